@@ -1,0 +1,64 @@
+//! Generates the MAVLink dialect from its XML and the log records from their `.proto`, and notes
+//! which build this is, so that every log can name it.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::{env, fs};
+
+use anyhow::{Context, Result};
+use prost::Message as _;
+use sha2::Digest as _;
+
+fn main() -> Result<()> {
+    let out_dir = PathBuf::from(env::var("OUT_DIR").context("OUT_DIR")?);
+    generate_dialect(&out_dir)?;
+    generate_log_records(&out_dir)?;
+    note_the_build()
+}
+
+fn generate_dialect(out_dir: &Path) -> Result<()> {
+    // The generated code asks for features that this crate does not have.
+    println!("cargo:rustc-check-cfg=cfg(feature, values(\"serde\", \"arbitrary\", \"ts-rs\"))");
+    for file in ["minimal", "standard", "common", "touchdown"] {
+        println!("cargo:rerun-if-changed=dialect/{file}.xml");
+    }
+    mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec!["dialect/touchdown.xml"]), out_dir)
+        .context("dialect/touchdown.xml")?;
+    Ok(())
+}
+
+fn generate_log_records(out_dir: &Path) -> Result<()> {
+    let file = "proto/touchdown/log/v1.proto";
+    println!("cargo:rerun-if-changed={file}");
+    let descriptors = protox::compile([file], ["proto"]).context(file)?;
+    fs::write(out_dir.join("log_v1.fds"), descriptors.encode_to_vec())?;
+    prost_build::Config::new().compile_fds(descriptors).context(file)?;
+    Ok(())
+}
+
+fn note_the_build() -> Result<()> {
+    let git = |args: &[&str]| {
+        let output = Command::new("git").args(args).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
+    if let Some(git_dir) = git(&["rev-parse", "--absolute-git-dir"]) {
+        println!("cargo:rerun-if-changed={git_dir}/HEAD");
+        println!("cargo:rerun-if-changed={git_dir}/logs/HEAD");
+    }
+    let rustc = env::var("RUSTC").context("RUSTC")?;
+    let version = Command::new(rustc).arg("--version").output().context("rustc --version")?;
+    let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+
+    println!("cargo:rerun-if-changed=../Cargo.lock");
+    let lock = fs::read("../Cargo.lock").unwrap_or_default();
+    let lock_hash: String = sha2::Sha256::digest(&lock).iter().map(|byte| format!("{byte:02x}")).collect();
+
+    println!("cargo:rustc-env=TOUCHDOWN_GIT_COMMIT={commit}");
+    println!("cargo:rustc-env=TOUCHDOWN_RUSTC={version}");
+    println!("cargo:rustc-env=TOUCHDOWN_TARGET={}", env::var("TARGET").context("TARGET")?);
+    let features = env::var("CARGO_CFG_TARGET_FEATURE").unwrap_or_default();
+    println!("cargo:rustc-env=TOUCHDOWN_TARGET_FEATURES={features}");
+    println!("cargo:rustc-env=TOUCHDOWN_LOCK_SHA256={lock_hash}");
+    Ok(())
+}

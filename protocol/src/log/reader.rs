@@ -1,0 +1,226 @@
+//! MCAP to messages: everything before the first damage, then what the damage was.
+//!
+//! Reads from front to back with bounded memory, needs no summary and no footer, and so reads the log
+//! of a recorder that was killed. A chunk is handed out only if its checksum holds.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+
+use mcap::records::Record as McapRecord;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+/// A record or chunk larger than this is taken for damage.
+const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
+
+/// A channel of the log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LogChannel {
+    /// Topic.
+    pub topic: String,
+    /// How messages are encoded: `protobuf`, `mavlink2`.
+    pub message_encoding: String,
+    /// Name of the schema; empty without one.
+    pub schema_name: String,
+    /// For raw frames: `link`, `endpoint`, `dialect`.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// One item of a log.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LogItem {
+    /// The file's header: which library wrote it.
+    Library(String),
+    /// A metadata record.
+    Metadata {
+        /// Its name.
+        name: String,
+        /// Its entries.
+        entries: BTreeMap<String, String>,
+    },
+    /// An attachment.
+    Attachment {
+        /// Its name.
+        name: String,
+        /// Its content.
+        data: Vec<u8>,
+    },
+    /// A message.
+    Message {
+        /// Its channel; see [`LogReader::channel`].
+        channel_id: u16,
+        /// Nanoseconds since the Unix epoch.
+        log_time_ns: u64,
+        /// Its number within its channel.
+        sequence: u32,
+        /// Its content.
+        data: Vec<u8>,
+    },
+    /// The end of the data, properly written.
+    DataEnd,
+}
+
+/// Where a log stops being readable.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Damage {
+    /// Not an MCAP file at all.
+    #[error("not an MCAP file: its first bytes are not the MCAP magic")]
+    NotMcap,
+    /// The file ends before its data do: its recorder was killed, or it was cut.
+    #[error("ends after {bytes} bytes without an end mark: the recorder was stopped, or the file was cut")]
+    Truncated {
+        /// Bytes read.
+        bytes: u64,
+    },
+    /// A record is broken.
+    #[error("unreadable near byte {near_byte}: {reason}")]
+    Corrupt {
+        /// Bytes read when it was noticed.
+        near_byte: u64,
+        /// What the parser said.
+        reason: String,
+    },
+}
+
+/// Reads a log's items in file order.
+pub struct LogReader<R: Read> {
+    input: R,
+    parser: LinearReader,
+    bytes_read: u64,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, LogChannel>,
+    saw_data_end: bool,
+    damage: Option<Damage>,
+    ended: bool,
+}
+
+impl<R: Read> LogReader<R> {
+    /// A reader at the start of `input`.
+    pub fn new(input: R) -> Self {
+        let options = LinearReaderOptions::default()
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(RECORD_LIMIT_BYTES);
+        Self {
+            input,
+            parser: LinearReader::new_with_options(options),
+            bytes_read: 0,
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            saw_data_end: false,
+            damage: None,
+            ended: false,
+        }
+    }
+
+    /// The channel of a message that was handed out.
+    pub fn channel(&self, id: u16) -> Option<&LogChannel> {
+        self.channels.get(&id)
+    }
+
+    /// Every channel seen so far.
+    pub fn channels(&self) -> impl Iterator<Item = (u16, &LogChannel)> {
+        self.channels.iter().map(|(id, channel)| (*id, channel))
+    }
+
+    /// What ended the reading early; `None` for a whole log, once the items are exhausted.
+    pub fn damage(&self) -> Option<&Damage> {
+        self.damage.as_ref()
+    }
+
+    /// The next item.
+    ///
+    /// # Errors
+    /// Reading the input itself failed. Damage is not an error: see [`LogReader::damage`].
+    pub fn next_item(&mut self) -> std::io::Result<Option<LogItem>> {
+        while !self.ended {
+            let parsed = match self.parser.next_event() {
+                None => {
+                    self.finish(None);
+                    break;
+                }
+                Some(Err(error)) => {
+                    let damage = self.describe(&error);
+                    self.finish(Some(damage));
+                    break;
+                }
+                Some(Ok(LinearReadEvent::ReadRequest(need))) => {
+                    let buffer = self.parser.insert(need);
+                    let count = self.input.read(buffer)?;
+                    self.parser.notify_read(count);
+                    self.bytes_read += count as u64;
+                    continue;
+                }
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
+                    mcap::parse_record(opcode, data).map(McapRecord::into_owned)
+                }
+            };
+            match parsed {
+                Ok(record) => {
+                    if let Some(item) = self.take(record) {
+                        return Ok(Some(item));
+                    }
+                }
+                Err(error) => {
+                    let damage = self.describe(&error);
+                    self.finish(Some(damage));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn finish(&mut self, damage: Option<Damage>) {
+        self.ended = true;
+        // Damage in the summary behind the data costs nothing that we read.
+        if !self.saw_data_end {
+            self.damage = damage.or(Some(Damage::Truncated { bytes: self.bytes_read }));
+        }
+    }
+
+    fn describe(&self, error: &mcap::McapError) -> Damage {
+        match error {
+            mcap::McapError::BadMagic => Damage::NotMcap,
+            mcap::McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Damage::NotMcap,
+            mcap::McapError::UnexpectedEof => Damage::Truncated { bytes: self.bytes_read },
+            other => Damage::Corrupt { near_byte: self.bytes_read, reason: other.to_string() },
+        }
+    }
+
+    fn take(&mut self, record: McapRecord<'static>) -> Option<LogItem> {
+        match record {
+            McapRecord::Header(header) => Some(LogItem::Library(header.library)),
+            McapRecord::Schema { header, .. } => {
+                self.schemas.insert(header.id, header.name);
+                None
+            }
+            McapRecord::Channel(channel) => {
+                let schema_name = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let known = LogChannel {
+                    topic: channel.topic,
+                    message_encoding: channel.message_encoding,
+                    schema_name,
+                    metadata: channel.metadata,
+                };
+                self.channels.insert(channel.id, known);
+                None
+            }
+            McapRecord::Message { header, data } => Some(LogItem::Message {
+                channel_id: header.channel_id,
+                log_time_ns: header.log_time,
+                sequence: header.sequence,
+                data: data.into_owned(),
+            }),
+            McapRecord::Metadata(metadata) => {
+                Some(LogItem::Metadata { name: metadata.name, entries: metadata.metadata })
+            }
+            McapRecord::Attachment { header, data, .. } => {
+                Some(LogItem::Attachment { name: header.name, data: data.into_owned() })
+            }
+            McapRecord::DataEnd(_) => {
+                self.saw_data_end = true;
+                Some(LogItem::DataEnd)
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! What can be written into a log, and on which topic it goes.
+
+use foxglove::messages::{FrameTransform, Log};
+
+use super::v1;
+
+/// Which way a raw frame went, seen from the program that wrote the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Direction {
+    /// Received.
+    Rx,
+    /// Sent.
+    Tx,
+}
+
+/// A raw MAVLink frame and where it passed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RawFrame {
+    /// Which way.
+    pub direction: Direction,
+    /// Who wrote it down: `vehicle` or `ground`.
+    pub endpoint: &'static str,
+    /// The link it crossed, as in `udpin:0.0.0.0:14550`.
+    pub link: String,
+    /// One whole frame.
+    pub bytes: Vec<u8>,
+}
+
+/// Something that happened, for a person to read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// How grave.
+    pub level: EventLevel,
+    /// Who says so: `vehicle`, `ground`, `recorder`.
+    pub name: String,
+    /// What happened.
+    pub message: String,
+}
+
+/// Gravity of an [`Event`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EventLevel {
+    /// As planned.
+    Info,
+    /// Worth a look.
+    Warning,
+    /// Something failed.
+    Error,
+    /// The flight is at stake.
+    Fatal,
+}
+
+/// One record of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// `/controller/tick`.
+    ControllerTick(Box<v1::ControllerTick>),
+    /// `/vehicle/truth`, and with it `/tf`: the same pose as a transform from `world` to `rocket`.
+    PlantTruth(Box<v1::PlantTruth>),
+    /// `/verdict`.
+    LandingVerdict(Box<v1::LandingVerdict>),
+    /// `/telemetry`.
+    Telemetry(Box<v1::Telemetry>),
+    /// `/operator`.
+    OperatorAction(v1::OperatorAction),
+    /// `/mavlink/rx/raw` or `/mavlink/tx/raw`.
+    RawFrame(RawFrame),
+    /// `/events`.
+    Event(Event),
+}
+
+/// Topic of the controller's ticks.
+pub const TOPIC_CONTROLLER_TICK: &str = "/controller/tick";
+/// Topic of the simulated plant's truth.
+pub const TOPIC_PLANT_TRUTH: &str = "/vehicle/truth";
+/// Topic of the landing verdict.
+pub const TOPIC_VERDICT: &str = "/verdict";
+/// Topic of a ground station's decoded telemetry.
+pub const TOPIC_TELEMETRY: &str = "/telemetry";
+/// Topic of the operator's keys and commands.
+pub const TOPIC_OPERATOR: &str = "/operator";
+/// Topic of raw frames received.
+pub const TOPIC_RAW_RX: &str = "/mavlink/rx/raw";
+/// Topic of raw frames sent.
+pub const TOPIC_RAW_TX: &str = "/mavlink/tx/raw";
+/// Topic of events.
+pub const TOPIC_EVENTS: &str = "/events";
+/// Topic of transforms.
+pub const TOPIC_TRANSFORM: &str = "/tf";
+/// Message encoding of the raw frames.
+pub const ENCODING_MAVLINK: &str = "mavlink2";
+
+/// Name of the metadata record that says which build wrote the log.
+pub const METADATA_BUILD: &str = "build";
+/// Name of the metadata record that says which run this is (profile, seed, start).
+pub const METADATA_RUN: &str = "run";
+/// Name of the attachment that holds the profile's whole text.
+pub const ATTACHMENT_PROFILE: &str = "profile.toml";
+/// Name of the attachment that holds the dialect.
+pub const ATTACHMENT_DIALECT: &str = "touchdown.xml";
+
+/// The pose of the plant as a Foxglove transform. World: x north, y west, z up; the rocket's x axis is
+/// its nose. Pitch `theta` from the horizontal is a rotation of `-theta` about y.
+pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform {
+    let half = -truth.state.theta_rad / 2.0;
+    FrameTransform {
+        timestamp: Some(timestamp(time_ns)),
+        parent_frame_id: "world".to_owned(),
+        child_frame_id: "rocket".to_owned(),
+        translation: Some(foxglove::messages::Vector3 { x: truth.state.x_m, y: 0.0, z: truth.state.z_m }),
+        rotation: Some(foxglove::messages::Quaternion {
+            x: 0.0,
+            y: display_sin(half),
+            z: 0.0,
+            w: display_cos(half),
+        }),
+    }
+}
+
+/// An event as a Foxglove log message.
+pub(super) fn log_message(event: &Event, time_ns: u64) -> Log {
+    let level = match event.level {
+        EventLevel::Info => foxglove::messages::log::Level::Info,
+        EventLevel::Warning => foxglove::messages::log::Level::Warning,
+        EventLevel::Error => foxglove::messages::log::Level::Error,
+        EventLevel::Fatal => foxglove::messages::log::Level::Fatal,
+    };
+    Log {
+        timestamp: Some(timestamp(time_ns)),
+        level: level as i32,
+        message: event.message.clone(),
+        name: event.name.clone(),
+        file: String::new(),
+        line: 0,
+    }
+}
+
+fn timestamp(time_ns: u64) -> foxglove::messages::Timestamp {
+    let seconds = u32::try_from(time_ns / 1_000_000_000).unwrap_or(u32::MAX);
+    foxglove::messages::Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
+}
+
+#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
+fn display_sin(angle_rad: f64) -> f64 {
+    angle_rad.sin()
+}
+
+#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
+fn display_cos(angle_rad: f64) -> f64 {
+    angle_rad.cos()
+}

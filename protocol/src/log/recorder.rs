@@ -1,0 +1,197 @@
+//! A thread that writes a log file, so that neither the control loop nor the screen waits for a disk.
+//!
+//! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can wait);
+//! [`Recorder::try_record`] never waits and counts what did not fit. The open chunk is ended and synced
+//! to the disk at least every 200 ms and at every [`Recorder::sync_soon`]: a killed process loses no
+//! more than that.
+
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::record::Record;
+use super::writer::{LogHeader, LogWriteError, LogWriter};
+
+const QUEUE_RECORDS: usize = 8192;
+const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
+
+/// Why recording could not begin or did not end well.
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// The file could not be made.
+    #[error("cannot create the log {}: {source}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Writing failed; what was synced before can still be read.
+    #[error("the log {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the writer said.
+        source: LogWriteError,
+    },
+    /// The writing thread is gone.
+    #[error("the log writer of {} stopped unexpectedly", path.display())]
+    Gone {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+enum Order {
+    Write(Box<Record>, u64),
+    SyncSoon,
+    Finish,
+}
+
+/// A handle to a log that is being written; clones write into the same log.
+#[derive(Clone)]
+pub struct Recorder {
+    orders: SyncSender<Order>,
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    path: PathBuf,
+    dropped: AtomicU64,
+    failed: AtomicBool,
+    thread: Mutex<Option<JoinHandle<Result<(), LogWriteError>>>>,
+}
+
+impl Recorder {
+    /// Creates the file and starts writing. An existing file is never overwritten.
+    ///
+    /// # Errors
+    /// The file exists or cannot be made, or its header cannot be written.
+    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
+        let create_error = |source| RecorderError::Create { path: path.to_owned(), source };
+        let file = File::options().write(true).read(true).create_new(true).open(path).map_err(create_error)?;
+        let disk = file.try_clone().map_err(create_error)?;
+        let writer = LogWriter::new(BufWriter::new(file), header)
+            .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
+        let (orders, inbox) = sync_channel(QUEUE_RECORDS);
+        let shared = Arc::new(Shared {
+            path: path.to_owned(),
+            dropped: AtomicU64::new(0),
+            failed: AtomicBool::new(false),
+            thread: Mutex::new(None),
+        });
+        let for_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || {
+                let ended = write_until_finished(writer, &disk, &inbox);
+                for_thread.failed.store(ended.is_err(), Ordering::Release);
+                ended
+            })
+            .map_err(create_error)?;
+        if let Ok(mut slot) = shared.thread.lock() {
+            *slot = Some(thread);
+        }
+        Ok(Self { orders, shared })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.shared.path
+    }
+
+    /// Records that found no room, or came after the writer had stopped.
+    pub fn dropped(&self) -> u64 {
+        self.shared.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Whether the writer still takes records.
+    pub fn is_running(&self) -> bool {
+        !self.shared.failed.load(Ordering::Acquire)
+    }
+
+    /// Writes a record, waiting for room; `time_ns` counts from the start of the run.
+    pub fn record(&self, record: Record, time_ns: u64) {
+        if self.orders.send(Order::Write(Box::new(record), time_ns)).is_err() {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Writes a record if there is room, else counts it as dropped.
+    pub fn try_record(&self, record: Record, time_ns: u64) {
+        if self.orders.try_send(Order::Write(Box::new(record), time_ns)).is_err() {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Asks for everything up to here to be put on the disk now: at every change of phase.
+    pub fn sync_soon(&self) {
+        // A full queue is being written anyway, and the timer syncs it.
+        let _ = self.orders.try_send(Order::SyncSoon);
+    }
+
+    /// Ends the log with its summary and waits for it. Later records of other handles count as dropped.
+    ///
+    /// # Errors
+    /// Some record could not be written; everything synced before it can still be read.
+    pub fn finish(&self) -> Result<PathBuf, RecorderError> {
+        let path = self.shared.path.clone();
+        let thread = self.shared.thread.lock().ok().and_then(|mut slot| slot.take());
+        let Some(thread) = thread else {
+            return Ok(path);
+        };
+        // If the thread is gone already, joining it says why.
+        let _ = self.orders.send(Order::Finish);
+        match thread.join() {
+            Ok(Ok(())) => Ok(path),
+            Ok(Err(source)) => Err(RecorderError::Write { path, source }),
+            Err(_panic) => Err(RecorderError::Gone { path }),
+        }
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "the flush timer is about the disk, not about the flight")]
+fn write_until_finished(
+    mut writer: LogWriter<BufWriter<File>>,
+    disk: &File,
+    inbox: &Receiver<Order>,
+) -> Result<(), LogWriteError> {
+    let mut flush_due: Option<Instant> = None;
+    loop {
+        let order = match flush_due {
+            None => inbox.recv().map_err(|_closed| RecvTimeoutError::Disconnected),
+            Some(due) => inbox.recv_timeout(due.saturating_duration_since(Instant::now())),
+        };
+        match order {
+            Ok(Order::Write(record, time_ns)) => {
+                writer.write(&record, time_ns)?;
+                let due = *flush_due.get_or_insert_with(|| Instant::now() + FLUSH_INTERVAL);
+                // Under a steady stream the receive never times out.
+                if Instant::now() >= due {
+                    sync(&mut writer, disk)?;
+                    flush_due = None;
+                }
+            }
+            Ok(Order::SyncSoon) | Err(RecvTimeoutError::Timeout) => {
+                sync(&mut writer, disk)?;
+                flush_due = None;
+            }
+            Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
+                let mut output = writer.finish()?;
+                output.flush().map_err(mcap::McapError::from)?;
+                return disk.sync_data().map_err(|error| mcap::McapError::from(error).into());
+            }
+        }
+    }
+}
+
+fn sync(writer: &mut LogWriter<BufWriter<File>>, disk: &File) -> Result<(), LogWriteError> {
+    writer.flush()?;
+    disk.sync_data().map_err(mcap::McapError::from)?;
+    Ok(())
+}

@@ -1,0 +1,234 @@
+//! Records to MCAP, without threads or clocks.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use foxglove::Encode as _;
+use foxglove::messages::{FrameTransform, Log};
+use mcap::records::MessageHeader;
+
+use super::build::build_info;
+use super::record::{
+    ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, Direction, ENCODING_MAVLINK, METADATA_BUILD, METADATA_RUN, RawFrame,
+    Record, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_VERDICT, log_message, transform,
+};
+use super::{DESCRIPTORS_V1, v1};
+use crate::dialect::DIALECT_XML;
+
+/// Small chunks lose little when the process is killed.
+const CHUNK_BYTES: u64 = 64 * 1024;
+
+/// What a log says about itself at its start.
+#[derive(Debug, Clone, Default)]
+pub struct LogHeader {
+    /// The program that writes it.
+    pub writer: String,
+    /// Start of the run, nanoseconds since the Unix epoch; record times count from here.
+    pub start_unix_ns: u64,
+    /// Run facts: profile, seed, start and so on.
+    pub run: BTreeMap<String, String>,
+    /// The profile's whole text, when the program knows it.
+    pub profile_toml: Option<String>,
+}
+
+/// Why a log could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum LogWriteError {
+    /// The MCAP writer refused or the file failed.
+    #[error("writing the log: {0}")]
+    Mcap(#[from] mcap::McapError),
+    /// A Foxglove message could not be encoded.
+    #[error("encoding {topic}: {reason}")]
+    Encode {
+        /// The topic.
+        topic: &'static str,
+        /// What the encoder said.
+        reason: String,
+    },
+}
+
+/// Writes records as MCAP messages, opening channels as they are needed.
+pub struct LogWriter<W: Write + Seek> {
+    writer: mcap::Writer<W>,
+    start_unix_ns: u64,
+    channels: BTreeMap<(String, String), (u16, u32)>,
+    buffer: Vec<u8>,
+}
+
+impl<W: Write + Seek> LogWriter<W> {
+    /// Starts a log: header, build and run metadata, profile and dialect attachments.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn new(output: W, header: &LogHeader) -> Result<Self, LogWriteError> {
+        let mut writer = mcap::WriteOptions::new()
+            .compression(Some(mcap::Compression::Lz4))
+            .chunk_size(Some(CHUNK_BYTES))
+            .library(format!("touchdown {} {}", header.writer, env!("CARGO_PKG_VERSION")))
+            .create(output)?;
+        writer.write_metadata(&mcap::records::Metadata {
+            name: METADATA_BUILD.to_owned(),
+            metadata: build_info(),
+        })?;
+        writer.write_metadata(&mcap::records::Metadata {
+            name: METADATA_RUN.to_owned(),
+            metadata: header.run.clone(),
+        })?;
+        let mut attach = |name: &str, media_type: &str, text: &str| {
+            writer.attach(&mcap::Attachment {
+                log_time: header.start_unix_ns,
+                create_time: header.start_unix_ns,
+                name: name.to_owned(),
+                media_type: media_type.to_owned(),
+                data: text.as_bytes().into(),
+            })
+        };
+        if let Some(profile) = &header.profile_toml {
+            attach(ATTACHMENT_PROFILE, "application/toml", profile)?;
+        }
+        attach(ATTACHMENT_DIALECT, "application/xml", DIALECT_XML)?;
+        Ok(Self { writer, start_unix_ns: header.start_unix_ns, channels: BTreeMap::new(), buffer: Vec::new() })
+    }
+
+    /// Writes one record; `time_ns` counts from the start of the run.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), LogWriteError> {
+        let log_time = self.start_unix_ns.saturating_add(time_ns);
+        match record {
+            Record::ControllerTick(tick) => {
+                self.write_v1(TOPIC_CONTROLLER_TICK, "ControllerTick", tick.as_ref(), log_time)
+            }
+            Record::PlantTruth(truth) => {
+                self.write_v1(TOPIC_PLANT_TRUTH, "PlantTruth", truth.as_ref(), log_time)?;
+                self.write_foxglove(TOPIC_TRANSFORM, &transform(truth, log_time), FrameTransform::get_schema(), log_time)
+            }
+            Record::LandingVerdict(verdict) => {
+                self.write_v1(TOPIC_VERDICT, "LandingVerdict", verdict.as_ref(), log_time)
+            }
+            Record::Telemetry(telemetry) => {
+                self.write_v1(TOPIC_TELEMETRY, "Telemetry", telemetry.as_ref(), log_time)
+            }
+            Record::OperatorAction(action) => self.write_v1(TOPIC_OPERATOR, "OperatorAction", action, log_time),
+            Record::RawFrame(frame) => self.write_raw(frame, log_time),
+            Record::Event(event) => {
+                self.write_foxglove(TOPIC_EVENTS, &log_message(event, log_time), Log::get_schema(), log_time)
+            }
+        }
+    }
+
+    /// Ends the open chunk, so that everything up to here can be read even if nothing follows.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn flush(&mut self) -> Result<(), LogWriteError> {
+        Ok(self.writer.flush()?)
+    }
+
+    /// Writes the summary and the footer.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn finish(mut self) -> Result<W, LogWriteError> {
+        self.writer.finish()?;
+        Ok(self.writer.into_inner())
+    }
+
+    fn write_v1<M: prost::Message>(
+        &mut self,
+        topic: &'static str,
+        message_name: &str,
+        message: &M,
+        log_time: u64,
+    ) -> Result<(), LogWriteError> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.clear();
+        buffer.reserve(message.encoded_len());
+        message.encode_raw(&mut buffer);
+        let schema = format!("{}.{message_name}", v1_package());
+        let channel = self.channel(topic, "protobuf", Some((&schema, DESCRIPTORS_V1)), &BTreeMap::new())?;
+        let written = self.put(channel, log_time, &buffer);
+        self.buffer = buffer;
+        written
+    }
+
+    fn write_foxglove<M: foxglove::Encode>(
+        &mut self,
+        topic: &'static str,
+        message: &M,
+        schema: Option<foxglove::Schema>,
+        log_time: u64,
+    ) -> Result<(), LogWriteError> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.clear();
+        let encoded = message.encode(&mut buffer);
+        encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })?;
+        let schema = schema.as_ref().map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        let channel = self.channel(topic, "protobuf", schema, &BTreeMap::new())?;
+        let written = self.put(channel, log_time, &buffer);
+        self.buffer = buffer;
+        written
+    }
+
+    fn write_raw(&mut self, frame: &RawFrame, log_time: u64) -> Result<(), LogWriteError> {
+        let topic = match frame.direction {
+            Direction::Rx => TOPIC_RAW_RX,
+            Direction::Tx => TOPIC_RAW_TX,
+        };
+        let metadata = BTreeMap::from([
+            ("dialect".to_owned(), "touchdown".to_owned()),
+            ("endpoint".to_owned(), frame.endpoint.to_owned()),
+            ("link".to_owned(), frame.link.clone()),
+        ]);
+        // A described schema on every channel: some readers refuse a file that has a channel without one.
+        let schema = ("mavlink2.Frame", RAW_FRAME_SCHEMA);
+        let channel = self.channel(topic, ENCODING_MAVLINK, Some(schema), &metadata)?;
+        self.put(channel, log_time, &frame.bytes)
+    }
+
+    fn channel(
+        &mut self,
+        topic: &str,
+        encoding: &str,
+        schema: Option<(&str, &[u8])>,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<(u16, u32), LogWriteError> {
+        let distinction = metadata.values().map(String::as_str).collect::<Vec<_>>().join(" ");
+        let key = (topic.to_owned(), distinction);
+        if let Some((id, sequence)) = self.channels.get_mut(&key) {
+            *sequence += 1;
+            return Ok((*id, *sequence));
+        }
+        let schema_id = match schema {
+            Some((name, data)) => {
+                let schema_encoding = if encoding == "protobuf" { "protobuf" } else { "text" };
+                self.writer.add_schema(name, schema_encoding, data)?
+            }
+            None => 0,
+        };
+        let id = self.writer.add_channel(schema_id, topic, encoding, metadata)?;
+        self.channels.insert(key, (id, 0));
+        Ok((id, 0))
+    }
+
+    fn put(&mut self, (channel_id, sequence): (u16, u32), log_time: u64, data: &[u8]) -> Result<(), LogWriteError> {
+        // publish_time equals log_time: one known reader takes only that.
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        Ok(self.writer.write_to_known_channel(&header, data)?)
+    }
+}
+
+const RAW_FRAME_SCHEMA: &[u8] =
+    b"One whole MAVLink frame, start marker to signature. Definitions: the attached dialect and its includes.";
+
+fn v1_package() -> &'static str {
+    "touchdown.log.v1"
+}
+
+impl From<v1::ControllerTick> for Record {
+    fn from(tick: v1::ControllerTick) -> Self {
+        Self::ControllerTick(Box::new(tick))
+    }
+}
