@@ -1,1 +1,18 @@
+//! The guidance flying a simulated vehicle, and the vehicle's end of the radio.
+//!
+//! * [`plant`]: the simulated vehicle, which the controller never sees: planar motion, motor, servos, ground.
+//! * [`scatter`]: seeded differences between the plant and what the controller believes.
+//! * [`vehicle`]: the flight computer: phases, checks, controller ticks, around one plant. Pure.
+//! * [`commands`]: what the radio may ask for and how it is answered. Pure.
+//! * [`telemetry`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's budget. Pure.
+//! * [`fly`]: the run loop: clock, links, log.
+#![warn(missing_docs)]
 
+pub mod commands;
+pub mod endpoint;
+pub mod fly;
+pub mod plant;
+pub mod scatter;
+pub mod solve_times;
+pub mod telemetry;
+pub mod vehicle;

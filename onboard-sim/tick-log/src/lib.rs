@@ -1,1 +1,235 @@
+//! Controller ticks between the flight code's types and the log's records, without losing a bit.
+//!
+//! The flight code knows nothing of logs and the log nothing of the flight code; whoever writes or replays
+//! a log goes through here.
+#![warn(missing_docs)]
 
+use flight::controller::{ControllerInput, ControllerOutput, Plan};
+use flight::dynamics::PlanarState;
+use flight::phase::Phase;
+use flight::verdict::LandingVerdict;
+use protocol::log::v1;
+
+/// Why a recorded tick cannot be given to this build's controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum TickLogError {
+    /// The phase's number has no meaning in this build.
+    #[error("tick {tick}: phase {phase} is unknown; this build knows 0 to {}", Phase::ALL.len() - 1)]
+    UnknownPhase {
+        /// The tick.
+        tick: u64,
+        /// The number found.
+        phase: u32,
+    },
+}
+
+/// A state as a record.
+pub fn state_to_log(state: &PlanarState) -> v1::PlanarState {
+    v1::PlanarState {
+        x_m: state.x_m,
+        z_m: state.z_m,
+        theta_rad: state.theta_rad,
+        u_m_s: state.u_m_s,
+        w_m_s: state.w_m_s,
+        q_rad_s: state.q_rad_s,
+    }
+}
+
+/// A recorded state.
+pub fn state_from_log(state: &v1::PlanarState) -> PlanarState {
+    PlanarState {
+        x_m: state.x_m,
+        z_m: state.z_m,
+        theta_rad: state.theta_rad,
+        u_m_s: state.u_m_s,
+        w_m_s: state.w_m_s,
+        q_rad_s: state.q_rad_s,
+    }
+}
+
+/// A tick's input as a record.
+pub fn input_to_log(input: &ControllerInput) -> v1::ControllerInput {
+    v1::ControllerInput {
+        tick: input.tick,
+        time_s: input.time_s,
+        phase: u32::from(input.phase.index()),
+        time_since_ignition_s: input.time_since_ignition_s,
+        state: state_to_log(&input.state),
+        gimbal_applied_rad: input.gimbal_applied_rad,
+        thrust_scale: input.thrust_scale,
+        degraded: input.degraded,
+        deadline_missed: input.deadline_missed,
+    }
+}
+
+/// A recorded input.
+///
+/// # Errors
+/// The phase is not one of this build's.
+pub fn input_from_log(input: &v1::ControllerInput) -> Result<ControllerInput, TickLogError> {
+    let unknown = TickLogError::UnknownPhase {
+        tick: input.tick,
+        phase: input.phase,
+    };
+    let phase = u8::try_from(input.phase)
+        .ok()
+        .and_then(Phase::from_index)
+        .ok_or(unknown)?;
+    Ok(ControllerInput {
+        tick: input.tick,
+        time_s: input.time_s,
+        phase,
+        time_since_ignition_s: input.time_since_ignition_s,
+        state: state_from_log(&input.state),
+        gimbal_applied_rad: input.gimbal_applied_rad,
+        thrust_scale: input.thrust_scale,
+        degraded: input.degraded,
+        deadline_missed: input.deadline_missed,
+    })
+}
+
+/// A tick's output as a record.
+pub fn output_to_log(output: &ControllerOutput) -> v1::ControllerOutput {
+    let solver = &output.solver;
+    v1::ControllerOutput {
+        tick: output.tick,
+        gimbal_command_rad: output.gimbal_command_rad,
+        fin_command_rad: output.fin_command_rad.to_vec(),
+        level: u32::from(output.level.index()),
+        solver: v1::SolverReport {
+            status: u32::from(solver.status.index()),
+            iterations: solver.iterations,
+            qp_iterations: solver.qp_iterations,
+            cost: solver.cost,
+            kkt_stationarity: solver.kkt_stationarity,
+            kkt_feasibility: solver.kkt_feasibility,
+            landing_feasible: solver.landing_feasible,
+            best_touchdown_speed_m_s: solver.best_touchdown_speed_m_s,
+        },
+        predicted_touchdown: v1::PredictedTouchdown {
+            time_from_now_s: output.predicted_touchdown.time_from_now_s,
+            state: state_to_log(&output.predicted_touchdown.state),
+        },
+        plan: plan_to_log(&output.plan),
+    }
+}
+
+/// A whole tick as a record. `state_digest` is the controller's
+/// [digest](flight::controller::ControllerState::digest) after the tick; the two times are measurements.
+pub fn tick_to_log(
+    input: &ControllerInput,
+    output: &ControllerOutput,
+    state_digest: u64,
+    solve_time_s: f64,
+    deadline_s: f64,
+) -> v1::ControllerTick {
+    v1::ControllerTick {
+        input: input_to_log(input),
+        output: output_to_log(output),
+        solve_time_s,
+        deadline_s,
+        state_digest,
+    }
+}
+
+/// A landing verdict as a record: the state at contact and how each limit was kept.
+pub fn verdict_to_log(time_s: f64, state: &PlanarState, verdict: &LandingVerdict) -> v1::LandingVerdict {
+    let limits = verdict.results.iter().map(|result| v1::LimitResult {
+        name: result.name.to_owned(),
+        value: result.value,
+        minimum: result.lowest,
+        maximum: result.highest,
+        unit: result.unit.to_owned(),
+        passed: result.passed,
+    });
+    v1::LandingVerdict {
+        time_s,
+        state: state_to_log(state),
+        limits: limits.collect(),
+        landed: verdict.landed(),
+    }
+}
+
+fn plan_to_log(plan: &Plan) -> v1::Plan {
+    v1::Plan {
+        states: plan.used_states().iter().map(state_to_log).collect(),
+        gimbal_rad: plan.used_gimbal_rad().to_vec(),
+        starts_in_s: plan.starts_in_s,
+        step_s: plan.step_s,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use prost::Message as _;
+
+    /// Any bit pattern: NaN payloads, both zeros, infinities, subnormals.
+    fn any_bits() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            any::<u64>().prop_map(f64::from_bits),
+            Just(0.0),
+            Just(-0.0),
+            Just(f64::NAN)
+        ]
+    }
+
+    fn bits(input: &ControllerInput) -> Vec<u64> {
+        let mut bits: Vec<u64> = input
+            .state
+            .to_array()
+            .iter()
+            .map(|value| value.to_bits())
+            .collect();
+        bits.extend([
+            input.tick,
+            input.time_s.to_bits(),
+            u64::from(input.phase.index()),
+            input.time_since_ignition_s.to_bits(),
+            input.gimbal_applied_rad.to_bits(),
+            input.thrust_scale.to_bits(),
+            u64::from(input.degraded),
+            u64::from(input.deadline_missed),
+        ]);
+        bits
+    }
+
+    proptest! {
+        #[test]
+        fn an_input_survives_the_log_bit_for_bit(
+            tick: u64,
+            phase in 0..Phase::ALL.len(),
+            numbers in prop::array::uniform10(any_bits()),
+            degraded: bool,
+            deadline_missed: bool,
+        ) {
+            let [x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s, time_s, since, gimbal, scale] = numbers;
+            let input = ControllerInput {
+                tick,
+                time_s,
+                phase: Phase::ALL[phase],
+                time_since_ignition_s: since,
+                state: PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s },
+                gimbal_applied_rad: gimbal,
+                thrust_scale: scale,
+                degraded,
+                deadline_missed,
+            };
+            let bytes = input_to_log(&input).encode_to_vec();
+            let read = v1::ControllerInput::decode(bytes.as_slice()).unwrap();
+            prop_assert_eq!(bits(&input_from_log(&read).unwrap()), bits(&input));
+        }
+    }
+
+    #[test]
+    fn an_unknown_phase_is_refused_by_its_number() {
+        let input = v1::ControllerInput {
+            tick: 7,
+            phase: 13,
+            ..v1::ControllerInput::default()
+        };
+        let error = input_from_log(&input).unwrap_err().to_string();
+        assert_eq!(error, "tick 7: phase 13 is unknown; this build knows 0 to 12");
+    }
+}

@@ -173,7 +173,9 @@ impl<R: Read> LogReader<R> {
         self.ended = true;
         // Damage in the summary behind the data costs nothing that we read.
         if !self.saw_data_end {
-            self.damage = damage.or(Some(Damage::Truncated { bytes: self.bytes_read }));
+            self.damage = damage.or(Some(Damage::Truncated {
+                bytes: self.bytes_read,
+            }));
         }
     }
 
@@ -181,8 +183,13 @@ impl<R: Read> LogReader<R> {
         match error {
             mcap::McapError::BadMagic => Damage::NotMcap,
             mcap::McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Damage::NotMcap,
-            mcap::McapError::UnexpectedEof => Damage::Truncated { bytes: self.bytes_read },
-            other => Damage::Corrupt { near_byte: self.bytes_read, reason: other.to_string() },
+            mcap::McapError::UnexpectedEof => Damage::Truncated {
+                bytes: self.bytes_read,
+            },
+            other => Damage::Corrupt {
+                near_byte: self.bytes_read,
+                reason: other.to_string(),
+            },
         }
     }
 
@@ -210,12 +217,14 @@ impl<R: Read> LogReader<R> {
                 sequence: header.sequence,
                 data: data.into_owned(),
             }),
-            McapRecord::Metadata(metadata) => {
-                Some(LogItem::Metadata { name: metadata.name, entries: metadata.metadata })
-            }
-            McapRecord::Attachment { header, data, .. } => {
-                Some(LogItem::Attachment { name: header.name, data: data.into_owned() })
-            }
+            McapRecord::Metadata(metadata) => Some(LogItem::Metadata {
+                name: metadata.name,
+                entries: metadata.metadata,
+            }),
+            McapRecord::Attachment { header, data, .. } => Some(LogItem::Attachment {
+                name: header.name,
+                data: data.into_owned(),
+            }),
             McapRecord::DataEnd(_) => {
                 self.saw_data_end = true;
                 Some(LogItem::DataEnd)

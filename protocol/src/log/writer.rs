@@ -9,9 +9,9 @@ use mcap::records::MessageHeader;
 
 use super::build::build_info;
 use super::record::{
-    ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, Direction, ENCODING_MAVLINK, METADATA_BUILD, METADATA_RUN, RawFrame,
-    Record, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
-    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_VERDICT, log_message, transform,
+    ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, Direction, ENCODING_MAVLINK, METADATA_BUILD, METADATA_RUN,
+    RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
+    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_VERDICT, log_message, transform,
 };
 use super::{DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
@@ -65,7 +65,11 @@ impl<W: Write + Seek> LogWriter<W> {
         let mut writer = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
-            .library(format!("touchdown {} {}", header.writer, env!("CARGO_PKG_VERSION")))
+            .library(format!(
+                "touchdown {} {}",
+                header.writer,
+                env!("CARGO_PKG_VERSION")
+            ))
             .create(output)?;
         writer.write_metadata(&mcap::records::Metadata {
             name: METADATA_BUILD.to_owned(),
@@ -88,7 +92,12 @@ impl<W: Write + Seek> LogWriter<W> {
             attach(ATTACHMENT_PROFILE, "application/toml", profile)?;
         }
         attach(ATTACHMENT_DIALECT, "application/xml", DIALECT_XML)?;
-        Ok(Self { writer, start_unix_ns: header.start_unix_ns, channels: BTreeMap::new(), buffer: Vec::new() })
+        Ok(Self {
+            writer,
+            start_unix_ns: header.start_unix_ns,
+            channels: BTreeMap::new(),
+            buffer: Vec::new(),
+        })
     }
 
     /// Writes one record; `time_ns` counts from the start of the run.
@@ -103,7 +112,12 @@ impl<W: Write + Seek> LogWriter<W> {
             }
             Record::PlantTruth(truth) => {
                 self.write_v1(TOPIC_PLANT_TRUTH, "PlantTruth", truth.as_ref(), log_time)?;
-                self.write_foxglove(TOPIC_TRANSFORM, &transform(truth, log_time), FrameTransform::get_schema(), log_time)
+                self.write_foxglove(
+                    TOPIC_TRANSFORM,
+                    &transform(truth, log_time),
+                    FrameTransform::get_schema(),
+                    log_time,
+                )
             }
             Record::LandingVerdict(verdict) => {
                 self.write_v1(TOPIC_VERDICT, "LandingVerdict", verdict.as_ref(), log_time)
@@ -111,11 +125,16 @@ impl<W: Write + Seek> LogWriter<W> {
             Record::Telemetry(telemetry) => {
                 self.write_v1(TOPIC_TELEMETRY, "Telemetry", telemetry.as_ref(), log_time)
             }
-            Record::OperatorAction(action) => self.write_v1(TOPIC_OPERATOR, "OperatorAction", action, log_time),
-            Record::RawFrame(frame) => self.write_raw(frame, log_time),
-            Record::Event(event) => {
-                self.write_foxglove(TOPIC_EVENTS, &log_message(event, log_time), Log::get_schema(), log_time)
+            Record::OperatorAction(action) => {
+                self.write_v1(TOPIC_OPERATOR, "OperatorAction", action, log_time)
             }
+            Record::RawFrame(frame) => self.write_raw(frame, log_time),
+            Record::Event(event) => self.write_foxglove(
+                TOPIC_EVENTS,
+                &log_message(event, log_time),
+                Log::get_schema(),
+                log_time,
+            ),
         }
     }
 
@@ -148,7 +167,12 @@ impl<W: Write + Seek> LogWriter<W> {
         buffer.reserve(message.encoded_len());
         message.encode_raw(&mut buffer);
         let schema = format!("{}.{message_name}", v1_package());
-        let channel = self.channel(topic, "protobuf", Some((&schema, DESCRIPTORS_V1)), &BTreeMap::new())?;
+        let channel = self.channel(
+            topic,
+            "protobuf",
+            Some((&schema, DESCRIPTORS_V1)),
+            &BTreeMap::new(),
+        )?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
         written
@@ -164,8 +188,13 @@ impl<W: Write + Seek> LogWriter<W> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         let encoded = message.encode(&mut buffer);
-        encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })?;
-        let schema = schema.as_ref().map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        encoded.map_err(|error| LogWriteError::Encode {
+            topic,
+            reason: error.to_string(),
+        })?;
+        let schema = schema
+            .as_ref()
+            .map(|schema| (schema.name.as_str(), schema.data.as_ref()));
         let channel = self.channel(topic, "protobuf", schema, &BTreeMap::new())?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
@@ -195,7 +224,11 @@ impl<W: Write + Seek> LogWriter<W> {
         schema: Option<(&str, &[u8])>,
         metadata: &BTreeMap<String, String>,
     ) -> Result<(u16, u32), LogWriteError> {
-        let distinction = metadata.values().map(String::as_str).collect::<Vec<_>>().join(" ");
+        let distinction = metadata
+            .values()
+            .map(String::as_str)
+            .collect::<Vec<_>>()
+            .join(" ");
         let key = (topic.to_owned(), distinction);
         if let Some((id, sequence)) = self.channels.get_mut(&key) {
             *sequence += 1;
@@ -203,7 +236,11 @@ impl<W: Write + Seek> LogWriter<W> {
         }
         let schema_id = match schema {
             Some((name, data)) => {
-                let schema_encoding = if encoding == "protobuf" { "protobuf" } else { "text" };
+                let schema_encoding = if encoding == "protobuf" {
+                    "protobuf"
+                } else {
+                    "text"
+                };
                 self.writer.add_schema(name, schema_encoding, data)?
             }
             None => 0,
@@ -213,9 +250,19 @@ impl<W: Write + Seek> LogWriter<W> {
         Ok((id, 0))
     }
 
-    fn put(&mut self, (channel_id, sequence): (u16, u32), log_time: u64, data: &[u8]) -> Result<(), LogWriteError> {
+    fn put(
+        &mut self,
+        (channel_id, sequence): (u16, u32),
+        log_time: u64,
+        data: &[u8],
+    ) -> Result<(), LogWriteError> {
         // publish_time equals log_time: one known reader takes only that.
-        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        let header = MessageHeader {
+            channel_id,
+            sequence,
+            log_time,
+            publish_time: log_time,
+        };
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }
 }

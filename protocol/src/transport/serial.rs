@@ -32,7 +32,11 @@ async fn run(path: String, baud: u32, inbox: Sender<Received>, mut outbox: Recei
         };
         // Said once, not twice a second.
         if trouble != last_trouble {
-            if inbox.send(Received::Down(format!("{path}: {trouble}"))).await.is_err() {
+            if inbox
+                .send(Received::Down(format!("{path}: {trouble}")))
+                .await
+                .is_err()
+            {
                 return;
             }
             last_trouble = trouble;
@@ -47,7 +51,11 @@ async fn run(path: String, baud: u32, inbox: Sender<Received>, mut outbox: Recei
 }
 
 /// Carries bytes until the line fails (says why) or nobody wants it any more (`None`).
-async fn carry(port: SerialStream, inbox: &Sender<Received>, outbox: &mut Receiver<Vec<u8>>) -> Option<String> {
+async fn carry(
+    port: SerialStream,
+    inbox: &Sender<Received>,
+    outbox: &mut Receiver<Vec<u8>>,
+) -> Option<String> {
     let (mut reader, mut writer) = tokio::io::split(port);
     let mut buffer = [0; 1024];
     loop {

@@ -12,17 +12,32 @@ const MAX_DATAGRAM: usize = 2048;
 /// Peers that a listening socket answers at the same time.
 const MAX_PEERS: usize = 4;
 
-pub(super) async fn listen(address: &str, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) -> io::Result<()> {
+pub(super) async fn listen(
+    address: &str,
+    inbox: Sender<Received>,
+    outbox: Receiver<Vec<u8>>,
+) -> io::Result<()> {
     let socket = UdpSocket::bind(address).await?;
     tokio::spawn(run(socket, Vec::new(), false, inbox, outbox));
     Ok(())
 }
 
-pub(super) async fn connect(address: &str, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) -> io::Result<()> {
+pub(super) async fn connect(
+    address: &str,
+    inbox: Sender<Received>,
+    outbox: Receiver<Vec<u8>>,
+) -> io::Result<()> {
     let peer = lookup_host(address).await?.next().ok_or_else(|| {
-        io::Error::new(io::ErrorKind::NotFound, format!("the name in `{address}` has no address"))
+        io::Error::new(
+            io::ErrorKind::NotFound,
+            format!("the name in `{address}` has no address"),
+        )
     })?;
-    let any: SocketAddr = if peer.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
+    let any: SocketAddr = if peer.is_ipv4() {
+        ([0, 0, 0, 0], 0).into()
+    } else {
+        ([0u16; 8], 0).into()
+    };
     // Not connected: an ICMP "port unreachable" from a ground that starts later must not end the link.
     let socket = UdpSocket::bind(any).await?;
     tokio::spawn(run(socket, vec![peer], true, inbox, outbox));

@@ -1,0 +1,158 @@
+//! The checks before arming on the pad.
+
+pub use crate::check::{Check, all_passed, first_refusal};
+use crate::profile::ArmingLimits;
+use crate::verdict::LandingVerdict;
+
+/// What the arming checks look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmingInput {
+    /// The physical pin has been pulled.
+    pub pin_out: bool,
+    /// An abort is latched.
+    pub abort_latched: bool,
+    /// Tilt from the vertical, rad.
+    pub tilt_rad: f64,
+    /// Rotation rate, rad/s.
+    pub rotation_rad_s: f64,
+    /// Speed, m/s.
+    pub speed_m_s: f64,
+    /// The self-test passed.
+    pub self_test_passed: bool,
+    /// The estimator has settled.
+    pub estimator_converged: bool,
+    /// Fins that answered from their commanded angle.
+    pub fins_answering: [bool; 4],
+    /// The landing motor's igniter has continuity.
+    pub igniter_continuity: bool,
+    /// The log is being written.
+    pub log_running: bool,
+    /// Free space for the log, bytes.
+    pub log_space_bytes: u64,
+    /// The rehearsal of the landing converged
+    /// ([`SolverReport::converged`](crate::controller::SolverReport::converged)).
+    pub controller_warm: bool,
+    /// The rehearsal's words for its outcome
+    /// ([`SolverReport::summary`](crate::controller::SolverReport::summary)).
+    pub controller_found: String,
+    /// The rehearsal's end judged against the touchdown limits; `None` without a rehearsal.
+    pub predicted_landing: Option<LandingVerdict>,
+}
+
+/// Every arming check with the value found, in the order an operator fixes them.
+pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
+    let answering = input.fins_answering.iter().filter(|answers| **answers).count();
+    let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
+    vec![
+        Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
+        Check::condition("pin", input.pin_out, "out", "in"),
+        Check::condition("self-test", input.self_test_passed, "passed", "not passed"),
+        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
+        Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
+        Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
+        Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
+        Check {
+            name: "fins answering",
+            passed: answering == input.fins_answering.len(),
+            found: format!("{answering} of 4"),
+            required: "4 of 4".to_owned(),
+        },
+        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
+        Check::condition("log", input.log_running, "running", "not running"),
+        Check {
+            name: "log space",
+            passed: input.log_space_bytes >= limits.log_space_min_bytes,
+            found: mib(input.log_space_bytes),
+            required: format!("at least {}", mib(limits.log_space_min_bytes)),
+        },
+        Check {
+            name: "controller warm",
+            passed: input.controller_warm,
+            found: input.controller_found.clone(),
+            required: "a converged rehearsal".to_owned(),
+        },
+        predicted_landing(input.predicted_landing.as_ref()),
+    ]
+}
+
+fn predicted_landing(verdict: Option<&LandingVerdict>) -> Check {
+    let found = match verdict {
+        None => "no prediction".to_owned(),
+        Some(verdict) => verdict.summary(),
+    };
+    Check {
+        name: "predicted touchdown",
+        passed: verdict.is_some_and(LandingVerdict::landed),
+        found,
+        required: "inside every touchdown limit".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::PlanarState;
+    use crate::profile::Profile;
+    use crate::verdict::TouchdownLimits;
+
+    fn ready() -> ArmingInput {
+        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let down = PlanarState { theta_rad: core::f64::consts::FRAC_PI_2, ..PlanarState::default() };
+        ArmingInput {
+            pin_out: true,
+            abort_latched: false,
+            tilt_rad: 0.01,
+            rotation_rad_s: 0.0,
+            speed_m_s: 0.0,
+            self_test_passed: true,
+            estimator_converged: true,
+            fins_answering: [true; 4],
+            igniter_continuity: true,
+            log_running: true,
+            log_space_bytes: 1 << 30,
+            controller_warm: true,
+            controller_found: "converged".to_owned(),
+            predicted_landing: Some(LandingVerdict::judge(&TouchdownLimits::from_profile(&profile), &down)),
+        }
+    }
+
+    #[test]
+    fn a_ready_vehicle_passes_every_check() {
+        let checks = arming_checks(&ArmingLimits::default(), &ready());
+        assert!(all_passed(&checks));
+        assert_eq!(first_refusal(&checks), None);
+    }
+
+    /// A reading spoilt on purpose, and the check that must refuse it.
+    type Spoiling = (&'static str, fn(&mut ArmingInput));
+
+    #[test]
+    fn each_check_refuses_alone_and_names_itself_and_the_value() {
+        let spoilings: [Spoiling; 14] = [
+            ("abort latch: found latched", |input| input.abort_latched = true),
+            ("pin: found in, required out", |input| input.pin_out = false),
+            ("self-test: found not passed", |input| input.self_test_passed = false),
+            ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
+                input.tilt_rad = 6.0_f64.to_radians();
+            }),
+            ("tilt from vertical: found NaN deg", |input| input.tilt_rad = f64::NAN),
+            ("rotation: found", |input| input.rotation_rad_s = -0.5),
+            ("speed: found 1.00 m/s", |input| input.speed_m_s = 1.0),
+            ("estimator: found not converged", |input| input.estimator_converged = false),
+            ("fins answering: found 3 of 4", |input| input.fins_answering[2] = false),
+            ("igniter continuity: found open circuit", |input| input.igniter_continuity = false),
+            ("log: found not running", |input| input.log_running = false),
+            ("log space: found 1 MiB", |input| input.log_space_bytes = 1 << 20),
+            ("controller warm: found", |input| input.controller_warm = false),
+            ("predicted touchdown: found no prediction", |input| input.predicted_landing = None),
+        ];
+        for (expected, spoil) in spoilings {
+            let mut input = ready();
+            spoil(&mut input);
+            let checks = arming_checks(&ArmingLimits::default(), &input);
+            assert_eq!(checks.iter().filter(|check| !check.passed).count(), 1, "{expected}");
+            let refusal = first_refusal(&checks).unwrap();
+            assert!(refusal.starts_with(expected), "{refusal}");
+        }
+    }
+}

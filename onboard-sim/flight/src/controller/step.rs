@@ -1,0 +1,278 @@
+//! The tick itself.
+
+use super::{
+    ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, FlownPlan, MAX_HORIZON_STEPS,
+    Plan, PredictedTouchdown, SolverReport,
+};
+use crate::dynamics::PlanarState;
+use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart, solve};
+use crate::phase::Phase;
+
+/// Largest miss of an end or path condition that still counts as a plan that lands, m, rad, m/s or rad/s.
+const LANDING_MISS: f64 = 1e-3;
+
+/// Advances the controller by one tick.
+///
+/// Never fails and never returns a command that is not a number: what cannot be planned is flown by a lower
+/// [`ControlLevel`].
+pub fn step(state: &mut ControllerState, input: &ControllerInput) -> ControllerOutput {
+    let decision = match input.phase {
+        Phase::PadIdle | Phase::PadArmed => rehearse(state),
+        phase if phase.is_landing() => land(state, input),
+        _ => {
+            state.flown = None;
+            Decision::idle()
+        }
+    };
+    let limit_rad = state.config.profile.gimbal.limit_rad();
+    let command_rad = decision.gimbal_rad.clamp(-limit_rad, limit_rad);
+    ControllerOutput {
+        tick: input.tick,
+        gimbal_command_rad: if command_rad.is_finite() { command_rad } else { 0.0 },
+        fin_command_rad: [fin_rad(&state.config, input.phase); 4],
+        level: decision.level,
+        solver: decision.report,
+        predicted_touchdown: decision.touchdown,
+        plan: decision.plan,
+    }
+}
+
+/// What a branch of the tick decides.
+struct Decision {
+    gimbal_rad: f64,
+    level: ControlLevel,
+    report: SolverReport,
+    touchdown: PredictedTouchdown,
+    plan: Plan,
+}
+
+impl Decision {
+    fn idle() -> Self {
+        Self {
+            gimbal_rad: 0.0,
+            level: ControlLevel::Idle,
+            report: SolverReport::NOT_RUN,
+            touchdown: PredictedTouchdown::default(),
+            plan: Plan::none(),
+        }
+    }
+}
+
+/// The fins' opening angle in a phase, rad: closed until apogee, deployed from then on.
+fn fin_rad(config: &ControllerConfig, phase: Phase) -> f64 {
+    let fins = &config.profile.fins;
+    if phase.on_pad() || matches!(phase, Phase::Boost | Phase::Coast) {
+        fins.closed_rad()
+    } else {
+        fins.deployed_rad()
+    }
+}
+
+/// Solves the landing from the profile's start state as if released now; the gimbal stays centred.
+fn rehearse(state: &mut ControllerState) -> Decision {
+    let config = &state.config;
+    let start = config.profile.start.planar_state();
+    let moment = Moment::of(config, 0.0);
+    let thrust_n = config.profile.motor.mean_thrust_n(0.0, moment.sample_time_s);
+    let predicted = config.model.rk4_step(&start, 0.0, thrust_n, moment.sample_time_s);
+    let problem = moment.problem(config, predicted, 1.0);
+    let warm = moment.warm_start(state.flown.as_ref());
+    let solution = solve(&problem, warm.as_ref());
+    let decision = planned(config, &moment, &solution);
+    state.flown = keep(&moment, solution);
+    Decision { gimbal_rad: 0.0, level: ControlLevel::Rehearsal, ..decision }
+}
+
+/// Plans the rest of the landing and takes the plan's first input, or the best that is left.
+fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
+    let moment = Moment::of(&state.config, input.time_since_ignition_s);
+    if input.degraded {
+        return stabilise(state, input, &moment, SolverReport::NOT_RUN);
+    }
+    let Some(predicted) = predict(&state.config, input, &moment) else {
+        let report = SolverReport { status: SolveStatus::BadInput, ..SolverReport::NOT_RUN };
+        return fall_back(state, input, &moment, report);
+    };
+    if moment.intervals == 0 {
+        return after_the_plan(state, input, &moment, predicted);
+    }
+    let mut problem = moment.problem(&state.config, predicted, input.thrust_scale);
+    if input.deadline_missed {
+        problem.solver.max_iterations = problem.solver.max_iterations_after_miss;
+    }
+    let warm = moment.warm_start(state.flown.as_ref());
+    let solution = solve(&problem, warm.as_ref());
+    if solution.inputs_rad.is_empty() {
+        let report = report_of(&solution);
+        return fall_back(state, input, &moment, report);
+    }
+    let decision = planned(&state.config, &moment, &solution);
+    state.flown = keep(&moment, solution);
+    decision
+}
+
+/// The plan's last input is being held: nothing is left to plan. Without thrust nothing is left to do either.
+fn after_the_plan(
+    state: &ControllerState,
+    input: &ControllerInput,
+    moment: &Moment,
+    predicted: PlanarState,
+) -> Decision {
+    if state.config.profile.motor.mean_thrust_n(moment.starts_s, moment.sample_time_s) > 0.0 {
+        return stabilise(state, input, moment, SolverReport::NOT_RUN);
+    }
+    let touchdown = PredictedTouchdown { time_from_now_s: moment.sample_time_s, state: predicted };
+    Decision { touchdown, ..Decision::idle() }
+}
+
+/// Where in the landing a tick is.
+struct Moment {
+    sample_time_s: f64,
+    /// Samples between ignition and the instant this tick's command is applied.
+    first_interval: usize,
+    /// Intervals from there to the end of the horizon.
+    intervals: usize,
+    /// Time since ignition at the beginning of the first interval, s.
+    starts_s: f64,
+}
+
+impl Moment {
+    fn of(config: &ControllerConfig, time_since_ignition_s: f64) -> Self {
+        let sample_time_s = config.sample_time_s();
+        let horizon = config.profile.nmpc.horizon_steps.min(MAX_HORIZON_STEPS);
+        let elapsed = (time_since_ignition_s / sample_time_s).clamp(0.0, horizon as f64);
+        // A time that is not a number lands on 0, and the state check answers it.
+        let first_interval = libm::round(elapsed) as usize + 1;
+        Self {
+            sample_time_s,
+            first_interval,
+            intervals: horizon.saturating_sub(first_interval),
+            starts_s: time_since_ignition_s.max(0.0) + sample_time_s,
+        }
+    }
+
+    fn problem(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64) -> Problem {
+        Problem::from_profile(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale)
+    }
+
+    /// The flown plan shifted to this moment, if it reaches this far.
+    fn warm_start(&self, flown: Option<&FlownPlan>) -> Option<WarmStart> {
+        let flown = flown?;
+        let elapsed = self.first_interval.checked_sub(flown.first_interval)?;
+        let warm = flown.solution.shifted(elapsed);
+        (warm.inputs_rad.len() == self.intervals).then_some(warm)
+    }
+
+    /// The flown plan's input for this moment, and the states from there on.
+    fn shifted_plan<'a>(&self, flown: Option<&'a FlownPlan>) -> Option<(&'a [PlanarState], &'a [f64])> {
+        let flown = flown?;
+        let elapsed = self.first_interval.checked_sub(flown.first_interval)?;
+        let inputs_rad = flown.solution.inputs_rad.get(elapsed..).filter(|inputs| !inputs.is_empty())?;
+        Some((flown.solution.states.get(elapsed..)?, inputs_rad))
+    }
+}
+
+/// The state one sample ahead, under the angle the actuator holds; `None` unless everything is finite.
+fn predict(config: &ControllerConfig, input: &ControllerInput, moment: &Moment) -> Option<PlanarState> {
+    let inputs = [input.gimbal_applied_rad, input.thrust_scale, input.time_since_ignition_s];
+    if !(input.state.is_finite() && inputs.iter().all(|value| value.is_finite())) {
+        return None;
+    }
+    let nominal_n = config.profile.motor.mean_thrust_n(input.time_since_ignition_s, moment.sample_time_s);
+    let thrust_n = input.thrust_scale * nominal_n;
+    let predicted =
+        config.model.rk4_step(&input.state, input.gimbal_applied_rad, thrust_n, moment.sample_time_s);
+    predicted.is_finite().then_some(predicted)
+}
+
+/// The decision a solved plan leads to.
+fn planned(config: &ControllerConfig, moment: &Moment, solution: &Solution) -> Decision {
+    let report = report_of(solution);
+    let sample_time_s = config.sample_time_s();
+    let level = if report.converged() { ControlLevel::Converged } else { ControlLevel::BestFeasible };
+    Decision {
+        gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(0.0),
+        level,
+        report,
+        touchdown: PredictedTouchdown {
+            time_from_now_s: (1 + moment.intervals) as f64 * sample_time_s,
+            state: solution.states.last().copied().unwrap_or_default(),
+        },
+        plan: Plan::through(&solution.states, &solution.inputs_rad, sample_time_s, sample_time_s),
+    }
+}
+
+fn report_of(solution: &Solution) -> SolverReport {
+    SolverReport {
+        status: solution.status,
+        iterations: u32::try_from(solution.iterations).unwrap_or(u32::MAX),
+        qp_iterations: solution.qp_iterations,
+        cost: solution.cost,
+        kkt_stationarity: solution.kkt_stationarity,
+        kkt_feasibility: solution.kkt_feasibility,
+        landing_feasible: !solution.inputs_rad.is_empty() && solution.condition_miss <= LANDING_MISS,
+        best_touchdown_speed_m_s: solution.best_touchdown_speed_m_s,
+    }
+}
+
+fn keep(moment: &Moment, solution: Solution) -> Option<FlownPlan> {
+    (!solution.inputs_rad.is_empty()).then_some(FlownPlan { first_interval: moment.first_interval, solution })
+}
+
+/// Nothing could be planned: the previous plan if it reaches this far and can still be trusted, else upright.
+fn fall_back(state: &ControllerState, input: &ControllerInput, moment: &Moment, report: SolverReport) -> Decision {
+    // A plan towards a landing that is known to be impossible is not worth following.
+    if report.status != SolveStatus::NotLandable
+        && let Some((states, inputs_rad)) = moment.shifted_plan(state.flown.as_ref())
+    {
+        return Decision {
+            gimbal_rad: inputs_rad.first().copied().unwrap_or(0.0),
+            level: ControlLevel::ShiftedPlan,
+            report,
+            touchdown: PredictedTouchdown {
+                time_from_now_s: (1 + inputs_rad.len()) as f64 * moment.sample_time_s,
+                state: states.last().copied().unwrap_or_default(),
+            },
+            plan: Plan::through(states, inputs_rad, moment.sample_time_s, moment.sample_time_s),
+        };
+    }
+    stabilise(state, input, moment, report)
+}
+
+/// The upright law, and the path it leads along.
+fn stabilise(state: &ControllerState, input: &ControllerInput, moment: &Moment, report: SolverReport) -> Decision {
+    let upright = Decision { level: ControlLevel::Stabiliser, report, ..Decision::idle() };
+    let Some(predicted) = predict(&state.config, input, moment) else {
+        return upright;
+    };
+    let config = &state.config;
+    let limit_rad = config.profile.gimbal.limit_rad();
+    let sample_time_s = moment.sample_time_s;
+    let mut states = vec![predicted];
+    let mut inputs_rad = Vec::with_capacity(moment.intervals);
+    let mut ahead = predicted;
+    for k in 0..moment.intervals.max(1) {
+        let nominal_n =
+            config.profile.motor.mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
+        let thrust_n = input.thrust_scale * nominal_n;
+        let gimbal_rad = config.stabiliser.gimbal(&ahead, thrust_n, limit_rad);
+        inputs_rad.push(gimbal_rad);
+        ahead = config.model.rk4_step(&ahead, gimbal_rad, thrust_n, sample_time_s);
+        if !ahead.is_finite() {
+            break;
+        }
+        states.push(ahead);
+        if ahead.z_m <= 0.0 {
+            break;
+        }
+    }
+    Decision {
+        gimbal_rad: inputs_rad.first().copied().unwrap_or(0.0),
+        touchdown: PredictedTouchdown {
+            time_from_now_s: states.len() as f64 * sample_time_s,
+            state: states.last().copied().unwrap_or_default(),
+        },
+        plan: Plan::through(&states, &inputs_rad, sample_time_s, sample_time_s),
+        ..upright
+    }
+}

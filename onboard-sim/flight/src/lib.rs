@@ -1,0 +1,28 @@
+//! Everything that decides in flight, and nothing else.
+//!
+//! The crate is pure: state, inputs and time are arguments, and the same arguments give the same bits on any
+//! machine. There is no clock, socket, file, thread or random source in it, so a log of
+//! [`controller::ControllerInput`] is enough to fly the controller again.
+//!
+//! * [`profile`]: the vehicle, motor, start, weights and limits, as data.
+//! * [`phase`]: the flight phases and the one table that moves between them.
+//! * [`arming`] and [`gate`]: the checks before arming and before ignition, each with the value found.
+//! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
+//! * [`nmpc`]: the landing optimal-control problem and its solver.
+//! * [`stabiliser`]: the upright law that flies when no plan can be had.
+//! * [`controller`]: one tick of the controller, from estimate to gimbal command.
+//! * [`verdict`]: the touchdown limits and whether a landing kept them.
+//!
+//! Units are SI and radians; names carry units and frames. The frames are those of [`dynamics`].
+#![warn(missing_docs)]
+
+pub mod arming;
+pub mod check;
+pub mod controller;
+pub mod dynamics;
+pub mod gate;
+pub mod nmpc;
+pub mod phase;
+pub mod profile;
+pub mod stabiliser;
+pub mod verdict;

@@ -1,0 +1,176 @@
+//! The landing optimal-control problem and its solver.
+//!
+//! [`solve`] takes a [`Problem`] and perhaps a [`WarmStart`] and returns a [`Solution`], always: how it went is
+//! [`SolveStatus`], data like the rest.
+//!
+//! The method is sequential quadratic programming with exact second derivatives. The states are not variables:
+//! they are rolled out from the inputs, so every iterate is a flyable path and the best one so far can be flown at
+//! any time. One iteration:
+//!
+//! 1. `rollout`: states and cost of the inputs, RK4, one step an interval.
+//! 2. `sensitivity`: tangents of every interval, and adjoint-weighted second derivatives over its RK4 stages.
+//! 3. `condense`: both condensed onto the inputs: gradient, Hessian, one row an end or path condition.
+//! 4. `convexify`: the Hessian made positive definite without changing the Newton step, where that is possible.
+//! 5. `polish`: the quadratic subproblem, conditions elastic, solved exactly from the last active set; where that
+//!    set is too far off, `qp` finds it with Clarabel.
+//! 6. `line_search` on cost plus exact penalty, with a second-order correction.
+//!
+//! `sqp` is the loop around them, with the optimality residual.
+//!
+//! Gauss-Newton Hessians are not an option: the multiplier of the end height is large and the curvature of the
+//! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
+
+mod bound;
+mod condense;
+mod convexify;
+mod guess;
+mod line_search;
+mod polish;
+mod problem;
+mod qp;
+mod rollout;
+mod sensitivity;
+mod sqp;
+
+pub use bound::best_touchdown_speed_m_s;
+pub use problem::Problem;
+pub use rollout::Trajectory;
+
+use crate::dynamics::PlanarState;
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SolveStatus {
+    /// No problem was solved.
+    #[default]
+    NotRun,
+    /// The optimality conditions hold to the tolerance.
+    Converged,
+    /// The iteration cap ended it; the best iterate is returned.
+    IterationLimit,
+    /// No step improved the best iterate any more, short of the tolerance.
+    Stalled,
+    /// The quadratic subproblem could not be solved; the best iterate is returned.
+    SubproblemFailed,
+    /// Even upright under full thrust the vehicle hits the ground faster than a landing allows; not solved.
+    NotLandable,
+    /// The problem or the start is not finite; nothing was solved.
+    BadInput,
+}
+
+impl SolveStatus {
+    /// The name in telemetry and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotRun => "not run",
+            Self::Converged => "converged",
+            Self::IterationLimit => "iteration limit",
+            Self::Stalled => "stalled",
+            Self::SubproblemFailed => "subproblem failed",
+            Self::NotLandable => "not landable",
+            Self::BadInput => "bad input",
+        }
+    }
+
+    /// The number sent over the air and written to logs, 0 to 6.
+    pub fn index(self) -> u8 {
+        self as u8
+    }
+}
+
+/// Where to start from: the inputs and multipliers of an earlier solution, shifted to the present.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WarmStart {
+    /// Gimbal angle of each interval, rad.
+    pub inputs_rad: Vec<f64>,
+    /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
+    pub end_multipliers: Vec<f64>,
+    /// Multiplier of the floor at each node before the end; empty without a floor.
+    pub floor_multipliers: Vec<f64>,
+}
+
+/// The outcome of a solve.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Solution {
+    /// How it ended.
+    pub status: SolveStatus,
+    /// Newton iterations, over all starting points tried.
+    pub iterations: usize,
+    /// Iterations of the quadratic subproblems, in all.
+    pub qp_iterations: u32,
+    /// Running cost (Eq. 28 of the landing paper), without penalties.
+    pub cost: f64,
+    /// Largest component of the Lagrangian's gradient by the inputs that no input limit explains.
+    pub kkt_stationarity: f64,
+    /// Largest condition residual that no multiplier at its price explains, m, rad, m/s or rad/s.
+    pub kkt_feasibility: f64,
+    /// How far the path misses its conditions, at worst, m, rad, m/s or rad/s.
+    pub condition_miss: f64,
+    /// Lower bound of the touchdown speed from the start, m/s.
+    pub best_touchdown_speed_m_s: f64,
+    /// The states, one more than inputs.
+    pub states: Vec<PlanarState>,
+    /// Gimbal angle of each interval, rad.
+    pub inputs_rad: Vec<f64>,
+    /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
+    pub end_multipliers: Vec<f64>,
+    /// Multiplier of the floor at each node before the end; empty without a floor.
+    pub floor_multipliers: Vec<f64>,
+}
+
+impl Solution {
+    /// The multiplier of the end height, cost per metre.
+    pub fn terminal_multiplier(&self) -> f64 {
+        self.end_multipliers.first().copied().unwrap_or(0.0)
+    }
+
+    /// This solution as a start for the same problem `steps` intervals later.
+    pub fn shifted(&self, steps: usize) -> WarmStart {
+        let later = |values: &[f64]| values.get(steps..).unwrap_or_default().to_vec();
+        WarmStart {
+            inputs_rad: later(&self.inputs_rad),
+            end_multipliers: self.end_multipliers.clone(),
+            floor_multipliers: later(&self.floor_multipliers),
+        }
+    }
+}
+
+/// Solves the landing problem.
+///
+/// With a warm start whose length fits, from there; otherwise from two bent guesses, keeping the better result:
+/// the problem has mirrored and multi-swing local minima, and the straight path between them is a saddle.
+pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
+    if !problem.is_finite() {
+        return Solution { status: SolveStatus::BadInput, ..Solution::default() };
+    }
+    let best_touchdown_speed_m_s = best_touchdown_speed_m_s(problem);
+    if best_touchdown_speed_m_s > problem.touchdown_speed_max_m_s {
+        return Solution { status: SolveStatus::NotLandable, best_touchdown_speed_m_s, ..Solution::default() };
+    }
+    let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
+    let mut solution = match fitting {
+        Some(start) => sqp::solve_from(problem, start),
+        None => cold(problem),
+    };
+    solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
+    solution
+}
+
+fn cold(problem: &Problem) -> Solution {
+    let amplitude_rad = problem.solver.guess_amplitude_rad;
+    let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
+        let inputs_rad = guess::bent(problem, amplitude_rad);
+        sqp::solve_from(problem, &WarmStart { inputs_rad, ..WarmStart::default() })
+    });
+    let iterations = left.iterations + right.iterations;
+    let qp_iterations = left.qp_iterations + right.qp_iterations;
+    let price = |solution: &Solution| {
+        let priced = solution.cost + problem.solver.terminal_penalty * solution.condition_miss;
+        if priced.is_finite() { priced } else { f64::INFINITY }
+    };
+    let better = if price(&right) < price(&left) { right } else { left };
+    Solution { iterations, qp_iterations, ..better }
+}
+
+#[cfg(test)]
+mod tests;

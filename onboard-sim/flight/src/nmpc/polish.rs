@@ -1,0 +1,218 @@
+//! The subproblem solved exactly on a guessed active set, which is mended until it is the right one.
+//!
+//! Near a solution the active set of the last iteration is nearly right, and a few linear systems take the place of
+//! an interior-point run. Far from it, the interior-point solution shows the set; its own multipliers carry an error
+//! of its tolerance times the size of the data, which is more than the outer tolerance.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::qp::{Qp, QpSolution};
+
+/// Most changes of the active set.
+const ROUNDS: u32 = 12;
+
+/// An interior-point step this close to an input's limit (rad) is taken as being on it.
+const ON_LIMIT_RAD: f64 = 1e-6;
+
+/// A multiplier this close to zero or its price, relative to the price, is taken as being there.
+const AT_PRICE: f64 = 1e-6;
+
+/// Conditions whose triangular factor falls to this, relative to the largest, depend on the others.
+const DEPENDENT: f64 = 1e-11;
+
+/// Violations up to this are rounding, relative to the data's size.
+const ROUNDING: f64 = 1e-9;
+
+/// Where an input's step stands.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Place {
+    /// Between its limits.
+    Free,
+    /// On its lower limit.
+    Lower,
+    /// On its upper limit.
+    Upper,
+}
+
+/// How a condition takes part.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Role {
+    /// Holds exactly; its multiplier is unknown.
+    Held,
+    /// Not broken and not needed: multiplier zero.
+    Slack,
+    /// Broken upwards or downwards: multiplier at its price, of this sign.
+    Broken(f64),
+}
+
+/// A guess of which limits and conditions are active.
+#[derive(Clone, PartialEq)]
+pub(super) struct ActiveSet {
+    pub(super) places: Vec<Place>,
+    pub(super) roles: Vec<Role>,
+}
+
+impl ActiveSet {
+    /// The active set a solution shows.
+    pub(super) fn of(qp: &Qp<'_>, solution: &QpSolution) -> Self {
+        let places = solution
+            .step
+            .iter()
+            .enumerate()
+            .map(|(j, step)| {
+                if qp.upper[j] - step <= ON_LIMIT_RAD {
+                    Place::Upper
+                } else if step - qp.lower[j] <= ON_LIMIT_RAD {
+                    Place::Lower
+                } else {
+                    Place::Free
+                }
+            })
+            .collect();
+        let roles = qp
+            .rows
+            .iter()
+            .zip(&solution.multipliers)
+            .map(|(row, multiplier)| Role::of(row.equality, *multiplier, qp.price))
+            .collect();
+        Self { places, roles }
+    }
+}
+
+impl Role {
+    /// The role a multiplier shows.
+    pub(super) fn of(equality: bool, multiplier: f64, price: f64) -> Self {
+        if multiplier >= price * (1.0 - AT_PRICE) {
+            Self::Broken(1.0)
+        } else if equality && multiplier <= price * (AT_PRICE - 1.0) {
+            Self::Broken(-1.0)
+        } else if !equality && multiplier <= price * AT_PRICE {
+            Self::Slack
+        } else {
+            Self::Held
+        }
+    }
+}
+
+/// The exact solution, if mending the guess leads to the right active set within a few rounds.
+pub(super) fn polished(qp: &Qp<'_>, mut guess: ActiveSet) -> Option<QpSolution> {
+    for round in 1..=ROUNDS {
+        let solution = solved_on(qp, &guess, round)?;
+        let mended = mended(qp, &guess, &solution);
+        if mended == guess {
+            return Some(solution);
+        }
+        guess = mended;
+    }
+    None
+}
+
+/// The subproblem's minimum on an active set; `None` if there the Hessian is not positive definite across the free
+/// directions, or the conditions depend on each other.
+fn solved_on(qp: &Qp<'_>, set: &ActiveSet, round: u32) -> Option<QpSolution> {
+    let count = qp.gradient.len();
+    let free: Vec<usize> = (0..count).filter(|j| set.places[*j] == Place::Free).collect();
+    let held: Vec<usize> = (0..set.roles.len()).filter(|row| set.roles[*row] == Role::Held).collect();
+    if free.len() < held.len() {
+        return None;
+    }
+    let mut step: Vec<f64> = (0..count)
+        .map(|j| match set.places[j] {
+            Place::Free => 0.0,
+            Place::Lower => qp.lower[j],
+            Place::Upper => qp.upper[j],
+        })
+        .collect();
+    let mut multipliers: Vec<f64> = set
+        .roles
+        .iter()
+        .map(|role| match role {
+            Role::Held | Role::Slack => 0.0,
+            Role::Broken(sign) => sign * qp.price,
+        })
+        .collect();
+
+    // On the free inputs: A p = -value, and H p + slope = A' y. With A' = Q R split into the range Y of A' and its
+    // null space Z, p = Y p_y + Z p_z: the conditions fix p_y, the reduced Hessian Z' H Z gives p_z.
+    let slope = lagrangian_slope(qp, &step, &multipliers);
+    let slope = DVector::from_fn(free.len(), |i, _| slope[free[i]]);
+    let hessian = DMatrix::from_fn(free.len(), free.len(), |i, j| qp.hessian[(free[i], free[j])]);
+    let rows = DMatrix::from_fn(free.len(), held.len(), |i, j| qp.rows[held[j]].gradient[free[i]]);
+    let values = DVector::from_fn(held.len(), |i, _| qp.rows[held[i]].after(&step));
+    let factors = rows.qr();
+    let triangle = factors.r();
+    let mut transposed = DMatrix::identity(free.len(), free.len());
+    factors.q_tr_mul(&mut transposed);
+    let range = transposed.rows(0, held.len()).transpose();
+    let null = transposed.rows(held.len(), free.len() - held.len()).transpose();
+    let diagonal = triangle.diagonal();
+    if diagonal.iter().any(|entry| entry.abs() <= DEPENDENT * diagonal.amax()) {
+        return None;
+    }
+    let along_range = triangle.tr_solve_upper_triangular(&-values)?;
+    let mut free_step = &range * along_range;
+    if null.ncols() > 0 {
+        let bent = hessian.clone() * &null;
+        let reduced = Cholesky::new(null.transpose() * bent)?;
+        let along_null = reduced.solve(&(-null.transpose() * (&slope + &hessian * &free_step)));
+        free_step += &null * along_null;
+    }
+    let unknown = triangle.solve_upper_triangular(&(range.transpose() * (&slope + &hessian * &free_step)))?;
+    for (row, multiplier) in held.iter().zip(unknown.iter()) {
+        multipliers[*row] = *multiplier;
+    }
+    for (j, value) in free.iter().zip(free_step.iter()) {
+        step[*j] = *value;
+    }
+    let finite = step.iter().chain(&multipliers).all(|value| value.is_finite());
+    finite.then_some(QpSolution { step, multipliers, iterations: round })
+}
+
+/// Gradient of the subproblem's Lagrangian.
+fn lagrangian_slope(qp: &Qp<'_>, step: &[f64], multipliers: &[f64]) -> DVector<f64> {
+    let mut slope = qp.gradient + qp.hessian * DVector::from_column_slice(step);
+    for (row, multiplier) in qp.rows.iter().zip(multipliers) {
+        if *multiplier != 0.0 {
+            for (entry, gradient) in slope.iter_mut().zip(&row.gradient) {
+                *entry -= multiplier * gradient;
+            }
+        }
+    }
+    slope
+}
+
+/// The active set with every limit and condition changed that the solution contradicts.
+fn mended(qp: &Qp<'_>, set: &ActiveSet, solution: &QpSolution) -> ActiveSet {
+    let slope = lagrangian_slope(qp, &solution.step, &solution.multipliers);
+    let size = 1.0 + qp.gradient.amax();
+    let places = set
+        .places
+        .iter()
+        .enumerate()
+        .map(|(j, place)| match place {
+            Place::Free if solution.step[j] > qp.upper[j] + ROUNDING => Place::Upper,
+            Place::Free if solution.step[j] < qp.lower[j] - ROUNDING => Place::Lower,
+            Place::Upper if slope[j] > ROUNDING * size => Place::Free,
+            Place::Lower if slope[j] < -ROUNDING * size => Place::Free,
+            kept => *kept,
+        })
+        .collect();
+    let roles = set
+        .roles
+        .iter()
+        .zip(qp.rows)
+        .zip(&solution.multipliers)
+        .map(|((role, row), multiplier)| {
+            let value = row.after(&solution.step);
+            match role {
+                Role::Held if *multiplier > qp.price => Role::Broken(1.0),
+                Role::Held if row.equality && *multiplier < -qp.price => Role::Broken(-1.0),
+                Role::Held if !row.equality && *multiplier < 0.0 => Role::Slack,
+                Role::Slack if value < -ROUNDING => Role::Held,
+                Role::Broken(sign) if sign * value > ROUNDING => Role::Held,
+                kept => *kept,
+            }
+        })
+        .collect();
+    ActiveSet { places, roles }
+}

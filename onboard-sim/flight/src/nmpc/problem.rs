@@ -1,0 +1,191 @@
+//! The landing problem, as data.
+
+use core::f64::consts::FRAC_PI_2;
+
+use crate::dynamics::{PlanarModel, PlanarState};
+use crate::profile::{FinalBox, Profile, SolverLimits};
+
+/// One landing problem: from a state now, through intervals of held gimbal angle, to the ground.
+///
+/// Minimise the running cost (Eq. 28 of the landing paper) subject to the planar dynamics, the gimbal limit,
+/// `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other states there (the paper's Table 2)
+/// and `z >= altitude_min_m` at every node before it. The conditions on states are exact penalties, so the problem
+/// always has a solution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// The dynamics.
+    pub model: PlanarModel,
+    /// The state at the beginning of the first interval.
+    pub initial: PlanarState,
+    /// Length of an interval, s.
+    pub step_s: f64,
+    /// Thrust in each interval, N; its length is the number of intervals.
+    pub thrust_n: Vec<f64>,
+    /// Weights of (x, z, theta - pi/2, u, w, q).
+    pub state_weights: [f64; 6],
+    /// Weight of the gimbal angle.
+    pub input_weight: f64,
+    /// Largest gimbal angle on either side, rad.
+    pub gimbal_limit_rad: f64,
+    /// Largest horizontal distance at the end, m.
+    pub x_final_m: f64,
+    /// Box the other states end in.
+    pub final_box: Option<FinalBox>,
+    /// Lowest altitude at the nodes before the end, m.
+    pub altitude_min_m: Option<f64>,
+    /// Fastest touchdown that counts as a landing, m/s.
+    pub touchdown_speed_max_m_s: f64,
+    /// Limits of the solver.
+    pub solver: SolverLimits,
+}
+
+/// A scalar condition on one state component of one node: `sign * component - offset`, which is to be zero (an
+/// equality) or not negative. SI and radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Condition {
+    /// The node, 1 to the number of intervals.
+    pub node: usize,
+    /// The component in state order.
+    pub component: usize,
+    /// Sign of the component.
+    pub sign: f64,
+    /// What the signed component is compared with.
+    pub offset: f64,
+    /// Zero, not only not negative.
+    pub equality: bool,
+}
+
+impl Condition {
+    /// The condition's value on a path.
+    pub fn value(&self, states: &[[f64; 6]]) -> f64 {
+        let component = states.get(self.node).and_then(|state| state.get(self.component));
+        component.map_or(f64::NAN, |value| self.sign * value - self.offset)
+    }
+
+    /// By how much a value breaks the condition.
+    pub fn violation(&self, value: f64) -> f64 {
+        if self.equality { value.abs() } else { (-value).max(0.0) }
+    }
+}
+
+const X: usize = 0;
+const Z: usize = 1;
+const THETA: usize = 2;
+const U: usize = 3;
+const W: usize = 4;
+const Q: usize = 5;
+
+impl Problem {
+    /// The problem of a profile from `initial`, `starts_s` after ignition, over `intervals` samples, with the
+    /// motor at `thrust_scale` of nominal.
+    pub fn from_profile(
+        profile: &Profile,
+        initial: PlanarState,
+        starts_s: f64,
+        intervals: usize,
+        thrust_scale: f64,
+    ) -> Self {
+        let nmpc = &profile.nmpc;
+        let step_s = nmpc.sample_time_s;
+        let thrust_n = (0..intervals)
+            .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s))
+            .collect();
+        Self {
+            model: PlanarModel::from_profile(profile),
+            initial,
+            step_s,
+            thrust_n,
+            state_weights: nmpc.weights.state_diagonal(),
+            input_weight: nmpc.weights.delta,
+            gimbal_limit_rad: nmpc.limits.gimbal_rad(),
+            x_final_m: nmpc.limits.x_final_m,
+            final_box: nmpc.limits.final_box,
+            altitude_min_m: nmpc.limits.altitude_min_m,
+            touchdown_speed_max_m_s: profile.touchdown_limits.u_m_s,
+            solver: nmpc.solver,
+        }
+    }
+
+    /// Number of intervals.
+    pub fn intervals(&self) -> usize {
+        self.thrust_n.len()
+    }
+
+    /// The conditions, in the order of their multipliers: those at the end, height first, then the floor at each
+    /// node before it.
+    pub fn conditions(&self) -> Vec<Condition> {
+        let mut conditions = self.end_conditions();
+        if let Some(offset) = self.altitude_min_m {
+            conditions.extend((1..self.intervals()).map(|node| Condition {
+                node,
+                component: Z,
+                sign: 1.0,
+                offset,
+                equality: false,
+            }));
+        }
+        conditions
+    }
+
+    /// The conditions at the end of the horizon; none without intervals.
+    pub(super) fn end_conditions(&self) -> Vec<Condition> {
+        let end = self.intervals();
+        if end == 0 {
+            return Vec::new();
+        }
+        let at_least = |node, component, lowest| Condition {
+            node,
+            component,
+            sign: 1.0,
+            offset: lowest,
+            equality: false,
+        };
+        let at_most = |node, component, highest: f64| Condition {
+            node,
+            component,
+            sign: -1.0,
+            offset: -highest,
+            equality: false,
+        };
+        let between = |node, component, lowest, highest| {
+            [at_least(node, component, lowest), at_most(node, component, highest)]
+        };
+        let mut conditions = vec![Condition { equality: true, ..at_least(end, Z, 0.0) }];
+        conditions.extend(between(end, X, -self.x_final_m, self.x_final_m));
+        if let Some(limits) = self.final_box {
+            let tilt = limits.pitch_error_deg.to_radians();
+            let rate = limits.pitch_rate_deg_s.to_radians();
+            conditions.extend(between(end, U, limits.u_min_m_s, limits.u_max_m_s));
+            // From the end backwards, so that a horizon too short for all of them keeps the order of the others.
+            for node in (1..=end).rev().take(limits.settled_nodes) {
+                conditions.extend(between(node, THETA, FRAC_PI_2 - tilt, FRAC_PI_2 + tilt));
+                conditions.extend(between(node, W, -limits.w_m_s, limits.w_m_s));
+                conditions.extend(between(node, Q, -rate, rate));
+            }
+        }
+        conditions
+    }
+
+    /// Deviation of a state from the target: upright, at rest, at the origin.
+    pub(super) fn deviation(state: &[f64; 6]) -> [f64; 6] {
+        let [x, z, theta, u, w, q] = *state;
+        [x, z, theta - FRAC_PI_2, u, w, q]
+    }
+
+    /// Running cost rate at a state and input.
+    pub(super) fn cost_rate(&self, state: &[f64; 6], gimbal_rad: f64) -> f64 {
+        let deviation = Self::deviation(state);
+        let state_part: f64 =
+            self.state_weights.iter().zip(&deviation).map(|(weight, value)| weight * value * value).sum();
+        0.5 * (state_part + self.input_weight * gimbal_rad * gimbal_rad)
+    }
+
+    /// Whether every number of the problem is finite, so that it can be solved at all.
+    pub(super) fn is_finite(&self) -> bool {
+        self.initial.is_finite()
+            && self.step_s.is_finite()
+            && self.step_s > 0.0
+            && self.thrust_n.iter().all(|thrust| thrust.is_finite())
+            && self.gimbal_limit_rad.is_finite()
+    }
+}

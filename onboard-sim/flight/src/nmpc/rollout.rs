@@ -1,0 +1,71 @@
+//! States and cost of a sequence of inputs.
+
+use super::Problem;
+use super::problem::Condition;
+use crate::dynamics::along;
+
+/// Weights of the four RK4 stages.
+pub(super) const STAGE_WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+
+/// How far each RK4 stage after the first lies along its predecessor's slope.
+pub(super) const STAGE_STEPS: [f64; 3] = [0.5, 0.5, 1.0];
+
+/// The path of a sequence of inputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// States at the nodes, one more than inputs, in state order, SI and radians.
+    pub states: Vec<[f64; 6]>,
+    /// Running cost: each interval's length times the cost rate at the state it ends in and the input it holds.
+    /// Summing at the ends of the intervals leaves out the initial state, which no input can change, and weighs the
+    /// touchdown.
+    pub cost: f64,
+}
+
+/// The states of the four RK4 stages of an interval and the state after it.
+pub(super) fn stages(
+    problem: &Problem,
+    state: &[f64; 6],
+    gimbal_rad: f64,
+    thrust_n: f64,
+) -> ([[f64; 6]; 4], [f64; 6]) {
+    let step_s = problem.step_s;
+    let mut points = [*state; 4];
+    let mut next = *state;
+    for stage in 0..4 {
+        let slope = problem.model.derivative(&points[stage], gimbal_rad, thrust_n);
+        if let Some(along_step) = STAGE_STEPS.get(stage) {
+            points[stage + 1] = along(state, &slope, along_step * step_s);
+        }
+        next = along(&next, &slope, STAGE_WEIGHTS[stage] * step_s);
+    }
+    (points, next)
+}
+
+impl Trajectory {
+    /// Rolls the inputs out from the problem's initial state.
+    pub fn of(problem: &Problem, inputs_rad: &[f64]) -> Self {
+        let mut state = problem.initial.to_array();
+        let mut states = Vec::with_capacity(inputs_rad.len() + 1);
+        states.push(state);
+        let mut cost = 0.0;
+        for (gimbal_rad, thrust_n) in inputs_rad.iter().zip(&problem.thrust_n) {
+            let (_, next) = stages(problem, &state, *gimbal_rad, *thrust_n);
+            cost += problem.step_s * problem.cost_rate(&next, *gimbal_rad);
+            state = next;
+            states.push(state);
+        }
+        Self { states, cost }
+    }
+
+    /// Cost plus the price of every broken condition; infinite if the path is not finite.
+    pub(super) fn merit(&self, conditions: &[Condition], price: f64) -> f64 {
+        let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
+        let merit = self.cost + price * broken;
+        if merit.is_finite() { merit } else { f64::INFINITY }
+    }
+
+    /// The largest violation of any condition, m.
+    pub(super) fn worst_violation(&self, conditions: &[Condition]) -> f64 {
+        conditions.iter().map(|row| row.violation(row.value(&self.states))).fold(0.0, f64::max)
+    }
+}

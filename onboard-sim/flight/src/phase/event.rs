@@ -1,0 +1,215 @@
+//! What can happen to a vehicle, what follows from it, and why it may be refused.
+
+use super::{Phase, StartPoint};
+
+/// Something that happened or was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// The self-test ended well.
+    SelfTestPassed,
+    /// The physical pin was pulled.
+    PinPulled,
+    /// The physical pin was put back.
+    PinInserted,
+    /// Radio command: arm. `checks_passed` is the result of the [arming checks](crate::arming).
+    ArmRequested {
+        /// Every arming check passed.
+        checks_passed: bool,
+    },
+    /// Radio command: disarm; during a countdown it cancels it.
+    DisarmRequested,
+    /// Radio command: start the countdown.
+    StartRequested {
+        /// Length of the countdown, s.
+        countdown_s: f64,
+    },
+    /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the air sends
+    /// [`Event::ReleasedAt`] instead.
+    CountdownElapsed,
+    /// The countdown of a simulation that starts in the air ended and the vehicle was let go there.
+    ReleasedAt(StartPoint),
+    /// Left the pad.
+    LiftOff,
+    /// The burning motor ended.
+    Burnout,
+    /// Vertical speed changed sign.
+    Apogee,
+    /// All fins answered from their deployed angle.
+    FinsConfirmed,
+    /// Close enough to the ground for the landing controller to take over.
+    LandArm,
+    /// The ignition gate was evaluated.
+    IgnitionGate {
+        /// Every [gate check](crate::gate) passed.
+        open: bool,
+    },
+    /// The accelerometer shows landing-motor thrust.
+    ThrustConfirmed,
+    /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition command.
+    NoThrustTimeout,
+    /// Radio command: abort.
+    AbortRequested {
+        /// The parachute still has room to open.
+        above_commit_height: bool,
+        /// The ignition gate is open at this moment.
+        gate_open: bool,
+    },
+    /// Contact with the ground was sensed.
+    Contact {
+        /// Thrust is below the weight, so the vehicle will stay down.
+        thrust_below_weight: bool,
+    },
+    /// On the ground, every actuator and igniter line is shut down.
+    SafingDone,
+}
+
+impl Event {
+    /// The name in messages and logs.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::SelfTestPassed => "self-test passed",
+            Self::PinPulled => "pin pulled",
+            Self::PinInserted => "pin inserted",
+            Self::ArmRequested { .. } => "arm",
+            Self::DisarmRequested => "disarm",
+            Self::StartRequested { .. } => "start",
+            Self::CountdownElapsed => "countdown elapsed",
+            Self::ReleasedAt(_) => "release",
+            Self::LiftOff => "lift-off",
+            Self::Burnout => "burn-out",
+            Self::Apogee => "apogee",
+            Self::FinsConfirmed => "fins confirmed",
+            Self::LandArm => "land arm",
+            Self::IgnitionGate { .. } => "ignition gate",
+            Self::ThrustConfirmed => "thrust confirmed",
+            Self::NoThrustTimeout => "no thrust",
+            Self::AbortRequested { .. } => "abort",
+            Self::Contact { .. } => "contact",
+            Self::SafingDone => "safing done",
+        }
+    }
+}
+
+/// Something the world must now do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Effect {
+    /// Light the ascent motor.
+    IgniteAscentMotor = 0,
+    /// Light the landing motor. Emitted at most once in a life.
+    IgniteLandingMotor = 1,
+    /// Cut the landing motor's igniter line.
+    InhibitLandingMotor = 2,
+    /// Drop both igniter lines' arming.
+    Disarm = 3,
+    /// Deploy the parachute.
+    DeployChute = 4,
+    /// Open the fins fully.
+    FinsOpen = 5,
+    /// The countdown began.
+    StartCountdown = 6,
+    /// The countdown was cancelled.
+    CancelCountdown = 7,
+    /// Show the 60 s wait before the pad may be approached.
+    ShowPadWait = 8,
+    /// The vehicle is being lost: record it as such.
+    RecordLoss = 9,
+}
+
+impl Effect {
+    /// Every effect, in index order.
+    pub const ALL: [Self; 10] = [
+        Self::IgniteAscentMotor,
+        Self::IgniteLandingMotor,
+        Self::InhibitLandingMotor,
+        Self::Disarm,
+        Self::DeployChute,
+        Self::FinsOpen,
+        Self::StartCountdown,
+        Self::CancelCountdown,
+        Self::ShowPadWait,
+        Self::RecordLoss,
+    ];
+}
+
+/// A small set of [`Effect`]s.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Effects(u16);
+
+impl Effects {
+    /// No effect.
+    pub const NONE: Self = Self(0);
+
+    /// The set of the effects given.
+    pub fn of(effects: &[Effect]) -> Self {
+        Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
+    }
+
+    /// Whether the effect is in the set.
+    pub fn contains(self, effect: Effect) -> bool {
+        self.0 & (1 << (effect as u16)) != 0
+    }
+
+    /// Whether the set is empty.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The effects in the set, in index order.
+    pub fn iter(self) -> impl Iterator<Item = Effect> {
+        Effect::ALL.into_iter().filter(move |effect| self.contains(*effect))
+    }
+}
+
+/// Why an event changed nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// The event belongs to other phases.
+    WrongPhase {
+        /// What was asked for, as a verb.
+        action: &'static str,
+        /// The phase it was asked in.
+        phase: Phase,
+        /// Where it would be accepted.
+        only: &'static str,
+    },
+    /// An abort is latched.
+    AbortLatched,
+    /// The pin is in.
+    PinIn,
+    /// An arming check failed.
+    ChecksFailed,
+    /// Not armed.
+    NotArmed,
+    /// The landing motor is inhibited.
+    LandingMotorInhibited,
+    /// A countdown runs already.
+    CountdownRunning,
+    /// The countdown has not ended, or was never started.
+    CountdownNotElapsed,
+    /// The countdown's length is not a number of seconds.
+    BadCountdown,
+    /// The abort is latched already.
+    AlreadyAborted,
+    /// Contact with thrust above the weight: the vehicle will not stay down yet.
+    ThrustAboveWeight,
+}
+
+impl Refusal {
+    /// The reason, in an operator's words.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::WrongPhase { action, phase, only } => format!("cannot {action} in {}: {only}", phase.name()),
+            Self::AbortLatched => "an abort is latched: restart the vehicle to clear it".to_owned(),
+            Self::PinIn => "the pin is in: pull it before arming".to_owned(),
+            Self::ChecksFailed => "an arming check failed".to_owned(),
+            Self::NotArmed => "not armed".to_owned(),
+            Self::LandingMotorInhibited => "the landing motor is inhibited".to_owned(),
+            Self::CountdownRunning => "a countdown is running: disarm to cancel it".to_owned(),
+            Self::CountdownNotElapsed => "the countdown has not ended".to_owned(),
+            Self::BadCountdown => "the countdown must be a number of seconds, 0 or more".to_owned(),
+            Self::AlreadyAborted => "already aborted".to_owned(),
+            Self::ThrustAboveWeight => "contact with thrust above weight: not down yet".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! The transition table.
+
+use super::{Effect, Effects, Event, Interlocks, Mode, Phase, Refusal, StartPoint};
+
+/// What an event leads to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    /// The mode afterwards; unchanged if refused.
+    pub mode: Mode,
+    /// What the world must do.
+    pub effects: Effects,
+    /// Why nothing changed, if refused.
+    pub refusal: Option<Refusal>,
+}
+
+/// What one row of the table says.
+enum Row {
+    /// Accepted: latches and countdown as edited, phase as given, effects as given.
+    Go(Mode, Phase, Effects),
+    Refuse(Refusal),
+}
+
+/// The mode after `event` at vehicle time `time_s`.
+///
+/// Total and pure: every event is answered in every phase.
+pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
+    match row(mode, event, time_s) {
+        Row::Go(mut next, phase, effects) => {
+            if phase != mode.phase {
+                next.phase = phase;
+                next.entered_at_s = time_s;
+            }
+            Transition { mode: next, effects, refusal: None }
+        }
+        Row::Refuse(refusal) => Transition { mode: *mode, effects: Effects::NONE, refusal: Some(refusal) },
+    }
+}
+
+fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
+    use Event as E;
+    use Phase as P;
+    let phase = mode.phase;
+    let locks = mode.interlocks;
+    let go = |to: Phase| Row::Go(*mode, to, Effects::NONE);
+    let go_with = |to: Phase, effects: &[Effect]| Row::Go(*mode, to, Effects::of(effects));
+    let wrong = |action, only| Row::Refuse(Refusal::WrongPhase { action, phase, only });
+    let latch = |interlocks: Interlocks| Mode { interlocks, ..*mode };
+
+    match (phase, event) {
+        // On the pad.
+        (P::Safe, E::SelfTestPassed) => go(P::PadIdle),
+        (_, E::SelfTestPassed) => wrong("pass the self-test", "only SAFE waits for it"),
+
+        (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) => {
+            Row::Go(latch(Interlocks { pin_out: true, ..locks }), phase, Effects::NONE)
+        }
+        (P::Safe | P::PadIdle, E::PinInserted) => {
+            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        }
+        (P::PadArmed, E::PinInserted) => {
+            disarmed(&latch(Interlocks { pin_out: false, ..locks }))
+        }
+        (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the pad only"),
+
+        (P::PadIdle, E::ArmRequested { checks_passed }) => match () {
+            () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
+            () if !locks.pin_out => Row::Refuse(Refusal::PinIn),
+            () if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
+            () => Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE),
+        },
+        (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
+
+        (P::PadArmed, E::DisarmRequested) => disarmed(mode),
+        (_, E::DisarmRequested) => wrong("disarm", "only PAD_ARMED disarms"),
+
+        (P::PadArmed, E::StartRequested { countdown_s }) => match mode.countdown_end_s {
+            Some(_) => Row::Refuse(Refusal::CountdownRunning),
+            None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
+            None => Row::Go(
+                Mode { countdown_end_s: Some(time_s + countdown_s), ..*mode },
+                phase,
+                Effects::of(&[Effect::StartCountdown]),
+            ),
+        },
+        (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
+
+        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
+            Mode { countdown_end_s: None, ..*mode },
+            phase,
+            Effects::of(&[Effect::IgniteAscentMotor]),
+        ),
+        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
+        }
+        (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::LandArmed, Effects::of(&[Effect::FinsOpen]))
+        }
+        (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Ignition)) => {
+            Row::Refuse(Refusal::CountdownNotElapsed)
+        }
+        (_, E::CountdownElapsed) => wrong("end a countdown", "only PAD_ARMED counts down"),
+        (_, E::ReleasedAt(StartPoint::Pad)) => wrong("release at the pad", "a pad start lifts off by itself"),
+        (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),
+
+        // Ascent.
+        (P::PadArmed, E::LiftOff) => go(P::Boost),
+        (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED lifts off"),
+        (P::Boost, E::Burnout) => go(P::Coast),
+        // The landing motor ended; contact decides what follows.
+        (P::Powered, E::Burnout) => go(phase),
+        (_, E::Burnout) => wrong("burn out", "only BOOST and POWERED burn"),
+        (P::Boost | P::Coast, E::Apogee) if locks.abort_latched => go_with(P::Chute, &[Effect::DeployChute]),
+        (P::Boost | P::Coast, E::Apogee) => go_with(P::Deploy, &[Effect::FinsOpen]),
+        (_, E::Apogee) => wrong("pass apogee", "only BOOST and COAST rise"),
+
+        // Descent.
+        (P::Deploy, E::FinsConfirmed) => go(P::AeroDescent),
+        (_, E::FinsConfirmed) => wrong("confirm the fins", "only DEPLOY waits for them"),
+        (P::AeroDescent, E::LandArm) => may_light(locks, || go(P::LandArmed)),
+        (_, E::LandArm) => wrong("arm for landing", "only AERO_DESCENT does"),
+        (P::LandArmed, E::IgnitionGate { open: false }) => go(phase),
+        (P::LandArmed, E::IgnitionGate { open: true }) if locks.abort_latched => {
+            Row::Refuse(Refusal::AbortLatched)
+        }
+        (P::LandArmed, E::IgnitionGate { open: true }) => {
+            may_light(locks, || go_with(P::Ignition, &[Effect::IgniteLandingMotor]))
+        }
+        (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
+
+        // Landing burn. A late light after "no light" is thrust all the same.
+        (P::Ignition, E::ThrustConfirmed) => go(P::Powered),
+        (_, E::ThrustConfirmed) => wrong("confirm thrust", "only IGNITION waits for it"),
+        (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => Row::Go(
+            latch(Interlocks { no_light_latched: true, landing_motor_inhibited: true, ..locks }),
+            phase,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
+        ),
+        (P::Ignition, E::NoThrustTimeout) => go(phase),
+        (_, E::NoThrustTimeout) => wrong("miss thrust", "only IGNITION waits for it"),
+
+        (_, E::AbortRequested { above_commit_height, gate_open }) => abort(mode, above_commit_height, gate_open, time_s),
+
+        // Ground.
+        (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::Contact { .. }) => {
+            wrong("touch down", "only a vehicle in the air touches down")
+        }
+        (_, E::Contact { thrust_below_weight: false }) => Row::Refuse(Refusal::ThrustAboveWeight),
+        (_, E::Contact { thrust_below_weight: true }) => Row::Go(
+            latch(Interlocks { landing_motor_inhibited: true, ..locks }),
+            P::Touchdown,
+            Effects::of(&[Effect::InhibitLandingMotor]),
+        ),
+        (P::Touchdown, E::SafingDone) => {
+            Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, Effects::of(&[Effect::Disarm]))
+        }
+        (_, E::SafingDone) => wrong("safe", "only TOUCHDOWN is made safe"),
+    }
+}
+
+/// The abort column: what an abort means where.
+fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -> Row {
+    use Phase as P;
+    let phase = mode.phase;
+    let locks = mode.interlocks;
+    let may_burn = gate_open && locks.armed && !locks.landing_motor_inhibited && !locks.abort_latched;
+    let inhibited = Mode {
+        interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..locks },
+        countdown_end_s: None,
+        ..*mode
+    };
+    match phase {
+        P::Touchdown | P::Safed => Row::Refuse(Refusal::WrongPhase {
+            action: "abort",
+            phase,
+            only: "the vehicle is on the ground",
+        }),
+        P::Chute => {
+            Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
+        }
+        // The motor has been lit and cannot be stopped; a parachute under thrust would burn or tangle.
+        P::Ignition | P::Powered if locks.degraded => Row::Refuse(Refusal::AlreadyAborted),
+        P::Ignition | P::Powered => {
+            let interlocks = Interlocks { abort_latched: true, degraded: true, ..locks };
+            Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
+        }
+        P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        P::Safe | P::PadIdle | P::PadArmed => {
+            let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
+            let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
+            let to = if phase == P::PadArmed { P::PadIdle } else { phase };
+            // The wait runs from the abort, also where the phase stays.
+            Row::Go(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, Effects::of(&effects))
+        }
+        P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
+        // Repeated on the way down, an abort may still find room for the parachute.
+        P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => Row::Go(
+            inhibited,
+            P::Chute,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute]),
+        ),
+        P::Deploy | P::AeroDescent | P::LandArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        // Too low for the parachute: landing on the motor is the safest way down that is left.
+        P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
+            let interlocks = Interlocks { abort_latched: true, ..locks };
+            Row::Go(Mode { interlocks, ..*mode }, P::Ignition, Effects::of(&[Effect::IgniteLandingMotor]))
+        }
+        P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(
+            inhibited,
+            phase,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
+        ),
+    }
+}
+
+fn disarmed(mode: &Mode) -> Row {
+    let interlocks = Interlocks { armed: false, ..mode.interlocks };
+    let effects = match mode.countdown_end_s {
+        Some(_) => Effects::of(&[Effect::Disarm, Effect::CancelCountdown]),
+        None => Effects::of(&[Effect::Disarm]),
+    };
+    Row::Go(Mode { interlocks, countdown_end_s: None, ..*mode }, Phase::PadIdle, effects)
+}
+
+fn countdown_over(mode: &Mode, time_s: f64) -> bool {
+    mode.countdown_end_s.is_some_and(|end_s| time_s >= end_s)
+}
+
+/// The interlocks of the landing motor that hold in every phase.
+fn may_light(locks: Interlocks, row: impl FnOnce() -> Row) -> Row {
+    match () {
+        () if !locks.armed => Row::Refuse(Refusal::NotArmed),
+        () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
+        () if locks.landing_motor_inhibited => Row::Refuse(Refusal::LandingMotorInhibited),
+        () => row(),
+    }
+}

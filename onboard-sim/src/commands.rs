@@ -1,0 +1,182 @@
+//! MAVLink commands to requests of the vehicle.
+//!
+//! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly: an arm that is
+//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock.
+
+use protocol::command::CommandRequest;
+use protocol::dialect::{MavCmd, MavResult};
+
+use crate::vehicle::{Answer, Request, Result};
+
+/// What a command asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Something for the vehicle to decide.
+    Vehicle(Request),
+    /// MAV_CMD_SET_MESSAGE_INTERVAL: message id, interval in microseconds (-1 off, 0 default).
+    SetInterval {
+        /// Message.
+        message_id: u32,
+        /// Interval.
+        interval_us: f32,
+    },
+    /// MAV_CMD_REQUEST_MESSAGE: message id and the request's second parameter.
+    SendMessage {
+        /// Message.
+        message_id: u32,
+        /// Parameter 2: for MESSAGE_INTERVAL, of which message.
+        of: u32,
+    },
+}
+
+/// Why a command is not carried out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unfit {
+    /// The result to answer with.
+    pub result: MavResult,
+    /// The words for the crew, where there is something to say.
+    pub reason: Option<String>,
+}
+
+/// Reads a command.
+///
+/// # Errors
+/// The command is unknown here or its parameters are out of range, with the answer to give.
+pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
+    let [param1, param2, ..] = request.params;
+    let unfit = |result, reason: String| {
+        Err(Unfit {
+            result,
+            reason: Some(reason),
+        })
+    };
+    if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
+        // The force codes of parameter 2 (21196, 2989) change nothing: every check counts.
+        if param1.to_bits() == 1.0f32.to_bits() {
+            Ok(Command::Vehicle(Request::Arm))
+        } else if param1 == 0.0 {
+            Ok(Command::Vehicle(Request::Disarm))
+        } else {
+            unfit(
+                MavResult::MAV_RESULT_DENIED,
+                format!("arm refused: param1 = {param1}, must be 1 (arm) or 0 (disarm)"),
+            )
+        }
+    } else if request.is(MavCmd::MAV_CMD_MISSION_START) {
+        Ok(Command::Vehicle(Request::Start))
+    } else if request.is(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) {
+        if param1 > 0.5 {
+            Ok(Command::Vehicle(Request::Abort))
+        } else {
+            unfit(
+                MavResult::MAV_RESULT_FAILED,
+                format!("termination: param1 = {param1}, must be above 0.5"),
+            )
+        }
+    } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
+        Ok(Command::SetInterval {
+            message_id: id(param1),
+            interval_us: param2,
+        })
+    } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
+        Ok(Command::SendMessage {
+            message_id: id(param1),
+            of: id(param2),
+        })
+    } else {
+        Err(Unfit {
+            result: MavResult::MAV_RESULT_UNSUPPORTED,
+            reason: None,
+        })
+    }
+}
+
+/// The MAV_RESULT of a vehicle's answer.
+pub fn mav_result(answer: &Answer) -> MavResult {
+    match answer.result {
+        Result::Accepted => MavResult::MAV_RESULT_ACCEPTED,
+        Result::NotNow => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+        Result::Denied => MavResult::MAV_RESULT_DENIED,
+        Result::Failed => MavResult::MAV_RESULT_FAILED,
+    }
+}
+
+/// A message id sent as a float: saturates, and NaN becomes 0, which no message request is refused for but
+/// HEARTBEAT answers.
+fn id(param: f32) -> u32 {
+    param as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::identity::{GROUND, VEHICLE};
+
+    fn command(command: u16, param1: f32, param2: f32) -> CommandRequest {
+        CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command,
+            params: [param1, param2, f32::NAN, f32::NAN, f32::NAN, f32::NAN, f32::NAN],
+            confirmation: 0,
+        }
+    }
+
+    fn result_of(request: &CommandRequest) -> MavResult {
+        parse(request).unwrap_err().result
+    }
+
+    #[test]
+    fn arm_takes_exactly_one_and_disarm_exactly_nought() {
+        assert_eq!(
+            parse(&command(400, 1.0, f32::NAN)),
+            Ok(Command::Vehicle(Request::Arm))
+        );
+        assert_eq!(
+            parse(&command(400, 0.0, 0.0)),
+            Ok(Command::Vehicle(Request::Disarm))
+        );
+        for param1 in [0.5, 2.0, -1.0, f32::NAN, f32::INFINITY, 1.000_000_1] {
+            assert_eq!(
+                result_of(&command(400, param1, 0.0)),
+                MavResult::MAV_RESULT_DENIED,
+                "{param1}"
+            );
+        }
+    }
+
+    #[test]
+    fn force_codes_ask_for_no_more_than_an_arm() {
+        for code in [21196.0, 2989.0] {
+            assert_eq!(
+                parse(&command(400, 1.0, code)),
+                Ok(Command::Vehicle(Request::Arm))
+            );
+        }
+    }
+
+    #[test]
+    fn termination_needs_more_than_half() {
+        assert_eq!(
+            parse(&command(185, 1.0, 0.0)),
+            Ok(Command::Vehicle(Request::Abort))
+        );
+        for param1 in [0.0, 0.5, f32::NAN, -1.0] {
+            assert_eq!(
+                result_of(&command(185, param1, 0.0)),
+                MavResult::MAV_RESULT_FAILED,
+                "{param1}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_unsupported() {
+        for number in [0, 22, 176, 65_535] {
+            assert_eq!(
+                result_of(&command(number, 1.0, 1.0)),
+                MavResult::MAV_RESULT_UNSUPPORTED
+            );
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use clap::{Parser, Subcommand};
+use flight::profile::BUILTIN;
+use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, load_profile, log_header};
+use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::log::recorder::Recorder;
+use protocol::transport::Endpoint;
+use tokio::sync::watch;
+
+/// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Fly one flight.
+    ///
+    /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
+    ///
+    /// Exit codes: 0 landed inside every limit; 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
+    /// 5 stopped before its end.
+    Fly(FlyArguments),
+    /// List the built-in profiles, or print one as a file to start from.
+    Profiles {
+        /// Print this profile's TOML.
+        #[arg(long, value_name = "NAME")]
+        show: Option<String>,
+    },
+}
+
+#[derive(clap::Args)]
+struct FlyArguments {
+    /// Built-in profile or TOML file.
+    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
+    profile: String,
+    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT or serial:DEVICE:BAUD; may be given more than once.
+    #[arg(long, value_name = "LINK")]
+    mavlink: Vec<Endpoint>,
+    /// Log to write (MCAP). An existing file is not overwritten.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Seed of the profile's dispersions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Speed of simulated time: a factor, or max.
+    #[arg(long, default_value = "1")]
+    speed: Speed,
+    /// Arm and start without a ground station, also with --mavlink.
+    #[arg(long)]
+    auto_start: bool,
+    /// Keep serving the links after the flight, until interrupted.
+    #[arg(long)]
+    stay: bool,
+    /// Do not apply a controller output that took longer than its sample, as hardware would not.
+    #[arg(long)]
+    enforce_deadline: bool,
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse()) {
+        Ok(code) => code,
+        Err(error) => {
+            // Nothing is left to do if even this cannot be written.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
+    match arguments.command {
+        Command::Profiles { show } => profiles(show.as_deref()),
+        Command::Fly(arguments) => {
+            let runtime = tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build()?;
+            runtime.block_on(fly(arguments))
+        }
+    }
+}
+
+fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
+    let mut out = std::io::stdout().lock();
+    if let Some(name) = show {
+        let (_, text) = load_profile(name)?;
+        out.write_all(text.as_bytes())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (name, _) in BUILTIN {
+        let (profile, _) = load_profile(name)?;
+        writeln!(out, "{name:<20} {}", profile.summary)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
+    let (profile, profile_toml) = load_profile(&arguments.profile)?;
+    let recorder = match &arguments.log {
+        None => None,
+        Some(path) => {
+            let header = log_header("onboard-sim", &profile, &profile_toml, arguments.seed, unix_ns());
+            Some(Recorder::create(path, &header)?)
+        }
+    };
+    let options = FlyOptions {
+        profile_name_or_path: arguments.profile,
+        auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
+        links: arguments.mavlink,
+        recorder: recorder.clone(),
+        seed: arguments.seed,
+        speed: arguments.speed,
+        exit_when_safed: !arguments.stay,
+        deadline_policy: if arguments.enforce_deadline {
+            DeadlinePolicy::Enforce
+        } else {
+            DeadlinePolicy::Observe
+        },
+    };
+    let (stop, stopped) = watch::channel(false);
+    tokio::spawn(async move {
+        interrupted().await;
+        let _ = stop.send(true);
+    });
+    let flown = fly_observed(options, stopped, report_event).await;
+    let log_path = recorder.as_ref().map(Recorder::finish).transpose();
+    let summary = flown?;
+    print_summary(&summary)?;
+    if let Some(path) = log_path.context("the flight is over, but its log is not whole")? {
+        writeln!(std::io::stdout(), "log {}", path.display())?;
+    }
+    Ok(exit_code(&summary.outcome))
+}
+
+/// Waits for Ctrl-C or a request to terminate.
+async fn interrupted() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
+        let _ = tokio::signal::ctrl_c().await;
+        return;
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        _ = terminate.recv() => {}
+    }
+}
+
+fn report_event(time_s: f64, event: &VehicleEvent) {
+    let words = match event {
+        VehicleEvent::Text { text, .. } => text.clone(),
+        VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
+        VehicleEvent::Tick(_) | VehicleEvent::Verdict { .. } => return,
+    };
+    // A closed pipe must not end a flight.
+    let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");
+}
+
+fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    if let Some((impact, verdict)) = &summary.verdict {
+        writeln!(out, "touchdown at {:.3} s:", impact.time_s)?;
+        for limit in &verdict.results {
+            let mark = if limit.passed { "ok  " } else { "FAIL" };
+            writeln!(
+                out,
+                "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
+                limit.name, limit.value, limit.unit, limit.lowest, limit.highest
+            )?;
+        }
+    }
+    if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
+        writeln!(
+            out,
+            "controller ticks: median {:.3} ms, p99 {:.3} ms, worst {:.3} ms, {} over their deadline",
+            1e3 * median_s,
+            1e3 * p99_s,
+            1e3 * worst_s,
+            summary.solve_times.missed()
+        )?;
+    }
+    match &summary.outcome {
+        Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
+        Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
+        Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,
+        Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
+        Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
+    }
+    Ok(())
+}
+
+fn exit_code(outcome: &Outcome) -> ExitCode {
+    ExitCode::from(match outcome {
+        Outcome::Landed => 0,
+        Outcome::OutsideLimits => 3,
+        Outcome::Aborted | Outcome::Refused(_) => 4,
+        Outcome::Stopped => 5,
+    })
+}
+
+#[expect(clippy::disallowed_methods, reason = "a log says when it was begun")]
+fn unix_ns() -> u64 {
+    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since_epoch.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+}

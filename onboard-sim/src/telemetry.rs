@@ -1,0 +1,370 @@
+//! A vehicle's state as MAVLink messages.
+//!
+//! Frames: the pitch plane is north-down of NED; pitch from the horizontal is a rotation about NED's y (east)
+//! axis, so an upright rocket has 90 degrees of pitch. Values are narrowed to the fields' types here and only
+//! here; what does not fit saturates.
+
+use flight::dynamics::PlanarState;
+use flight::phase::{Interlocks, Phase};
+use mavlink::MessageData as _;
+use mavlink::types::CharArray;
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA, CURRENT_MODE_DATA,
+    EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavLandedState,
+    MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState,
+    MavSysStatusSensor, MavType, MavVtolState, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdControlLevel, TdInterlock, TdLimit, TdPhase,
+    TdSolverStatus, VFR_HUD_DATA,
+};
+
+use crate::vehicle::{AbortEffect, Snapshot};
+
+/// Points of the predicted path in one message.
+const PATH_POINTS: usize = 12;
+
+/// The message of this id as things stand, or `None` if the vehicle has none or nothing to say in it.
+pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
+    match message_id {
+        HEARTBEAT_DATA::ID => Some(heartbeat(snapshot)),
+        SYS_STATUS_DATA::ID => Some(sys_status(snapshot)),
+        EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(snapshot)),
+        ATTITUDE_QUATERNION_DATA::ID => Some(attitude(snapshot)),
+        LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
+        VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
+        CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
+        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version()),
+        TD_FLIGHT_STATUS_DATA::ID => Some(flight_status(snapshot)),
+        TD_FINS_DATA::ID => Some(fins(snapshot)),
+        TD_GIMBAL_DATA::ID => Some(gimbal(snapshot)),
+        TD_CONTROLLER_DATA::ID => controller(snapshot),
+        TD_TOUCHDOWN_PREDICTION_DATA::ID => touchdown_prediction(snapshot),
+        TD_PREDICTED_PATH_DATA::ID => predicted_path(snapshot),
+        TD_LANDING_VERDICT_DATA::ID => landing_verdict(snapshot),
+        _ => None,
+    }
+}
+
+/// One AVAILABLE_MODES a phase.
+pub fn available_modes() -> impl Iterator<Item = MavMessage> {
+    Phase::ALL.into_iter().map(|phase| {
+        MavMessage::AVAILABLE_MODES(AVAILABLE_MODES_DATA {
+            custom_mode: u32::from(phase.index()),
+            properties: MavModeProperty::MAV_MODE_PROPERTY_NOT_USER_SELECTABLE,
+            number_modes: Phase::ALL.len() as u8,
+            mode_index: phase.index() + 1,
+            standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
+            mode_name: characters(phase.name()),
+        })
+    })
+}
+
+fn heartbeat(snapshot: &Snapshot) -> MavMessage {
+    let mut base_mode =
+        MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED;
+    base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, snapshot.interlocks.armed);
+    let system_status = match snapshot.phase {
+        _ if snapshot.interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
+        _ if snapshot.interlocks.no_light_latched => MavState::MAV_STATE_EMERGENCY,
+        Phase::Safe => MavState::MAV_STATE_BOOT,
+        Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => MavState::MAV_STATE_STANDBY,
+        Phase::Chute => MavState::MAV_STATE_EMERGENCY,
+        _ => MavState::MAV_STATE_ACTIVE,
+    };
+    MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: u32::from(snapshot.phase.index()),
+        mavtype: MavType::MAV_TYPE_ROCKET,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+        base_mode,
+        system_status,
+        mavlink_version: 3,
+    })
+}
+
+fn sys_status(snapshot: &Snapshot) -> MavMessage {
+    let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS;
+    let mut healthy = present;
+    healthy.set(
+        MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK,
+        snapshot.checks_failed == 0,
+    );
+    MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+        onboard_control_sensors_present: present,
+        onboard_control_sensors_enabled: present,
+        onboard_control_sensors_health: healthy,
+        load: (1000.0 * snapshot.solve_time_s / snapshot.deadline_s).clamp(0.0, 1000.0) as u16,
+        voltage_battery: u16::MAX,
+        current_battery: -1,
+        battery_remaining: -1,
+        ..SYS_STATUS_DATA::default()
+    })
+}
+
+fn extended_sys_state(snapshot: &Snapshot) -> MavMessage {
+    let landed_state = match snapshot.phase {
+        Phase::Safe | Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => {
+            MavLandedState::MAV_LANDED_STATE_ON_GROUND
+        }
+        Phase::Boost => MavLandedState::MAV_LANDED_STATE_TAKEOFF,
+        Phase::LandArmed | Phase::Ignition | Phase::Powered => MavLandedState::MAV_LANDED_STATE_LANDING,
+        Phase::Coast | Phase::Deploy | Phase::AeroDescent | Phase::Chute => {
+            MavLandedState::MAV_LANDED_STATE_IN_AIR
+        }
+    };
+    MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+        vtol_state: MavVtolState::MAV_VTOL_STATE_UNDEFINED,
+        landed_state,
+    })
+}
+
+fn attitude(snapshot: &Snapshot) -> MavMessage {
+    let half_rad = 0.5 * snapshot.state.theta_rad;
+    MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        q1: libm::cos(half_rad) as f32,
+        q3: libm::sin(half_rad) as f32,
+        pitchspeed: snapshot.state.q_rad_s as f32,
+        ..ATTITUDE_QUATERNION_DATA::default()
+    })
+}
+
+fn position(snapshot: &Snapshot) -> MavMessage {
+    let (x_m_s, up_m_s) = snapshot.state.ground_velocity_m_s();
+    MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        x: snapshot.state.x_m as f32,
+        y: 0.0,
+        z: -snapshot.state.z_m as f32,
+        vx: x_m_s as f32,
+        vy: 0.0,
+        vz: -up_m_s as f32,
+    })
+}
+
+fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
+    let (x_m_s, up_m_s) = snapshot.state.ground_velocity_m_s();
+    MavMessage::VFR_HUD(VFR_HUD_DATA {
+        airspeed: snapshot.state.speed_m_s() as f32,
+        groundspeed: x_m_s.abs() as f32,
+        alt: snapshot.state.z_m as f32,
+        climb: up_m_s as f32,
+        heading: 0,
+        throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
+    })
+}
+
+fn current_mode(snapshot: &Snapshot) -> MavMessage {
+    MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {
+        custom_mode: u32::from(snapshot.phase.index()),
+        standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
+        ..CURRENT_MODE_DATA::default()
+    })
+}
+
+fn autopilot_version() -> MavMessage {
+    let version = env!("CARGO_PKG_VERSION")
+        .split('.')
+        .map(|part| part.parse::<u32>().unwrap_or(0));
+    MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
+        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION,
+        // Major, minor, patch, then 0 for a development version.
+        flight_sw_version: version
+            .take(3)
+            .fold(0, |packed, part| (packed << 8) | (part & 0xff))
+            << 8,
+        ..AUTOPILOT_VERSION_DATA::default()
+    })
+}
+
+fn flight_status(snapshot: &Snapshot) -> MavMessage {
+    let seconds = snapshot
+        .countdown_s
+        .or(snapshot.since_ignition_s.map(|since_s| -since_s));
+    let locks = snapshot.interlocks;
+    MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        countdown_ms: seconds.map_or(i32::MAX, |s| (1000.0 * s).round() as i32),
+        interlocks: interlocks(locks),
+        checks_failed: snapshot.checks_failed,
+        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| s.ceil() as u16),
+        phase: td_phase(snapshot.phase),
+        abort_effect: match snapshot.abort_effect {
+            AbortEffect::None => TdAbortEffect::TD_ABORT_EFFECT_NONE,
+            AbortEffect::SafeOnPad => TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD,
+            AbortEffect::ChuteAtApogee => TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE,
+            AbortEffect::ChuteNow => TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW,
+            AbortEffect::BurnOrInhibit => TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT,
+            AbortEffect::UprightOnly => TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY,
+        },
+    })
+}
+
+fn interlocks(locks: Interlocks) -> TdInterlock {
+    let mut bits = TdInterlock::empty();
+    bits.set(TdInterlock::TD_INTERLOCK_PIN_OUT, locks.pin_out);
+    bits.set(TdInterlock::TD_INTERLOCK_ARMED, locks.armed);
+    bits.set(
+        TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
+        locks.landing_motor_inhibited,
+    );
+    bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
+    bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
+    bits.set(TdInterlock::TD_INTERLOCK_DEGRADED, locks.degraded);
+    bits
+}
+
+fn td_phase(phase: Phase) -> TdPhase {
+    match phase {
+        Phase::Safe => TdPhase::TD_PHASE_SAFE,
+        Phase::PadIdle => TdPhase::TD_PHASE_PAD_IDLE,
+        Phase::PadArmed => TdPhase::TD_PHASE_PAD_ARMED,
+        Phase::Boost => TdPhase::TD_PHASE_BOOST,
+        Phase::Coast => TdPhase::TD_PHASE_COAST,
+        Phase::Deploy => TdPhase::TD_PHASE_DEPLOY,
+        Phase::AeroDescent => TdPhase::TD_PHASE_AERO_DESCENT,
+        Phase::LandArmed => TdPhase::TD_PHASE_LAND_ARMED,
+        Phase::Ignition => TdPhase::TD_PHASE_IGNITION,
+        Phase::Powered => TdPhase::TD_PHASE_POWERED,
+        Phase::Touchdown => TdPhase::TD_PHASE_TOUCHDOWN,
+        Phase::Safed => TdPhase::TD_PHASE_SAFED,
+        Phase::Chute => TdPhase::TD_PHASE_CHUTE,
+    }
+}
+
+fn fins(snapshot: &Snapshot) -> MavMessage {
+    let (commanded, measured) = snapshot.fins_rad;
+    MavMessage::TD_FINS(TD_FINS_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        commanded: commanded.map(centidegrees),
+        measured: measured.map(centidegrees),
+    })
+}
+
+fn gimbal(snapshot: &Snapshot) -> MavMessage {
+    let (commanded, measured) = snapshot.gimbal_rad;
+    MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        pitch_commanded: centidegrees(commanded),
+        pitch_measured: centidegrees(measured),
+        yaw_commanded: 0,
+        yaw_measured: 0,
+    })
+}
+
+fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
+    let output = snapshot.output.as_ref()?;
+    let microseconds = |s: f64| (1e6 * s).round();
+    Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        tick: output.tick as u32,
+        cost: output.solver.cost as f32,
+        kkt_stationarity: output.solver.kkt_stationarity as f32,
+        kkt_feasibility: output.solver.kkt_feasibility as f32,
+        thrust_scale: 1.0,
+        solve_time_us: microseconds(snapshot.solve_time_s) as u32,
+        deadline_margin_us: microseconds(snapshot.deadline_s - snapshot.solve_time_s) as i32,
+        iterations: u16::try_from(output.solver.iterations).unwrap_or(u16::MAX),
+        level: td_level(output.level),
+        solver_status: td_status(output.solver.status),
+    }))
+}
+
+fn td_level(level: flight::controller::ControlLevel) -> TdControlLevel {
+    use flight::controller::ControlLevel as L;
+    match level {
+        L::Idle => TdControlLevel::TD_CONTROL_LEVEL_IDLE,
+        L::Rehearsal => TdControlLevel::TD_CONTROL_LEVEL_REHEARSAL,
+        L::Converged => TdControlLevel::TD_CONTROL_LEVEL_CONVERGED,
+        L::BestFeasible => TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE,
+        L::ShiftedPlan => TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN,
+        L::Stabiliser => TdControlLevel::TD_CONTROL_LEVEL_STABILISER,
+    }
+}
+
+fn td_status(status: flight::nmpc::SolveStatus) -> TdSolverStatus {
+    use flight::nmpc::SolveStatus as S;
+    match status {
+        S::NotRun => TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN,
+        S::Converged => TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
+        S::IterationLimit => TdSolverStatus::TD_SOLVER_STATUS_ITERATION_LIMIT,
+        S::Stalled => TdSolverStatus::TD_SOLVER_STATUS_STALLED,
+        S::SubproblemFailed => TdSolverStatus::TD_SOLVER_STATUS_SUBPROBLEM_FAILED,
+        S::NotLandable => TdSolverStatus::TD_SOLVER_STATUS_NOT_LANDABLE,
+        S::BadInput => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
+    }
+}
+
+fn touchdown_prediction(snapshot: &Snapshot) -> Option<MavMessage> {
+    let output = snapshot.output.as_ref().filter(|output| output.plan.len > 0)?;
+    let end = &output.predicted_touchdown.state;
+    Some(MavMessage::TD_TOUCHDOWN_PREDICTION(
+        TD_TOUCHDOWN_PREDICTION_DATA {
+            time_boot_ms: boot_ms(snapshot.time_s),
+            time_to_go_ms: (1000.0 * output.predicted_touchdown.time_from_now_s).round() as i32,
+            x_m: end.x_m as f32,
+            altitude_m: end.z_m as f32,
+            pitch_rad: end.theta_rad as f32,
+            u_m_s: end.u_m_s as f32,
+            w_m_s: end.w_m_s as f32,
+            q_rad_s: end.q_rad_s as f32,
+            limits_violated: TdLimit::from_bits_truncate(snapshot.predicted_violations),
+        },
+    ))
+}
+
+fn predicted_path(snapshot: &Snapshot) -> Option<MavMessage> {
+    let states = snapshot.output.as_ref()?.plan.used_states();
+    let last = states.len().checked_sub(1)?;
+    let count = states.len().min(PATH_POINTS);
+    let mut path = TD_PREDICTED_PATH_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        count: count as u8,
+        ..TD_PREDICTED_PATH_DATA::default()
+    };
+    for point in 0..count {
+        // Evenly spread, both ends kept.
+        let state: &PlanarState = &states[last * point / (count - 1).max(1)];
+        path.x[point] = centimetres(state.x_m);
+        path.altitude[point] = centimetres(state.z_m);
+    }
+    Some(MavMessage::TD_PREDICTED_PATH(path))
+}
+
+fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
+    let (impact, verdict) = snapshot.verdict.as_ref()?;
+    Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+        time_boot_ms: boot_ms(impact.time_s),
+        x_m: impact.state.x_m as f32,
+        altitude_m: impact.state.z_m as f32,
+        pitch_rad: impact.state.theta_rad as f32,
+        u_m_s: impact.state.u_m_s as f32,
+        w_m_s: impact.state.w_m_s as f32,
+        q_rad_s: impact.state.q_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(crate::vehicle::violations(verdict)),
+        landed: u8::from(verdict.landed()),
+    }))
+}
+
+fn boot_ms(time_s: f64) -> u32 {
+    (1000.0 * time_s).round() as u32
+}
+
+fn centidegrees(angle_rad: f64) -> i16 {
+    (100.0 * angle_rad.to_degrees()).round() as i16
+}
+
+fn centimetres(length_m: f64) -> i16 {
+    (100.0 * length_m).round() as i16
+}
+
+fn characters<const N: usize>(text: &str) -> CharArray<N> {
+    let mut bytes = [0; N];
+    for (place, byte) in bytes.iter_mut().zip(text.bytes()) {
+        *place = byte;
+    }
+    CharArray::new(bytes)
+}

@@ -1,0 +1,185 @@
+//! One frame of the flight computer.
+
+use std::time::Duration;
+
+use flight::arming;
+use flight::controller::{self, ControllerInput};
+use flight::phase::{Event, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
+use flight::verdict::LandingVerdict;
+
+use super::{DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, Tick, Vehicle, VehicleEvent};
+use crate::plant::Impact;
+
+impl Vehicle {
+    pub(super) fn run_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) {
+        if self.frame.is_multiple_of(self.frames_per_sample) {
+            self.run_sample(stopwatch);
+        }
+        for _ in 0..self.substeps_per_frame {
+            if let Some(impact) = self.plant.step() {
+                self.touch(impact);
+            }
+        }
+        self.frame += 1;
+        self.look_around();
+    }
+
+    /// The part that falls on a controller sample: actuators first, then phases, then the controller.
+    fn run_sample(&mut self, stopwatch: &mut dyn FnMut() -> Duration) {
+        let time_s = self.time_s();
+        self.gimbal_applied_rad = self.next_gimbal_rad;
+        self.plant.command(self.gimbal_applied_rad, self.fin_command_rad);
+
+        if self.mode.phase == Phase::Safe {
+            self.happen(Event::SelfTestPassed);
+        }
+        if self
+            .mode
+            .countdown_remaining_s(time_s)
+            .is_some_and(|left_s| left_s <= 0.0)
+            && self.happen(Event::ReleasedAt(StartPoint::Ignition)).is_none()
+        {
+            self.plant.release(self.draw.release);
+        }
+        if self.mode.phase == Phase::LandArmed {
+            self.evaluate_gate();
+        }
+        let rehearsing = self.mode.phase.on_pad();
+        let samples_between = if rehearsing {
+            (REHEARSAL_PERIOD_S / self.profile.nmpc.sample_time_s).round() as u64
+        } else {
+            1
+        };
+        let sample = self.frame / self.frames_per_sample;
+        if self.mode.phase != Phase::Safed && sample.is_multiple_of(samples_between.max(1)) {
+            self.run_controller(sample, stopwatch);
+        }
+    }
+
+    fn evaluate_gate(&mut self) {
+        let checks = self.gate_checks();
+        let open = arming::all_passed(&checks);
+        if let Some(reason) = arming::first_refusal(&checks) {
+            self.say(Severity::Critical, format!("ignition gate closed: {reason}"));
+        }
+        if let Some(refusal) = self.happen(Event::IgnitionGate { open }) {
+            self.say(Severity::Critical, format!("no ignition: {}", refusal.reason()));
+        }
+    }
+
+    fn run_controller(&mut self, sample: u64, stopwatch: &mut dyn FnMut() -> Duration) {
+        let deadline_s = self.profile.nmpc.sample_time_s;
+        let since_ignition_s = self
+            .ignition_sample
+            .map_or(0.0, |ignition| (sample - ignition) as f64 * deadline_s);
+        let input = ControllerInput {
+            tick: self.tick,
+            time_s: self.time_s(),
+            phase: self.mode.phase,
+            time_since_ignition_s: since_ignition_s,
+            state: self.plant.state(),
+            gimbal_applied_rad: self.gimbal_applied_rad,
+            thrust_scale: 1.0,
+            degraded: self.mode.interlocks.degraded,
+            deadline_missed: self.deadline_missed,
+        };
+        let began = stopwatch();
+        let output = controller::step(&mut self.controller, &input);
+        let solve_time_s = stopwatch().saturating_sub(began).as_secs_f64();
+
+        let level_before = self.output.as_ref().map(|output| output.level);
+        if self.mode.phase.in_landing_burn() && level_before != Some(output.level) {
+            self.say(
+                Severity::Notice,
+                format!("controller level {}", output.level.name()),
+            );
+        }
+        self.deadline_missed = solve_time_s > deadline_s && self.policy == DeadlinePolicy::Enforce;
+        self.next_gimbal_rad = if self.deadline_missed {
+            // What hardware has at hand when an answer is late: the next command of the plan before.
+            self.say(
+                Severity::Warning,
+                format!("deadline missed by {:.3} s", solve_time_s - deadline_s),
+            );
+            let before = self.output.as_ref().map(|output| output.plan.used_gimbal_rad());
+            before
+                .and_then(|plan| plan.get(1))
+                .copied()
+                .unwrap_or(self.gimbal_applied_rad)
+        } else {
+            output.gimbal_command_rad
+        };
+        if !self.mode.phase.on_pad() {
+            self.fin_command_rad = output.fin_command_rad;
+        }
+        self.tick += 1;
+        self.solve_time_s = solve_time_s;
+        self.events.push(VehicleEvent::Tick(Box::new(Tick {
+            input,
+            output: output.clone(),
+            state_digest: self.controller.digest(),
+            solve_time_s,
+            deadline_s,
+        })));
+        self.output = Some(output);
+    }
+
+    /// What the flight computer senses between samples.
+    fn look_around(&mut self) {
+        let time_s = self.time_s();
+        let in_phase_s = time_s - self.mode.entered_at_s;
+        match self.mode.phase {
+            Phase::Ignition if self.plant.thrust_n() > 0.0 => {
+                self.happen(Event::ThrustConfirmed);
+            }
+            Phase::Ignition
+                if in_phase_s >= NO_THRUST_TIMEOUT_S && !self.mode.interlocks.no_light_latched =>
+            {
+                self.happen(Event::NoThrustTimeout);
+            }
+            Phase::Powered if !self.burned_out && self.plant.thrust_n() <= 0.0 => {
+                self.burned_out = true;
+                self.happen(Event::Burnout);
+                self.say(Severity::Info, "burn-out".to_owned());
+            }
+            Phase::Touchdown if in_phase_s >= SAFING_S => {
+                self.happen(Event::SafingDone);
+            }
+            _ => {}
+        }
+        let airborne =
+            !self.mode.phase.on_pad() && !matches!(self.mode.phase, Phase::Touchdown | Phase::Safed);
+        if airborne && self.plant.in_contact() {
+            let thrust_below_weight = self.plant.thrust_below_weight();
+            if self.happen(Event::Contact { thrust_below_weight }).is_none() {
+                self.judge();
+            }
+        }
+    }
+
+    fn touch(&mut self, impact: Impact) {
+        let vertical_m_s = impact.state.ground_velocity_m_s().1;
+        self.say(
+            Severity::Notice,
+            format!("ground contact at {vertical_m_s:.2} m/s"),
+        );
+        self.impacts.push(impact);
+    }
+
+    /// A landing is as good as its worst contact: a bounce does not wash off a hard one.
+    fn judge(&mut self) {
+        let judged: Vec<_> = self
+            .impacts
+            .iter()
+            .map(|impact| (*impact, LandingVerdict::judge(&self.limits, &impact.state)))
+            .collect();
+        let worst = judged
+            .iter()
+            .find(|(_, verdict)| !verdict.landed())
+            .or(judged.first());
+        if let Some((impact, verdict)) = worst.copied() {
+            self.verdict = Some((impact, verdict));
+            self.events.push(VehicleEvent::Verdict { impact, verdict });
+        }
+    }
+}

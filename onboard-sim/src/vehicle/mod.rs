@@ -1,0 +1,278 @@
+//! The flight computer around one simulated vehicle: phases, checks, controller ticks, touchdown.
+//!
+//! Pure but for the stopwatch that its caller hands in to time the controller. Time is simulated and moves in
+//! frames ([`Vehicle::frame_s`], 20 ms for a 100 ms sample); a controller tick falls on every few frames.
+//! Its estimate is the plant's true state: sensors are a matter of their own.
+
+mod answer;
+mod events;
+mod flight_loop;
+mod snapshot;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use flight::arming::{ArmingInput, Check, arming_checks};
+use flight::controller::{ControlLevel, ControllerConfig, ControllerOutput, ControllerState};
+use flight::gate::{GateInput, gate_checks};
+use flight::phase::{Mode, Phase, StartPoint};
+use flight::profile::Profile;
+use flight::verdict::{LandingVerdict, TouchdownLimits};
+
+pub use answer::{Answer, Request, Result};
+pub use events::{Severity, Tick, VehicleEvent};
+pub(crate) use snapshot::violations;
+pub use snapshot::{AbortEffect, Snapshot};
+
+use crate::plant::{Impact, Plant, STEP_S};
+use crate::scatter::Draw;
+
+/// Frames are at least this long.
+const FRAME_MIN_S: f64 = 0.02;
+/// The landing is rehearsed this often while the vehicle waits on the pad.
+const REHEARSAL_PERIOD_S: f64 = 1.0;
+/// Time on the ground before everything is shut down.
+const SAFING_S: f64 = 1.0;
+
+/// Why a profile cannot be flown here.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum VehicleError {
+    /// The start is not simulated.
+    #[error("profile {profile}: start.at = {at:?} is not simulated; only \"ignition\" is")]
+    Start {
+        /// Profile.
+        profile: String,
+        /// What it asks for.
+        at: StartPoint,
+    },
+    /// The sample time does not fit the plant's step.
+    #[error(
+        "profile {profile}: nmpc.sample_time_s = {sample_time_s}: must be a whole number of milliseconds"
+    )]
+    SampleTime {
+        /// Profile.
+        profile: String,
+        /// What it asks for.
+        sample_time_s: f64,
+    },
+}
+
+/// What the vehicle is told of its log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogState {
+    /// The log is being written; also true where the operator chose to fly without one.
+    pub running: bool,
+    /// Free space for it, bytes.
+    pub space_bytes: u64,
+}
+
+/// How late outputs are treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DeadlinePolicy {
+    /// Simulated time waits: the output is applied and the miss is counted.
+    #[default]
+    Observe,
+    /// As in hardware: a late output is not applied, the previous plan's next command is.
+    Enforce,
+}
+
+/// One vehicle, one flight.
+pub struct Vehicle {
+    profile: Profile,
+    limits: TouchdownLimits,
+    draw: Draw,
+    plant: Plant,
+    mode: Mode,
+    controller: ControllerState,
+    policy: DeadlinePolicy,
+    log: LogState,
+    frame: u64,
+    frames_per_sample: u64,
+    substeps_per_frame: u64,
+    tick: u64,
+    ignition_sample: Option<u64>,
+    output: Option<ControllerOutput>,
+    solve_time_s: f64,
+    /// The command that the actuators get at the next sample.
+    next_gimbal_rad: f64,
+    gimbal_applied_rad: f64,
+    fin_command_rad: [f64; 4],
+    deadline_missed: bool,
+    impacts: Vec<Impact>,
+    burned_out: bool,
+    verdict: Option<(Impact, LandingVerdict)>,
+    events: Vec<VehicleEvent>,
+}
+
+impl Vehicle {
+    /// A vehicle powered up in its rig.
+    ///
+    /// # Errors
+    /// The profile asks for something this simulation does not do.
+    pub fn new(
+        profile: &Profile,
+        draw: Draw,
+        policy: DeadlinePolicy,
+    ) -> std::result::Result<Self, VehicleError> {
+        if profile.start.at != StartPoint::Ignition {
+            return Err(VehicleError::Start {
+                profile: profile.name.clone(),
+                at: profile.start.at,
+            });
+        }
+        let sample_time_s = profile.nmpc.sample_time_s;
+        let substeps = (sample_time_s / STEP_S).round();
+        if substeps < 1.0 || (substeps * STEP_S - sample_time_s).abs() > 1e-9 {
+            return Err(VehicleError::SampleTime {
+                profile: profile.name.clone(),
+                sample_time_s,
+            });
+        }
+        let substeps = substeps as u64;
+        let shortest = (FRAME_MIN_S / STEP_S).round() as u64;
+        let substeps_per_frame = (shortest..=substeps)
+            .find(|length| substeps.is_multiple_of(*length))
+            .unwrap_or(substeps);
+        let config = ControllerConfig::from_profile(profile);
+        Ok(Self {
+            limits: TouchdownLimits::from_profile(profile),
+            plant: Plant::new(profile, &draw),
+            mode: Mode::power_up(0.0),
+            controller: ControllerState::new(&config),
+            policy,
+            log: LogState {
+                running: false,
+                space_bytes: 0,
+            },
+            frame: 0,
+            frames_per_sample: substeps / substeps_per_frame,
+            substeps_per_frame,
+            tick: 0,
+            ignition_sample: None,
+            output: None,
+            solve_time_s: 0.0,
+            next_gimbal_rad: 0.0,
+            gimbal_applied_rad: 0.0,
+            fin_command_rad: [profile.fins.closed_rad(); 4],
+            deadline_missed: false,
+            impacts: Vec::new(),
+            burned_out: false,
+            verdict: None,
+            events: Vec::new(),
+            profile: profile.clone(),
+            draw,
+        })
+    }
+
+    /// Simulated time, s. A product rather than a sum, so that it does not drift.
+    pub fn time_s(&self) -> f64 {
+        self.frame as f64 * self.frame_s()
+    }
+
+    /// Length of a frame, s.
+    pub fn frame_s(&self) -> f64 {
+        self.profile.nmpc.sample_time_s / self.frames_per_sample as f64
+    }
+
+    /// The phase.
+    pub fn phase(&self) -> Phase {
+        self.mode.phase
+    }
+
+    /// Phase, latches and countdown.
+    pub fn mode(&self) -> &Mode {
+        &self.mode
+    }
+
+    /// The profile.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The verdict of the touchdown, with the contact it judges, once there is one.
+    pub fn verdict(&self) -> Option<&(Impact, LandingVerdict)> {
+        self.verdict.as_ref()
+    }
+
+    /// Whether an abort has been accepted.
+    pub fn aborted(&self) -> bool {
+        self.mode.interlocks.abort_latched
+    }
+
+    /// Tells the vehicle how its log fares.
+    pub fn set_log_state(&mut self, log: LogState) {
+        self.log = log;
+    }
+
+    /// What the crew pulls by hand; the simulation does it when the program starts.
+    pub fn pull_pin(&mut self) {
+        self.happen(flight::phase::Event::PinPulled);
+    }
+
+    /// Advances by one frame. `stopwatch` is any clock; only differences of it are used, to time the controller.
+    pub fn advance_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {
+        self.run_frame(stopwatch);
+        std::mem::take(&mut self.events)
+    }
+
+    /// The arming checks with the values found now.
+    pub fn arming_checks(&self) -> Vec<Check> {
+        let state = self.plant.state();
+        let solver = self.output.as_ref().map(|output| output.solver);
+        let rehearsed = self
+            .output
+            .as_ref()
+            .filter(|output| output.level == ControlLevel::Rehearsal);
+        let input = ArmingInput {
+            pin_out: self.mode.interlocks.pin_out,
+            abort_latched: self.mode.interlocks.abort_latched,
+            tilt_rad: state.theta_rad - core::f64::consts::FRAC_PI_2,
+            rotation_rad_s: state.q_rad_s,
+            speed_m_s: state.speed_m_s(),
+            self_test_passed: self.mode.phase != Phase::Safe,
+            // The estimate is the truth.
+            estimator_converged: true,
+            fins_answering: self.fins_answering(),
+            igniter_continuity: self.ignition_sample.is_none(),
+            log_running: self.log.running,
+            log_space_bytes: self.log.space_bytes,
+            controller_warm: solver.is_some_and(|solver| solver.converged()),
+            controller_found: solver.map_or_else(|| "no rehearsal yet".to_owned(), |solver| solver.summary()),
+            predicted_landing: rehearsed
+                .filter(|output| output.plan.len > 0)
+                .map(|output| LandingVerdict::judge(&self.limits, &output.predicted_touchdown.state)),
+        };
+        arming_checks(&self.profile.arming, &input)
+    }
+
+    /// The ignition gate's checks with the values found now.
+    pub fn gate_checks(&self) -> Vec<Check> {
+        let state = self.plant.state();
+        let predicted = self.output.as_ref();
+        let input = GateInput {
+            tilt_rad: state.theta_rad - core::f64::consts::FRAC_PI_2,
+            vertical_speed_m_s: state.ground_velocity_m_s().1,
+            pitch_rate_rad_s: state.q_rad_s,
+            speed_m_s: state.speed_m_s(),
+            predicted_speed_m_s: self.profile.start.planar_state().speed_m_s(),
+            // One height source: the truth.
+            height_disagreement_m: 0.0,
+            landing_feasible: predicted.is_some_and(|output| output.solver.landing_feasible),
+            predicted_touchdown_x_m: predicted
+                .map_or(f64::NAN, |output| output.predicted_touchdown.state.x_m),
+            // Released at ignition, the fins open with the release; their confirmation belongs to the descent.
+            fins_confirmed: true,
+            parachute_stowed: true,
+            igniter_continuity: self.ignition_sample.is_none(),
+            estimator_healthy: state.is_finite(),
+        };
+        gate_checks(&self.profile.gate, &input)
+    }
+
+    /// Fins whose actual angle follows the commanded one, or is on its way at full rate.
+    fn fins_answering(&self) -> [bool; 4] {
+        let (commanded, actual) = self.plant.fins_rad();
+        std::array::from_fn(|fin| commanded[fin].is_finite() && actual[fin].is_finite())
+    }
+}
