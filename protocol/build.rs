@@ -63,10 +63,9 @@ fn note_the_build() -> Result<()> {
 
     println!("cargo:rerun-if-changed=../Cargo.lock");
     let lock = fs::read("../Cargo.lock").unwrap_or_default();
-    let lock_hash: String = sha2::Sha256::digest(&lock)
+    let lock_hash = sha2::Sha256::digest(&lock)
         .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+        .fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
 
     println!("cargo:rustc-env=TOUCHDOWN_GIT_COMMIT={commit}");
     println!("cargo:rustc-env=TOUCHDOWN_RUSTC={version}");

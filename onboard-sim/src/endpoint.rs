@@ -5,15 +5,16 @@
 use flight::phase::Phase;
 use mavlink::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
+#[expect(deprecated, reason = "only [`pong`] uses it")]
+use protocol::dialect::PING_DATA;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, AVAILABLE_MODES_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA,
-    LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity, PING_DATA,
-    SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TIMESYNC_DATA,
-    VFR_HUD_DATA,
+    LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TIMESYNC_DATA, VFR_HUD_DATA,
 };
 use protocol::frame::{Encoder, Frame};
-use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::text;
 
 use crate::commands::{self, Command};
@@ -173,8 +174,13 @@ impl VehicleEndpoint {
                 };
                 self.answer(&MavMessage::PING(answer));
             }
-            // Nothing else is for us; what cannot be decoded is counted by the framer.
-            _ => {}
+            Ok(message) => {
+                if let Some(pong) = pong(&message, frame.source()) {
+                    self.answer(&pong);
+                }
+            }
+            // Nothing we know: no answer is better than a guess.
+            Err(_) => {}
         }
     }
 
@@ -358,3 +364,25 @@ impl VehicleEndpoint {
         }
     }
 }
+
+/// The answer to a PING that asks for one. Deprecated, but older ground stations still measure with it.
+#[expect(
+    deprecated,
+    reason = "the standard has replaced PING by TIMESYNC; older ground stations have not"
+)]
+fn pong(message: &MavMessage, asker: Address) -> Option<MavMessage> {
+    let MavMessage::PING(ping) = message else {
+        return None;
+    };
+    let (target_system, target_component) = (asker.system_id, asker.component_id);
+    (ping.target_system == 0).then(|| {
+        MavMessage::PING(PING_DATA {
+            target_system,
+            target_component,
+            ..ping.clone()
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -131,7 +131,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         interrupted().await;
         let _ = stop.send(true);
     });
-    let flown = fly_observed(options, stopped, report_event).await;
+    let flown = Box::pin(fly_observed(options, stopped, report_event)).await;
     let log_path = recorder.as_ref().map(Recorder::finish).transpose();
     let summary = flown?;
     print_summary(&summary)?;

@@ -48,15 +48,50 @@ pub fn gate_checks(limits: &GateLimits, input: &GateInput) -> Vec<Check> {
             found: format!("{:.2} m/s", input.vertical_speed_m_s),
             required: "below 0 m/s".to_owned(),
         },
-        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
-        Check::at_most("pitch rate", input.pitch_rate_rad_s.to_degrees(), limits.pitch_rate_max_deg_s, "deg/s"),
-        Check::at_most("speed error", speed_error_percent, 100.0 * limits.speed_error_max_fraction, "%"),
-        Check::at_most("height disagreement", input.height_disagreement_m, limits.height_disagreement_max_m, "m"),
-        Check::condition("landing plan", input.landing_feasible, "feasible from here", "not feasible from here"),
-        Check::at_most("predicted touchdown", input.predicted_touchdown_x_m, limits.fence_radius_m, "m"),
+        Check::at_most(
+            "tilt from vertical",
+            input.tilt_rad.to_degrees(),
+            limits.tilt_max_deg,
+            "deg",
+        ),
+        Check::at_most(
+            "pitch rate",
+            input.pitch_rate_rad_s.to_degrees(),
+            limits.pitch_rate_max_deg_s,
+            "deg/s",
+        ),
+        Check::at_most(
+            "speed error",
+            speed_error_percent,
+            100.0 * limits.speed_error_max_fraction,
+            "%",
+        ),
+        Check::at_most(
+            "height disagreement",
+            input.height_disagreement_m,
+            limits.height_disagreement_max_m,
+            "m",
+        ),
+        Check::condition(
+            "landing plan",
+            input.landing_feasible,
+            "feasible from here",
+            "not feasible from here",
+        ),
+        Check::at_most(
+            "predicted touchdown",
+            input.predicted_touchdown_x_m,
+            limits.fence_radius_m,
+            "m",
+        ),
         Check::condition("fins", input.fins_confirmed, "confirmed", "not confirmed"),
         Check::condition("parachute", input.parachute_stowed, "stowed", "not stowed"),
-        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
+        Check::condition(
+            "igniter continuity",
+            input.igniter_continuity,
+            "closed circuit",
+            "open circuit",
+        ),
         Check::condition("estimator", input.estimator_healthy, "healthy", "not healthy"),
     ]
 }
@@ -95,21 +130,48 @@ mod tests {
         assert_eq!(refusal_of(|_| {}), None);
     }
 
+    /// A reading spoilt on purpose, and the check that must close the gate.
+    type Spoiling = (&'static str, fn(&mut GateInput));
+
     #[test]
     fn each_check_closes_the_gate_alone() {
-        let spoilings: [(&str, fn(&mut GateInput)); 12] = [
-            ("descending", |input| input.vertical_speed_m_s = 0.0),
-            ("tilt from vertical", |input| input.tilt_rad = -0.36),
-            ("pitch rate", |input| input.pitch_rate_rad_s = 1.1),
-            ("speed error", |input| input.speed_m_s = 5.8),
-            ("speed error", |input| input.predicted_speed_m_s = 0.0),
-            ("height disagreement", |input| input.height_disagreement_m = f64::NAN),
-            ("landing plan", |input| input.landing_feasible = false),
-            ("predicted touchdown", |input| input.predicted_touchdown_x_m = -21.0),
-            ("fins", |input| input.fins_confirmed = false),
-            ("parachute", |input| input.parachute_stowed = false),
-            ("igniter continuity", |input| input.igniter_continuity = false),
-            ("estimator", |input| input.estimator_healthy = false),
+        let spoilings: [Spoiling; 12] = [
+            ("descending", |input| {
+                input.vertical_speed_m_s = 0.0;
+            }),
+            ("tilt from vertical", |input| {
+                input.tilt_rad = -0.36;
+            }),
+            ("pitch rate", |input| {
+                input.pitch_rate_rad_s = 1.1;
+            }),
+            ("speed error", |input| {
+                input.speed_m_s = 5.8;
+            }),
+            ("speed error", |input| {
+                input.predicted_speed_m_s = 0.0;
+            }),
+            ("height disagreement", |input| {
+                input.height_disagreement_m = f64::NAN;
+            }),
+            ("landing plan", |input| {
+                input.landing_feasible = false;
+            }),
+            ("predicted touchdown", |input| {
+                input.predicted_touchdown_x_m = -21.0;
+            }),
+            ("fins", |input| {
+                input.fins_confirmed = false;
+            }),
+            ("parachute", |input| {
+                input.parachute_stowed = false;
+            }),
+            ("igniter continuity", |input| {
+                input.igniter_continuity = false;
+            }),
+            ("estimator", |input| {
+                input.estimator_healthy = false;
+            }),
         ];
         for (name, spoil) in spoilings {
             let refusal = refusal_of(spoil).unwrap();

@@ -33,11 +33,21 @@ fn profile() -> Profile {
 }
 
 /// A tick's input; tests that spoil something change it before it is used.
-fn input(tick: u64, time_s: f64, state: PlanarState, gimbal_applied_rad: f64, thrust_scale: f64) -> ControllerInput {
+fn input(
+    tick: u64,
+    time_s: f64,
+    state: PlanarState,
+    gimbal_applied_rad: f64,
+    thrust_scale: f64,
+) -> ControllerInput {
     ControllerInput {
         tick,
         time_s,
-        phase: if tick == 0 { Phase::Ignition } else { Phase::Powered },
+        phase: if tick == 0 {
+            Phase::Ignition
+        } else {
+            Phase::Powered
+        },
         time_since_ignition_s: time_s,
         state,
         gimbal_applied_rad,
@@ -54,7 +64,10 @@ fn fly_with(scenario: Scenario, mut spoil: impl FnMut(&mut ControllerInput)) -> 
     let config = ControllerConfig::from_profile(&profile);
     let mut controller = ControllerState::new(&config);
     if scenario.rehearsed {
-        let rehearsal = ControllerInput { phase: Phase::PadIdle, ..input(0, 0.0, nominal, 0.0, 1.0) };
+        let rehearsal = ControllerInput {
+            phase: Phase::PadIdle,
+            ..input(0, 0.0, nominal, 0.0, 1.0)
+        };
         let output = step(&mut controller, &rehearsal);
         assert!(output.solver.converged(), "{}", output.solver.summary());
     }
@@ -80,7 +93,11 @@ fn fly_with(scenario: Scenario, mut spoil: impl FnMut(&mut ControllerInput)) -> 
             let thrust_n = profile.motor.mean_thrust_n(plant_s, PLANT_STEP_S);
             state = model.rk4_step(&state, applied_rad, thrust_n, PLANT_STEP_S);
             if state.z_m <= 0.0 {
-                return Flight { contact_s: plant_s + PLANT_STEP_S, contact: state, outputs };
+                return Flight {
+                    contact_s: plant_s + PLANT_STEP_S,
+                    contact: state,
+                    outputs,
+                };
             }
         }
         applied_rad = pending_rad;
@@ -94,10 +111,24 @@ fn fly(scenario: Scenario) -> Flight {
 
 fn report(name: &str, flight: &Flight) -> LandingVerdict {
     let verdict = LandingVerdict::judge(&TouchdownLimits::from_profile(&profile()), &flight.contact);
-    let values: Vec<String> =
-        verdict.results.iter().map(|limit| format!("{} {:+.4} {}", limit.name, limit.value, limit.unit)).collect();
-    let count = |level| flight.outputs.iter().filter(|output| output.level == level).count();
-    let worst = flight.outputs.iter().map(|output| output.solver.iterations).max().unwrap_or(0);
+    let values: Vec<String> = verdict
+        .results
+        .iter()
+        .map(|limit| format!("{} {:+.4} {}", limit.name, limit.value, limit.unit))
+        .collect();
+    let count = |level| {
+        flight
+            .outputs
+            .iter()
+            .filter(|output| output.level == level)
+            .count()
+    };
+    let worst = flight
+        .outputs
+        .iter()
+        .map(|output| output.solver.iterations)
+        .max()
+        .unwrap_or(0);
     println!(
         "{name}: contact {:.3} s, {}; {} converged, {} best feasible, {} stabiliser, at most {worst} iterations",
         flight.contact_s,
@@ -113,11 +144,19 @@ fn assert_lands(name: &str, flight: &Flight) {
     let verdict = report(name, flight);
     assert!(verdict.landed(), "{name}: {}", verdict.summary());
     // Contact while thrust still exceeds weight would not be the end of the flight.
-    assert!(flight.contact_s >= 4.95, "{name}: contact at {} s, under thrust", flight.contact_s);
+    assert!(
+        flight.contact_s >= 4.95,
+        "{name}: contact at {} s, under thrust",
+        flight.contact_s
+    );
 }
 
 fn nominal() -> Scenario {
-    Scenario { start: profile().start.planar_state(), thrust_scale: 1.0, rehearsed: true }
+    Scenario {
+        start: profile().start.planar_state(),
+        thrust_scale: 1.0,
+        rehearsed: true,
+    }
 }
 
 /// The start states of the landing paper, section 3.3.2.
@@ -125,12 +164,48 @@ fn paper_starts() -> [(&'static str, PlanarState); 7] {
     let nominal = profile().start.planar_state();
     [
         ("nominal", nominal),
-        ("theta0 = 60 deg", PlanarState { theta_rad: 60.0_f64.to_radians(), ..nominal }),
-        ("theta0 = 120 deg", PlanarState { theta_rad: 120.0_f64.to_radians(), ..nominal }),
-        ("w0 = -1 m/s", PlanarState { w_m_s: -1.0, ..nominal }),
-        ("w0 = +1 m/s", PlanarState { w_m_s: 1.0, ..nominal }),
-        ("q0 = -5 deg/s", PlanarState { q_rad_s: -5.0_f64.to_radians(), ..nominal }),
-        ("q0 = +5 deg/s", PlanarState { q_rad_s: 5.0_f64.to_radians(), ..nominal }),
+        (
+            "theta0 = 60 deg",
+            PlanarState {
+                theta_rad: 60.0_f64.to_radians(),
+                ..nominal
+            },
+        ),
+        (
+            "theta0 = 120 deg",
+            PlanarState {
+                theta_rad: 120.0_f64.to_radians(),
+                ..nominal
+            },
+        ),
+        (
+            "w0 = -1 m/s",
+            PlanarState {
+                w_m_s: -1.0,
+                ..nominal
+            },
+        ),
+        (
+            "w0 = +1 m/s",
+            PlanarState {
+                w_m_s: 1.0,
+                ..nominal
+            },
+        ),
+        (
+            "q0 = -5 deg/s",
+            PlanarState {
+                q_rad_s: -5.0_f64.to_radians(),
+                ..nominal
+            },
+        ),
+        (
+            "q0 = +5 deg/s",
+            PlanarState {
+                q_rad_s: 5.0_f64.to_radians(),
+                ..nominal
+            },
+        ),
     ]
 }
 
@@ -176,11 +251,23 @@ fn dispersed_starts_land_inside_table_2() {
 #[test]
 fn half_a_percent_of_thrust_known_to_the_controller_lands() {
     for thrust_scale in [0.995, 1.005] {
-        assert_lands(&format!("thrust {thrust_scale}"), &fly(Scenario { thrust_scale, ..nominal() }));
+        assert_lands(
+            &format!("thrust {thrust_scale}"),
+            &fly(Scenario {
+                thrust_scale,
+                ..nominal()
+            }),
+        );
     }
 }
 
 #[test]
 fn a_cold_first_tick_lands_too() {
-    assert_lands("cold", &fly(Scenario { rehearsed: false, ..nominal() }));
+    assert_lands(
+        "cold",
+        &fly(Scenario {
+            rehearsed: false,
+            ..nominal()
+        }),
+    );
 }

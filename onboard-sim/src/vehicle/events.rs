@@ -60,6 +60,6 @@ pub enum VehicleEvent {
         /// The contact that was judged.
         impact: Impact,
         /// Limit by limit.
-        verdict: LandingVerdict,
+        verdict: Box<LandingVerdict>,
     },
 }

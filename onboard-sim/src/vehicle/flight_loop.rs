@@ -7,7 +7,9 @@ use flight::controller::{self, ControllerInput};
 use flight::phase::{Event, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
 use flight::verdict::LandingVerdict;
 
-use super::{DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, Tick, Vehicle, VehicleEvent};
+use super::{
+    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
+};
 use crate::plant::Impact;
 
 impl Vehicle {
@@ -129,7 +131,7 @@ impl Vehicle {
         let time_s = self.time_s();
         let in_phase_s = time_s - self.mode.entered_at_s;
         match self.mode.phase {
-            Phase::Ignition if self.plant.thrust_n() > 0.0 => {
+            Phase::Ignition if self.plant.thrust_n() > 0.0 && in_phase_s >= THRUST_CONFIRM_S => {
                 self.happen(Event::ThrustConfirmed);
             }
             Phase::Ignition
@@ -179,7 +181,10 @@ impl Vehicle {
             .or(judged.first());
         if let Some((impact, verdict)) = worst.copied() {
             self.verdict = Some((impact, verdict));
-            self.events.push(VehicleEvent::Verdict { impact, verdict });
+            self.events.push(VehicleEvent::Verdict {
+                impact,
+                verdict: Box::new(verdict),
+            });
         }
     }
 }

@@ -32,6 +32,8 @@ use crate::scatter::Draw;
 const FRAME_MIN_S: f64 = 0.02;
 /// The landing is rehearsed this often while the vehicle waits on the pad.
 const REHEARSAL_PERIOD_S: f64 = 1.0;
+/// Thrust is believed once it has been sensed for this long: one spike is not a burning motor.
+const THRUST_CONFIRM_S: f64 = 0.04;
 /// Time on the ground before everything is shut down.
 const SAFING_S: f64 = 1.0;
 

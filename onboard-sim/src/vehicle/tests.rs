@@ -1,1 +1,336 @@
+//! The vehicle as its crew meets it: arming, countdown, landing, and an abort in every phase it passes.
 
+use std::time::Duration;
+
+use flight::phase::Phase;
+use flight::profile::Profile;
+
+use super::*;
+use crate::scatter::draw;
+
+fn still() -> impl FnMut() -> Duration {
+    || Duration::ZERO
+}
+
+fn vehicle_of(profile: &Profile) -> Vehicle {
+    let mut vehicle = Vehicle::new(profile, draw(profile, 1), DeadlinePolicy::Observe).unwrap();
+    vehicle.set_log_state(LogState {
+        running: true,
+        space_bytes: u64::MAX,
+    });
+    vehicle.pull_pin();
+    vehicle
+}
+
+fn vehicle() -> Vehicle {
+    vehicle_of(&Profile::builtin("paper-calibrated").unwrap())
+}
+
+fn run_until(vehicle: &mut Vehicle, mut done: impl FnMut(&Vehicle) -> bool) -> Vec<VehicleEvent> {
+    let mut events = Vec::new();
+    for _ in 0..2_000 {
+        if done(vehicle) {
+            return events;
+        }
+        events.extend(vehicle.advance_frame(&mut still()));
+    }
+    panic!("still {:?} at {} s", vehicle.phase(), vehicle.time_s());
+}
+
+fn phases(events: &[VehicleEvent]) -> Vec<Phase> {
+    let to = |event: &VehicleEvent| match event {
+        VehicleEvent::PhaseChanged { to, .. } => Some(*to),
+        _ => None,
+    };
+    events.iter().filter_map(to).collect()
+}
+
+fn in_phase(phase: Phase) -> Vehicle {
+    let mut vehicle = vehicle();
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    if phase == Phase::PadIdle {
+        return vehicle;
+    }
+    assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted);
+    if phase == Phase::PadArmed {
+        return vehicle;
+    }
+    assert_eq!(vehicle.request(Request::Start).result, Result::Accepted);
+    run_until(&mut vehicle, |v| v.phase() == phase);
+    vehicle
+}
+
+#[test]
+fn the_nominal_flight_passes_its_phases_and_lands_inside_table_2() {
+    let mut vehicle = in_phase(Phase::PadArmed);
+    vehicle.request(Request::Start);
+    let events = run_until(&mut vehicle, Vehicle::is_over);
+    let expected = [
+        Phase::PadArmed,
+        Phase::LandArmed,
+        Phase::Ignition,
+        Phase::Powered,
+        Phase::Touchdown,
+        Phase::Safed,
+    ];
+    assert_eq!(phases(&events), expected);
+    let (impact, verdict) = vehicle.verdict().unwrap();
+    assert!(verdict.landed(), "{impact:?}: {}", verdict.summary());
+    assert!(
+        events
+            .iter()
+            .any(|event| matches!(event, VehicleEvent::Verdict { .. }))
+    );
+}
+
+#[test]
+fn ticks_are_numbered_without_gaps_and_fall_on_samples_since_ignition() {
+    let mut vehicle = in_phase(Phase::PadArmed);
+    vehicle.request(Request::Start);
+    let events = run_until(&mut vehicle, Vehicle::is_over);
+    let ticks: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event {
+            VehicleEvent::Tick(tick) => Some(tick.input),
+            _ => None,
+        })
+        .collect();
+    for pair in ticks.windows(2) {
+        assert_eq!(pair[1].tick, pair[0].tick + 1);
+    }
+    let powered: Vec<_> = ticks.iter().filter(|tick| tick.phase.in_landing_burn()).collect();
+    assert!(powered.len() >= 50, "{}", powered.len());
+    for (k, tick) in powered.iter().enumerate() {
+        assert!((tick.time_since_ignition_s - 0.1 * k as f64).abs() < 1e-9);
+    }
+    // As in the paper, the first action falls one sample after ignition.
+    assert_eq!(powered[0].gimbal_applied_rad.to_bits(), 0.0f64.to_bits());
+}
+
+#[test]
+fn two_flights_of_one_seed_are_equal_to_the_bit() {
+    let fly = || {
+        let mut vehicle = vehicle_of(&Profile::builtin("paper-dispersed").unwrap());
+        run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+        vehicle.request(Request::Arm);
+        vehicle.request(Request::Start);
+        run_until(&mut vehicle, Vehicle::is_over)
+    };
+    // Debug prints a double's shortest exact form, so equal text is equal bits (but for NaN payloads).
+    assert_eq!(format!("{:?}", fly()), format!("{:?}", fly()));
+}
+
+#[test]
+fn a_failed_check_refuses_arming_and_says_which() {
+    let mut vehicle = in_phase(Phase::PadIdle);
+    vehicle.set_log_state(LogState {
+        running: false,
+        space_bytes: 0,
+    });
+    let answer = vehicle.request(Request::Arm);
+    assert_eq!(answer.result, Result::NotNow);
+    assert!(answer.reason.unwrap().starts_with("log: found not running"));
+    assert_eq!(vehicle.phase(), Phase::PadIdle);
+    vehicle.set_log_state(LogState {
+        running: true,
+        space_bytes: u64::MAX,
+    });
+    assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted);
+    assert_eq!(
+        vehicle.request(Request::Arm).result,
+        Result::Accepted,
+        "armed already"
+    );
+}
+
+#[test]
+fn a_landing_that_cannot_be_is_refused_on_the_pad_with_its_bound() {
+    let mut vehicle = vehicle_of(&Profile::builtin("paper-as-printed").unwrap());
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    let reason = vehicle.request(Request::Arm).reason.unwrap();
+    assert!(
+        reason.contains("not landable: best touchdown speed 4.3 m/s"),
+        "{reason}"
+    );
+}
+
+#[test]
+fn a_countdown_can_be_cancelled_without_a_latch() {
+    let mut vehicle = in_phase(Phase::PadArmed);
+    assert_eq!(vehicle.request(Request::Start).result, Result::Accepted);
+    assert_eq!(
+        vehicle.request(Request::Start).result,
+        Result::Accepted,
+        "running already"
+    );
+    assert_eq!(vehicle.request(Request::Disarm).result, Result::Accepted);
+    assert_eq!(vehicle.phase(), Phase::PadIdle);
+    assert!(!vehicle.aborted());
+    for _ in 0..500 {
+        vehicle.advance_frame(&mut still());
+    }
+    assert_eq!(vehicle.phase(), Phase::PadIdle, "nothing was released");
+    assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted);
+}
+
+#[test]
+fn start_and_disarm_are_refused_where_they_do_not_belong() {
+    assert_eq!(
+        in_phase(Phase::PadIdle).request(Request::Start).result,
+        Result::Denied
+    );
+    let mut flying = in_phase(Phase::Powered);
+    for request in [Request::Arm, Request::Disarm, Request::Start] {
+        let answer = flying.request(request);
+        assert_eq!(answer.result, Result::Denied, "{request:?}");
+        assert!(answer.reason.unwrap().contains("POWERED"));
+    }
+}
+
+#[test]
+fn an_abort_on_the_pad_disarms_latches_and_shows_the_wait() {
+    for phase in [Phase::PadIdle, Phase::PadArmed] {
+        let mut vehicle = in_phase(phase);
+        assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::SafeOnPad);
+        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+        let after = vehicle.snapshot();
+        assert_eq!(after.phase, Phase::PadIdle);
+        assert!(!after.interlocks.armed && after.interlocks.landing_motor_inhibited);
+        assert_eq!(after.pad_wait_s, Some(60.0));
+        assert_eq!(after.abort_effect, AbortEffect::None);
+        assert_eq!(
+            vehicle.request(Request::Abort).result,
+            Result::Accepted,
+            "repeated until answered"
+        );
+        let refused = vehicle.request(Request::Arm);
+        assert_ne!(refused.result, Result::Accepted);
+        assert!(refused.reason.unwrap().contains("abort"));
+        assert!(vehicle.is_over());
+    }
+}
+
+#[test]
+fn an_abort_in_the_countdown_releases_nothing() {
+    let mut vehicle = in_phase(Phase::PadArmed);
+    vehicle.request(Request::Start);
+    vehicle.advance_frame(&mut still());
+    assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+    for _ in 0..500 {
+        vehicle.advance_frame(&mut still());
+    }
+    assert_eq!(vehicle.phase(), Phase::PadIdle);
+    assert!(vehicle.snapshot().thrust_n.abs() < f64::EPSILON);
+}
+
+#[test]
+fn an_abort_under_thrust_holds_upright_and_never_opens_a_parachute() {
+    for phase in [Phase::Ignition, Phase::Powered] {
+        let mut vehicle = in_phase(phase);
+        assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::UprightOnly);
+        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+        assert_eq!(
+            vehicle.request(Request::Abort).result,
+            Result::Accepted,
+            "repeated until answered"
+        );
+        let events = run_until(&mut vehicle, Vehicle::is_over);
+        assert!(!phases(&events).contains(&Phase::Chute));
+        assert!(events.iter().any(|event| matches!(
+            event,
+            VehicleEvent::Tick(tick) if tick.output.level == ControlLevel::Stabiliser
+        )));
+        // Full upright thrust from here climbs and falls back: recorded as what it is.
+        assert!(!vehicle.verdict().unwrap().1.landed());
+    }
+}
+
+#[test]
+fn an_abort_on_the_ground_is_refused_in_words() {
+    for phase in [Phase::Touchdown, Phase::Safed] {
+        let mut vehicle = in_phase(phase);
+        assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::None);
+        let answer = vehicle.request(Request::Abort);
+        assert_eq!(answer.result, Result::Failed);
+        assert!(answer.reason.unwrap().contains("on the ground"));
+        assert!(!vehicle.aborted());
+    }
+}
+
+#[test]
+fn a_gate_that_does_not_open_lights_nothing() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    profile.gate.tilt_max_deg = 1.0;
+    profile.dispersion.pitch_deg = 20.0;
+    let mut vehicle = vehicle_of(&profile);
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    vehicle.request(Request::Arm);
+    vehicle.request(Request::Start);
+    let events = run_until(&mut vehicle, Vehicle::is_over);
+    assert!(
+        !phases(&events).contains(&Phase::Ignition),
+        "{:?}",
+        phases(&events)
+    );
+    assert!(!vehicle.verdict().unwrap().1.landed());
+    let gate_words = events.iter().any(|event| {
+        matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("ignition gate closed: tilt"))
+    });
+    assert!(gate_words);
+}
+
+#[test]
+fn a_late_output_is_not_applied_when_deadlines_are_enforced() {
+    let profile = Profile::builtin("paper-calibrated").unwrap();
+    let mut vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Enforce).unwrap();
+    vehicle.set_log_state(LogState {
+        running: true,
+        space_bytes: u64::MAX,
+    });
+    vehicle.pull_pin();
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    vehicle.request(Request::Arm);
+    vehicle.request(Request::Start);
+    run_until(&mut vehicle, |v| v.phase() == Phase::Powered);
+    // A clock that moves by 0.2 s a look: every tick is late.
+    let mut now = Duration::ZERO;
+    let mut slow = || {
+        now += Duration::from_millis(200);
+        now
+    };
+    let mut ticks = Vec::new();
+    for _ in 0..15 {
+        for event in vehicle.advance_frame(&mut slow) {
+            if let VehicleEvent::Tick(tick) = event {
+                ticks.push(tick);
+            }
+        }
+    }
+    assert!(ticks.len() >= 3);
+    assert!(ticks[1].input.deadline_missed && ticks[2].input.deadline_missed);
+    // What was applied is the plan before the late one, one interval on.
+    let before = ticks[0].output.plan.used_gimbal_rad()[1];
+    assert_eq!(ticks[2].input.gimbal_applied_rad.to_bits(), before.to_bits());
+}
+
+#[test]
+fn a_profile_that_starts_elsewhere_is_refused_by_name() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    profile.start.at = StartPoint::Apogee;
+    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe)
+        .err()
+        .unwrap();
+    assert!(
+        error.to_string().contains("start.at = Apogee is not simulated"),
+        "{error}"
+    );
+    profile.start.at = StartPoint::Ignition;
+    profile.nmpc.sample_time_s = 0.0995;
+    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe)
+        .err()
+        .unwrap();
+    assert!(
+        error.to_string().contains("whole number of milliseconds"),
+        "{error}"
+    );
+}

@@ -99,6 +99,8 @@ impl<R: Read> LogReader<R> {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
+            // A record between two chunks, or a whole chunk, may be unrecognisable: only this sum tells.
+            .with_validate_data_section_crc(true)
             .with_record_length_limit(RECORD_LIMIT_BYTES);
         Self {
             input,
@@ -150,9 +152,16 @@ impl<R: Read> LogReader<R> {
                     self.bytes_read += count as u64;
                     continue;
                 }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    mcap::parse_record(opcode, data).map(McapRecord::into_owned)
+                // A hole in a file reads as an endless row of such records.
+                Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
+                    let reason = "a record of type 0, which does not exist".to_owned();
+                    self.finish(Some(Damage::Corrupt {
+                        near_byte: self.bytes_read,
+                        reason,
+                    }));
+                    break;
                 }
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => parse(opcode, data),
             };
             match parsed {
                 Ok(record) => {
@@ -232,4 +241,35 @@ impl<R: Read> LogReader<R> {
             _ => None,
         }
     }
+}
+
+fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
+    // The parser trusts an attachment to be long enough for its own fields.
+    if opcode == mcap::records::op::ATTACHMENT && !attachment_fits(data) {
+        return Err(mcap::McapError::BadAttachmentLength {
+            header: 0,
+            available: data.len() as u64,
+        });
+    }
+    mcap::parse_record(opcode, data).map(McapRecord::into_owned)
+}
+
+/// Whether an attachment has room for two times, two length-prefixed strings, the length of its data and a checksum.
+fn attachment_fits(data: &[u8]) -> bool {
+    const TIMES_BYTES: usize = 16;
+    const DATA_LENGTH_AND_CHECKSUM_BYTES: usize = 12;
+    let behind_string = |rest: &[u8]| -> Option<usize> {
+        let length = rest.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))?;
+        usize::try_from(length).ok()?.checked_add(4)
+    };
+    let Some(rest) = data.get(TIMES_BYTES..) else {
+        return false;
+    };
+    let Some(rest) = behind_string(rest).and_then(|length| rest.get(length..)) else {
+        return false;
+    };
+    let Some(rest) = behind_string(rest).and_then(|length| rest.get(length..)) else {
+        return false;
+    };
+    rest.len() >= DATA_LENGTH_AND_CHECKSUM_BYTES
 }

@@ -115,7 +115,7 @@ impl<W: Write + Seek> LogWriter<W> {
                 self.write_foxglove(
                     TOPIC_TRANSFORM,
                     &transform(truth, log_time),
-                    FrameTransform::get_schema(),
+                    FrameTransform::get_schema().as_ref(),
                     log_time,
                 )
             }
@@ -132,7 +132,7 @@ impl<W: Write + Seek> LogWriter<W> {
             Record::Event(event) => self.write_foxglove(
                 TOPIC_EVENTS,
                 &log_message(event, log_time),
-                Log::get_schema(),
+                Log::get_schema().as_ref(),
                 log_time,
             ),
         }
@@ -182,7 +182,7 @@ impl<W: Write + Seek> LogWriter<W> {
         &mut self,
         topic: &'static str,
         message: &M,
-        schema: Option<foxglove::Schema>,
+        schema: Option<&foxglove::Schema>,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
         let mut buffer = std::mem::take(&mut self.buffer);

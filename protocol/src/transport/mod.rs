@@ -66,11 +66,17 @@ impl Transport {
     /// # Errors
     /// A UDP address cannot be bound or resolved. A serial device that is not there is no error: it
     /// may be plugged in later, and [`Received::Down`] says so until then.
-    pub async fn open(endpoint: Endpoint) -> io::Result<Self> {
+    pub async fn open(mut endpoint: Endpoint) -> io::Result<Self> {
         let (inbox, received) = mpsc::channel(QUEUE);
         let (queue, outbox) = mpsc::channel(QUEUE);
-        match &endpoint {
-            Endpoint::UdpIn(address) => udp::listen(address, inbox, outbox).await?,
+        match &mut endpoint {
+            Endpoint::UdpIn(address) => {
+                let bound = udp::listen(address, inbox, outbox).await?;
+                // Port 0 lets the system choose; the endpoint then names its choice.
+                if address.ends_with(":0") {
+                    *address = bound.to_string();
+                }
+            }
             Endpoint::UdpOut(address) => udp::connect(address, inbox, outbox).await?,
             Endpoint::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
         }
@@ -85,7 +91,7 @@ impl Transport {
         })
     }
 
-    /// Where it leads.
+    /// Where it leads; for `udpin` with port 0, with the port that the system chose.
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }

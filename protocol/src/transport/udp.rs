@@ -12,14 +12,16 @@ const MAX_DATAGRAM: usize = 2048;
 /// Peers that a listening socket answers at the same time.
 const MAX_PEERS: usize = 4;
 
+/// Binds and listens; returns the address that was bound, which names the port if `address` left it open.
 pub(super) async fn listen(
     address: &str,
     inbox: Sender<Received>,
     outbox: Receiver<Vec<u8>>,
-) -> io::Result<()> {
+) -> io::Result<SocketAddr> {
     let socket = UdpSocket::bind(address).await?;
+    let bound = socket.local_addr()?;
     tokio::spawn(run(socket, Vec::new(), false, inbox, outbox));
-    Ok(())
+    Ok(bound)
 }
 
 pub(super) async fn connect(

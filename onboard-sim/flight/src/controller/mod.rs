@@ -64,7 +64,10 @@ pub struct ControllerState {
 impl ControllerState {
     /// The state before the first tick.
     pub fn new(config: &ControllerConfig) -> Self {
-        Self { config: config.clone(), flown: None }
+        Self {
+            config: config.clone(),
+            flown: None,
+        }
     }
 
     /// The configuration.
@@ -80,9 +83,17 @@ impl ControllerState {
         let solution = &flown.solution;
         let states = solution.states.iter().flat_map(|state| state.to_array());
         let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers);
-        let numbers = solution.inputs_rad.iter().chain(multipliers).copied().chain(states);
+        let numbers = solution
+            .inputs_rad
+            .iter()
+            .chain(multipliers)
+            .copied()
+            .chain(states);
         let words = [flown.first_interval as u64, u64::from(solution.status.index())];
-        words.into_iter().chain(numbers.map(f64::to_bits)).fold(FNV_OFFSET, fnv)
+        words
+            .into_iter()
+            .chain(numbers.map(f64::to_bits))
+            .fold(FNV_OFFSET, fnv)
     }
 }
 
@@ -90,7 +101,9 @@ impl ControllerState {
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 
 fn fnv(hash: u64, word: u64) -> u64 {
-    word.to_le_bytes().iter().fold(hash, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+    word.to_le_bytes().iter().fold(hash, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// A plan and where in the landing it begins.
@@ -219,7 +232,10 @@ impl SolverReport {
     pub fn summary(&self) -> String {
         match self.status {
             SolveStatus::NotLandable => {
-                format!("not landable: best touchdown speed {:.1} m/s", self.best_touchdown_speed_m_s)
+                format!(
+                    "not landable: best touchdown speed {:.1} m/s",
+                    self.best_touchdown_speed_m_s
+                )
             }
             SolveStatus::Converged if !self.landing_feasible => "converged, but misses the ground".to_owned(),
             status => status.name().to_owned(),

@@ -21,8 +21,14 @@ pub struct Plan {
 impl Plan {
     /// No plan.
     pub fn none() -> Self {
-        const REST: PlanarState =
-            PlanarState { x_m: 0.0, z_m: 0.0, theta_rad: 0.0, u_m_s: 0.0, w_m_s: 0.0, q_rad_s: 0.0 };
+        const REST: PlanarState = PlanarState {
+            x_m: 0.0,
+            z_m: 0.0,
+            theta_rad: 0.0,
+            u_m_s: 0.0,
+            w_m_s: 0.0,
+            q_rad_s: 0.0,
+        };
         Self {
             len: 0,
             starts_in_s: 0.0,
@@ -33,12 +39,7 @@ impl Plan {
     }
 
     /// The plan through these states under these inputs; what exceeds the room is cut off.
-    pub(super) fn through(
-        states: &[PlanarState],
-        inputs_rad: &[f64],
-        starts_in_s: f64,
-        step_s: f64,
-    ) -> Self {
+    pub(super) fn through(states: &[PlanarState], inputs_rad: &[f64], starts_in_s: f64, step_s: f64) -> Self {
         let mut plan = Self::none();
         if states.is_empty() {
             return plan;
@@ -57,7 +58,11 @@ impl Plan {
 
     /// The states in use; empty without a plan.
     pub fn used_states(&self) -> &[PlanarState] {
-        if self.len == 0 { &[] } else { self.states.get(..=self.len).unwrap_or_default() }
+        if self.len == 0 {
+            &[]
+        } else {
+            self.states.get(..=self.len).unwrap_or_default()
+        }
     }
 
     /// The gimbal angles in use, rad.

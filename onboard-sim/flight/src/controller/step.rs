@@ -1,8 +1,8 @@
 //! The tick itself.
 
 use super::{
-    ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, FlownPlan, MAX_HORIZON_STEPS,
-    Plan, PredictedTouchdown, SolverReport,
+    ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, FlownPlan,
+    MAX_HORIZON_STEPS, Plan, PredictedTouchdown, SolverReport,
 };
 use crate::dynamics::PlanarState;
 use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart, solve};
@@ -80,7 +80,11 @@ fn rehearse(state: &mut ControllerState) -> Decision {
     let solution = solve(&problem, warm.as_ref());
     let decision = planned(config, &moment, &solution);
     state.flown = keep(&moment, solution);
-    Decision { gimbal_rad: 0.0, level: ControlLevel::Rehearsal, ..decision }
+    Decision {
+        gimbal_rad: 0.0,
+        level: ControlLevel::Rehearsal,
+        ..decision
+    }
 }
 
 /// Plans the rest of the landing and takes the plan's first input, or the best that is left.
@@ -90,7 +94,10 @@ fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
         return stabilise(state, input, &moment, SolverReport::NOT_RUN);
     }
     let Some(predicted) = predict(&state.config, input, &moment) else {
-        let report = SolverReport { status: SolveStatus::BadInput, ..SolverReport::NOT_RUN };
+        let report = SolverReport {
+            status: SolveStatus::BadInput,
+            ..SolverReport::NOT_RUN
+        };
         return fall_back(state, input, &moment, report);
     };
     if moment.intervals == 0 {
@@ -118,11 +125,23 @@ fn after_the_plan(
     moment: &Moment,
     predicted: PlanarState,
 ) -> Decision {
-    if state.config.profile.motor.mean_thrust_n(moment.starts_s, moment.sample_time_s) > 0.0 {
+    if state
+        .config
+        .profile
+        .motor
+        .mean_thrust_n(moment.starts_s, moment.sample_time_s)
+        > 0.0
+    {
         return stabilise(state, input, moment, SolverReport::NOT_RUN);
     }
-    let touchdown = PredictedTouchdown { time_from_now_s: moment.sample_time_s, state: predicted };
-    Decision { touchdown, ..Decision::idle() }
+    let touchdown = PredictedTouchdown {
+        time_from_now_s: moment.sample_time_s,
+        state: predicted,
+    };
+    Decision {
+        touchdown,
+        ..Decision::idle()
+    }
 }
 
 /// Where in the landing a tick is.
@@ -152,7 +171,13 @@ impl Moment {
     }
 
     fn problem(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64) -> Problem {
-        Problem::from_profile(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale)
+        Problem::from_profile(
+            &config.profile,
+            predicted,
+            self.starts_s,
+            self.intervals,
+            thrust_scale,
+        )
     }
 
     /// The flown plan shifted to this moment, if it reaches this far.
@@ -167,21 +192,36 @@ impl Moment {
     fn shifted_plan<'a>(&self, flown: Option<&'a FlownPlan>) -> Option<(&'a [PlanarState], &'a [f64])> {
         let flown = flown?;
         let elapsed = self.first_interval.checked_sub(flown.first_interval)?;
-        let inputs_rad = flown.solution.inputs_rad.get(elapsed..).filter(|inputs| !inputs.is_empty())?;
+        let inputs_rad = flown
+            .solution
+            .inputs_rad
+            .get(elapsed..)
+            .filter(|inputs| !inputs.is_empty())?;
         Some((flown.solution.states.get(elapsed..)?, inputs_rad))
     }
 }
 
 /// The state one sample ahead, under the angle the actuator holds; `None` unless everything is finite.
 fn predict(config: &ControllerConfig, input: &ControllerInput, moment: &Moment) -> Option<PlanarState> {
-    let inputs = [input.gimbal_applied_rad, input.thrust_scale, input.time_since_ignition_s];
+    let inputs = [
+        input.gimbal_applied_rad,
+        input.thrust_scale,
+        input.time_since_ignition_s,
+    ];
     if !(input.state.is_finite() && inputs.iter().all(|value| value.is_finite())) {
         return None;
     }
-    let nominal_n = config.profile.motor.mean_thrust_n(input.time_since_ignition_s, moment.sample_time_s);
+    let nominal_n = config
+        .profile
+        .motor
+        .mean_thrust_n(input.time_since_ignition_s, moment.sample_time_s);
     let thrust_n = input.thrust_scale * nominal_n;
-    let predicted =
-        config.model.rk4_step(&input.state, input.gimbal_applied_rad, thrust_n, moment.sample_time_s);
+    let predicted = config.model.rk4_step(
+        &input.state,
+        input.gimbal_applied_rad,
+        thrust_n,
+        moment.sample_time_s,
+    );
     predicted.is_finite().then_some(predicted)
 }
 
@@ -189,7 +229,11 @@ fn predict(config: &ControllerConfig, input: &ControllerInput, moment: &Moment) 
 fn planned(config: &ControllerConfig, moment: &Moment, solution: &Solution) -> Decision {
     let report = report_of(solution);
     let sample_time_s = config.sample_time_s();
-    let level = if report.converged() { ControlLevel::Converged } else { ControlLevel::BestFeasible };
+    let level = if report.converged() {
+        ControlLevel::Converged
+    } else {
+        ControlLevel::BestFeasible
+    };
     Decision {
         gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(0.0),
         level,
@@ -198,7 +242,12 @@ fn planned(config: &ControllerConfig, moment: &Moment, solution: &Solution) -> D
             time_from_now_s: (1 + moment.intervals) as f64 * sample_time_s,
             state: solution.states.last().copied().unwrap_or_default(),
         },
-        plan: Plan::through(&solution.states, &solution.inputs_rad, sample_time_s, sample_time_s),
+        plan: Plan::through(
+            &solution.states,
+            &solution.inputs_rad,
+            sample_time_s,
+            sample_time_s,
+        ),
     }
 }
 
@@ -216,11 +265,19 @@ fn report_of(solution: &Solution) -> SolverReport {
 }
 
 fn keep(moment: &Moment, solution: Solution) -> Option<FlownPlan> {
-    (!solution.inputs_rad.is_empty()).then_some(FlownPlan { first_interval: moment.first_interval, solution })
+    (!solution.inputs_rad.is_empty()).then_some(FlownPlan {
+        first_interval: moment.first_interval,
+        solution,
+    })
 }
 
 /// Nothing could be planned: the previous plan if it reaches this far and can still be trusted, else upright.
-fn fall_back(state: &ControllerState, input: &ControllerInput, moment: &Moment, report: SolverReport) -> Decision {
+fn fall_back(
+    state: &ControllerState,
+    input: &ControllerInput,
+    moment: &Moment,
+    report: SolverReport,
+) -> Decision {
     // A plan towards a landing that is known to be impossible is not worth following.
     if report.status != SolveStatus::NotLandable
         && let Some((states, inputs_rad)) = moment.shifted_plan(state.flown.as_ref())
@@ -240,8 +297,17 @@ fn fall_back(state: &ControllerState, input: &ControllerInput, moment: &Moment, 
 }
 
 /// The upright law, and the path it leads along.
-fn stabilise(state: &ControllerState, input: &ControllerInput, moment: &Moment, report: SolverReport) -> Decision {
-    let upright = Decision { level: ControlLevel::Stabiliser, report, ..Decision::idle() };
+fn stabilise(
+    state: &ControllerState,
+    input: &ControllerInput,
+    moment: &Moment,
+    report: SolverReport,
+) -> Decision {
+    let upright = Decision {
+        level: ControlLevel::Stabiliser,
+        report,
+        ..Decision::idle()
+    };
     let Some(predicted) = predict(&state.config, input, moment) else {
         return upright;
     };
@@ -252,8 +318,10 @@ fn stabilise(state: &ControllerState, input: &ControllerInput, moment: &Moment, 
     let mut inputs_rad = Vec::with_capacity(moment.intervals);
     let mut ahead = predicted;
     for k in 0..moment.intervals.max(1) {
-        let nominal_n =
-            config.profile.motor.mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
+        let nominal_n = config
+            .profile
+            .motor
+            .mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
         let thrust_n = input.thrust_scale * nominal_n;
         let gimbal_rad = config.stabiliser.gimbal(&ahead, thrust_n, limit_rad);
         inputs_rad.push(gimbal_rad);

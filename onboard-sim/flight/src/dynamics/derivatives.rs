@@ -26,7 +26,13 @@ impl PlanarModel {
         let [_, _, theta, u, w, q] = *state;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } = self.params;
+        let PlanarParams {
+            mass_kg,
+            pitch_inertia_kg_m2,
+            thrust_arm_m,
+            drag_per_m,
+            gravity_m_s2,
+        } = self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let mut jacobian = [[0.0; 7]; 6];
         let sign = self.lateral_sign();
@@ -77,15 +83,20 @@ impl PlanarModel {
         let [wx, wz, _, wu, ww, wq] = *weights;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } = self.params;
+        let PlanarParams {
+            mass_kg,
+            pitch_inertia_kg_m2,
+            thrust_arm_m,
+            drag_per_m,
+            gravity_m_s2,
+        } = self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let sign = self.lateral_sign();
         let mut hessian = [[0.0; 7]; 7];
 
-        hessian[THETA][THETA] = wx * (-u * ct - sign * w * st)
-            + wz * (-u * st + sign * w * ct)
-            + wu * gravity_m_s2 * st
-            - ww * gravity_m_s2 * ct;
+        hessian[THETA][THETA] =
+            wx * (-u * ct - sign * w * st) + wz * (-u * st + sign * w * ct) + wu * gravity_m_s2 * st
+                - ww * gravity_m_s2 * ct;
         set(&mut hessian, THETA, U, -wx * st + wz * ct);
         set(&mut hessian, THETA, W, sign * (wx * ct + wz * st));
         set(&mut hessian, W, Q, -wu);

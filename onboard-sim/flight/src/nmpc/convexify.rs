@@ -75,7 +75,6 @@ pub(super) fn convexified(
     let damping = (-eigen.eigenvalues.min()).min(LARGEST_DAMPING * largest);
     let least = damping.max(SMALLEST_CURVATURE * eigen.eigenvalues.amax());
     let bent_up = eigen.eigenvalues.map(|curvature| curvature.abs().max(least));
-    let convex =
-        &eigen.eigenvectors * DMatrix::from_diagonal(&bent_up) * eigen.eigenvectors.transpose();
+    let convex = &eigen.eigenvectors * DMatrix::from_diagonal(&bent_up) * eigen.eigenvectors.transpose();
     Cholesky::new(convex.clone()).map(|_| (convex, gradient))
 }

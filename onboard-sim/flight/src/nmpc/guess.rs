@@ -27,7 +27,9 @@ pub(super) fn bent(problem: &Problem, amplitude_rad: f64) -> Vec<f64> {
     for (k, thrust_n) in problem.thrust_n.iter().enumerate() {
         let (theta_rad, q_rad_s) = reference(k);
         let gimbal_rad = law.gimbal_towards(&state, theta_rad, q_rad_s, *thrust_n, problem.gimbal_limit_rad);
-        state = problem.model.rk4_step(&state, gimbal_rad, *thrust_n, problem.step_s);
+        state = problem
+            .model
+            .rk4_step(&state, gimbal_rad, *thrust_n, problem.step_s);
         inputs_rad.push(gimbal_rad);
     }
     inputs_rad

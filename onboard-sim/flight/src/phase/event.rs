@@ -142,7 +142,11 @@ impl Effects {
 
     /// The set of the effects given.
     pub fn of(effects: &[Effect]) -> Self {
-        Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
+        Self(
+            effects
+                .iter()
+                .fold(0, |bits, effect| bits | 1 << (*effect as u16)),
+        )
     }
 
     /// Whether the effect is in the set.
@@ -157,7 +161,9 @@ impl Effects {
 
     /// The effects in the set, in index order.
     pub fn iter(self) -> impl Iterator<Item = Effect> {
-        Effect::ALL.into_iter().filter(move |effect| self.contains(*effect))
+        Effect::ALL
+            .into_iter()
+            .filter(move |effect| self.contains(*effect))
     }
 }
 
@@ -199,7 +205,9 @@ impl Refusal {
     /// The reason, in an operator's words.
     pub fn reason(&self) -> String {
         match self {
-            Self::WrongPhase { action, phase, only } => format!("cannot {action} in {}: {only}", phase.name()),
+            Self::WrongPhase { action, phase, only } => {
+                format!("cannot {action} in {}: {only}", phase.name())
+            }
             Self::AbortLatched => "an abort is latched: restart the vehicle to clear it".to_owned(),
             Self::PinIn => "the pin is in: pull it before arming".to_owned(),
             Self::ChecksFailed => "an arming check failed".to_owned(),

@@ -1,0 +1,261 @@
+//! The vehicle's end of the link, frame by frame.
+
+use std::time::Duration;
+
+use flight::profile::Profile;
+use proptest::prelude::*;
+use protocol::command::CommandAnswer;
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
+use protocol::identity::GROUND;
+use protocol::text::Reassembler;
+
+use super::*;
+use crate::scatter::draw;
+use crate::vehicle::{DeadlinePolicy, LogState};
+
+struct Bench {
+    vehicle: Vehicle,
+    endpoint: VehicleEndpoint,
+    ground: Encoder,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let mut vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+        vehicle.set_log_state(LogState {
+            running: true,
+            space_bytes: u64::MAX,
+        });
+        vehicle.pull_pin();
+        let mut bench = Self {
+            vehicle,
+            endpoint: VehicleEndpoint::new(),
+            ground: Encoder::new(GROUND),
+        };
+        bench.run(0.2);
+        bench
+    }
+
+    /// Runs for this long; returns what was sent.
+    fn run(&mut self, duration_s: f64) -> Vec<Frame> {
+        let end_s = self.vehicle.time_s() + duration_s;
+        let mut sent = Vec::new();
+        while self.vehicle.time_s() < end_s {
+            for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
+                self.endpoint.on_event(&event);
+            }
+            sent.extend(self.endpoint.poll(&self.vehicle.snapshot()));
+        }
+        sent
+    }
+
+    fn ask(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+        let mut payload = COMMAND_LONG_DATA {
+            param1,
+            param2,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        payload.param3 = f32::NAN;
+        let mut bytes = [0; 255];
+        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
+        bytes[28..30].copy_from_slice(&command.to_le_bytes());
+        let frame = self
+            .ground
+            .encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len])
+            .unwrap();
+        self.endpoint.on_frame(&frame, &mut self.vehicle);
+        let sent = self.run(0.1);
+        let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+        assert_eq!(answers.len(), 1, "one answer to one command");
+        assert_eq!((answers[0].command, answers[0].target), (command, GROUND));
+        (answers[0].result, texts(&sent).join("; "))
+    }
+}
+
+fn texts(frames: &[Frame]) -> Vec<String> {
+    let mut reassembler = Reassembler::new();
+    let chunks = frames.iter().filter_map(|frame| match frame.decode() {
+        Ok(MavMessage::STATUSTEXT(chunk)) => Some(reassembler.push(frame.source(), &chunk, Duration::ZERO)),
+        _ => None,
+    });
+    chunks.flatten().map(|text| text.text).collect()
+}
+
+fn count(frames: &[Frame], message_id: u32) -> usize {
+    frames
+        .iter()
+        .filter(|frame| frame.message_id() == message_id)
+        .count()
+}
+
+#[test]
+fn the_standard_rates_fit_the_radio_and_are_kept() {
+    let total: f64 = VehicleEndpoint::new()
+        .streams
+        .iter()
+        .map(|stream| stream.bytes_s(stream.interval_s))
+        .sum();
+    assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
+    let mut bench = Bench::new();
+    let sent = bench.run(10.0);
+    for standard in &STANDARD {
+        if standard.message_id == TD_LANDING_VERDICT_DATA::ID {
+            continue;
+        }
+        let expected = 10.0 * standard.rate_hz;
+        let found = count(&sent, standard.message_id) as f64;
+        assert!(
+            (found - expected).abs() <= 1.0,
+            "message {}: {found} of {expected}",
+            standard.message_id
+        );
+    }
+}
+
+#[test]
+fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
+    let mut worst = 0;
+    for _ in 0..14 {
+        let second: usize = bench.run(1.0).iter().map(|frame| frame.as_bytes().len()).sum();
+        worst = worst.max(second);
+    }
+    assert_eq!(bench.vehicle.phase(), Phase::Safed);
+    assert!(
+        worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES,
+        "{worst} B in one second"
+    );
+}
+
+#[test]
+fn arming_is_answered_and_seen_in_the_heartbeat() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);
+    let armed = bench.run(1.5).iter().any(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::HEARTBEAT(beat))
+            if beat.base_mode.contains(protocol::dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED))
+    });
+    assert!(armed);
+}
+
+#[test]
+fn a_refusal_is_answered_and_explained_in_words() {
+    let mut bench = Bench::new();
+    let (result, words) = bench.ask(300, 0.0, 0.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(
+        words.contains("start refused: cannot start in PAD_IDLE"),
+        "{words}"
+    );
+    bench.vehicle.set_log_state(LogState {
+        running: false,
+        space_bytes: 0,
+    });
+    // Force codes open nothing.
+    for code in [0.0, 21196.0, 2989.0] {
+        let (result, words) = bench.ask(400, 1.0, code);
+        assert_eq!(result, MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8);
+        assert!(words.contains("arm refused: log"), "{words}");
+    }
+    let (result, words) = bench.ask(400, 2.0, 0.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(words.contains("param1 = 2"), "{words}");
+}
+
+#[test]
+fn commands_this_vehicle_or_even_the_dialect_does_not_know_are_unsupported() {
+    let mut bench = Bench::new();
+    for command in [MavCmd::MAV_CMD_NAV_TAKEOFF as u16, 12_345, u16::MAX] {
+        assert_eq!(
+            bench.ask(command, 0.0, 0.0).0,
+            MavResult::MAV_RESULT_UNSUPPORTED as u8
+        );
+    }
+}
+
+#[test]
+fn a_command_for_somebody_else_is_left_alone() {
+    let mut bench = Bench::new();
+    for target_system in [2, 255] {
+        let command = COMMAND_LONG_DATA {
+            param1: 1.0,
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let frame = bench.ground.encode(&MavMessage::COMMAND_LONG(command));
+        bench.endpoint.on_frame(&frame, &mut bench.vehicle);
+    }
+    let sent = bench.run(0.5);
+    assert_eq!(count(&sent, 77), 0);
+    assert!(!bench.vehicle.mode().interlocks.armed);
+}
+
+#[test]
+fn intervals_can_be_set_within_the_budget_and_read_back() {
+    let mut bench = Bench::new();
+    let fins = TD_FINS_DATA::ID as f32;
+    assert_eq!(bench.ask(511, fins, -1.0).0, 0);
+    assert_eq!(count(&bench.run(3.0), TD_FINS_DATA::ID), 0, "switched off");
+    assert_eq!(bench.ask(511, fins, 250_000.0).0, 0);
+    let found = count(&bench.run(3.0), TD_FINS_DATA::ID);
+    assert!((11..=13).contains(&found), "{found} in 3 s at 4 Hz");
+    let (result, words) = bench.ask(511, fins, 10_000.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(words.contains("budget is 2000"), "{words}");
+    bench.endpoint.on_command(
+        &CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: 512,
+            params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
+            confirmation: 0,
+        },
+        &mut bench.vehicle,
+    );
+    let interval = bench.run(0.1).iter().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::MESSAGE_INTERVAL(interval)) => Some(interval.interval_us),
+        _ => None,
+    });
+    assert_eq!(interval, Some(250_000));
+}
+
+#[test]
+fn every_phase_has_a_name_for_other_people_s_clients() {
+    let mut bench = Bench::new();
+    bench.ask(512, AVAILABLE_MODES_DATA::ID as f32, 0.0);
+    let names: Vec<String> = telemetry::available_modes()
+        .filter_map(|message| match message {
+            MavMessage::AVAILABLE_MODES(mode) => mode.mode_name.to_str().ok().map(str::to_owned),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(names.len(), Phase::ALL.len());
+    assert_eq!(names[9], "POWERED");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever frames arrive, the vehicle goes on, and nothing but the two proper commands arms and starts it.
+    #[test]
+    fn hostile_payloads_never_stop_the_vehicle(
+        messages in prop::collection::vec((prop::sample::select(vec![0u32, 4, 75, 76, 77, 111, 253, 54_000]), prop::collection::vec(any::<u8>(), 1..64)), 1..40)
+    ) {
+        let mut bench = Bench::new();
+        for (message_id, payload) in messages {
+            if let Some(frame) = bench.ground.encode_payload(message_id, &payload) {
+                bench.endpoint.on_frame(&frame, &mut bench.vehicle);
+            }
+            bench.run(0.02);
+        }
+        let beats = count(&bench.run(2.0), HEARTBEAT_DATA::ID);
+        prop_assert!(beats >= 1);
+    }
+}
