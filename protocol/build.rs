@@ -22,11 +22,8 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     for file in ["minimal", "standard", "common", "touchdown"] {
         println!("cargo:rerun-if-changed=dialect/{file}.xml");
     }
-    mavlink_bindgen::generate(
-        mavlink_bindgen::XmlDefinitions::Files(vec!["dialect/touchdown.xml"]),
-        out_dir,
-    )
-    .context("dialect/touchdown.xml")?;
+    mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec!["dialect/touchdown.xml"]), out_dir)
+        .context("dialect/touchdown.xml")?;
     Ok(())
 }
 
@@ -35,19 +32,14 @@ fn generate_log_records(out_dir: &Path) -> Result<()> {
     println!("cargo:rerun-if-changed={file}");
     let descriptors = protox::compile([file], ["proto"]).context(file)?;
     fs::write(out_dir.join("log_v1.fds"), descriptors.encode_to_vec())?;
-    prost_build::Config::new()
-        .compile_fds(descriptors)
-        .context(file)?;
+    prost_build::Config::new().compile_fds(descriptors).context(file)?;
     Ok(())
 }
 
 fn note_the_build() -> Result<()> {
     let git = |args: &[&str]| {
         let output = Command::new("git").args(args).output().ok()?;
-        output
-            .status
-            .success()
-            .then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     let commit = git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
     if let Some(git_dir) = git(&["rev-parse", "--absolute-git-dir"]) {
@@ -55,24 +47,17 @@ fn note_the_build() -> Result<()> {
         println!("cargo:rerun-if-changed={git_dir}/logs/HEAD");
     }
     let rustc = env::var("RUSTC").context("RUSTC")?;
-    let version = Command::new(rustc)
-        .arg("--version")
-        .output()
-        .context("rustc --version")?;
+    let version = Command::new(rustc).arg("--version").output().context("rustc --version")?;
     let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
 
     println!("cargo:rerun-if-changed=../Cargo.lock");
     let lock = fs::read("../Cargo.lock").unwrap_or_default();
-    let lock_hash = sha2::Sha256::digest(&lock)
-        .iter()
-        .fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
+    let lock_hash =
+        sha2::Sha256::digest(&lock).iter().fold(String::new(), |hex, byte| format!("{hex}{byte:02x}"));
 
     println!("cargo:rustc-env=TOUCHDOWN_GIT_COMMIT={commit}");
     println!("cargo:rustc-env=TOUCHDOWN_RUSTC={version}");
-    println!(
-        "cargo:rustc-env=TOUCHDOWN_TARGET={}",
-        env::var("TARGET").context("TARGET")?
-    );
+    println!("cargo:rustc-env=TOUCHDOWN_TARGET={}", env::var("TARGET").context("TARGET")?);
     let features = env::var("CARGO_CFG_TARGET_FEATURE").unwrap_or_default();
     println!("cargo:rustc-env=TOUCHDOWN_TARGET_FEATURES={features}");
     println!("cargo:rustc-env=TOUCHDOWN_LOCK_SHA256={lock_hash}");

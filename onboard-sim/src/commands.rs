@@ -44,12 +44,7 @@ pub struct Unfit {
 /// The command is unknown here or its parameters are out of range, with the answer to give.
 pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
     let [param1, param2, ..] = request.params;
-    let unfit = |result, reason: String| {
-        Err(Unfit {
-            result,
-            reason: Some(reason),
-        })
-    };
+    let unfit = |result, reason: String| Err(Unfit { result, reason: Some(reason) });
     if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
         // The force codes of parameter 2 (21196, 2989) change nothing: every check counts.
         if param1.to_bits() == 1.0f32.to_bits() {
@@ -68,26 +63,14 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
         if param1 > 0.5 {
             Ok(Command::Vehicle(Request::Abort))
         } else {
-            unfit(
-                MavResult::MAV_RESULT_FAILED,
-                format!("termination: param1 = {param1}, must be above 0.5"),
-            )
+            unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
         }
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
-        Ok(Command::SetInterval {
-            message_id: id(param1),
-            interval_us: param2,
-        })
+        Ok(Command::SetInterval { message_id: id(param1), interval_us: param2 })
     } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
-        Ok(Command::SendMessage {
-            message_id: id(param1),
-            of: id(param2),
-        })
+        Ok(Command::SendMessage { message_id: id(param1), of: id(param2) })
     } else {
-        Err(Unfit {
-            result: MavResult::MAV_RESULT_UNSUPPORTED,
-            reason: None,
-        })
+        Err(Unfit { result: MavResult::MAV_RESULT_UNSUPPORTED, reason: None })
     }
 }
 
@@ -128,55 +111,32 @@ mod tests {
 
     #[test]
     fn arm_takes_exactly_one_and_disarm_exactly_nought() {
-        assert_eq!(
-            parse(&command(400, 1.0, f32::NAN)),
-            Ok(Command::Vehicle(Request::Arm))
-        );
-        assert_eq!(
-            parse(&command(400, 0.0, 0.0)),
-            Ok(Command::Vehicle(Request::Disarm))
-        );
+        assert_eq!(parse(&command(400, 1.0, f32::NAN)), Ok(Command::Vehicle(Request::Arm)));
+        assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(Request::Disarm)));
         for param1 in [0.5, 2.0, -1.0, f32::NAN, f32::INFINITY, 1.000_000_1] {
-            assert_eq!(
-                result_of(&command(400, param1, 0.0)),
-                MavResult::MAV_RESULT_DENIED,
-                "{param1}"
-            );
+            assert_eq!(result_of(&command(400, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
     }
 
     #[test]
     fn force_codes_ask_for_no_more_than_an_arm() {
         for code in [21196.0, 2989.0] {
-            assert_eq!(
-                parse(&command(400, 1.0, code)),
-                Ok(Command::Vehicle(Request::Arm))
-            );
+            assert_eq!(parse(&command(400, 1.0, code)), Ok(Command::Vehicle(Request::Arm)));
         }
     }
 
     #[test]
     fn termination_needs_more_than_half() {
-        assert_eq!(
-            parse(&command(185, 1.0, 0.0)),
-            Ok(Command::Vehicle(Request::Abort))
-        );
+        assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(Request::Abort)));
         for param1 in [0.0, 0.5, f32::NAN, -1.0] {
-            assert_eq!(
-                result_of(&command(185, param1, 0.0)),
-                MavResult::MAV_RESULT_FAILED,
-                "{param1}"
-            );
+            assert_eq!(result_of(&command(185, param1, 0.0)), MavResult::MAV_RESULT_FAILED, "{param1}");
         }
     }
 
     #[test]
     fn what_is_not_known_is_unsupported() {
         for number in [0, 22, 176, 65_535] {
-            assert_eq!(
-                result_of(&command(number, 1.0, 1.0)),
-                MavResult::MAV_RESULT_UNSUPPORTED
-            );
+            assert_eq!(result_of(&command(number, 1.0, 1.0)), MavResult::MAV_RESULT_UNSUPPORTED);
         }
     }
 }

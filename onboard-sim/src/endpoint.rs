@@ -34,48 +34,24 @@ struct Standard {
 }
 
 const fn standard(message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
-    Standard {
-        message_id,
-        payload_len,
-        rate_hz,
-    }
+    Standard { message_id, payload_len, rate_hz }
 }
 
 /// What is sent unasked. In the order in which it is given up when the budget runs short: last first.
 const STANDARD: [Standard; 13] = [
     standard(HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
     standard(TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
-    standard(
-        TD_LANDING_VERDICT_DATA::ID,
-        TD_LANDING_VERDICT_DATA::ENCODED_LEN,
-        1.0,
-    ),
+    standard(TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
     // Without its optional offset quaternion, which is never set and therefore cut.
     standard(ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
-    standard(
-        LOCAL_POSITION_NED_DATA::ID,
-        LOCAL_POSITION_NED_DATA::ENCODED_LEN,
-        10.0,
-    ),
+    standard(LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
     standard(TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
     standard(TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
     standard(TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
-    standard(
-        TD_TOUCHDOWN_PREDICTION_DATA::ID,
-        TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN,
-        2.0,
-    ),
-    standard(
-        TD_PREDICTED_PATH_DATA::ID,
-        TD_PREDICTED_PATH_DATA::ENCODED_LEN,
-        1.0,
-    ),
+    standard(TD_TOUCHDOWN_PREDICTION_DATA::ID, TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN, 2.0),
+    standard(TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
     standard(SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard(
-        EXTENDED_SYS_STATE_DATA::ID,
-        EXTENDED_SYS_STATE_DATA::ENCODED_LEN,
-        1.0,
-    ),
+    standard(EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
     standard(VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
 ];
 
@@ -91,9 +67,7 @@ struct Stream {
 
 impl Stream {
     fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
-        interval_s.map_or(0.0, |interval_s| {
-            (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s
-        })
+        interval_s.map_or(0.0, |interval_s| (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s)
     }
 }
 
@@ -162,10 +136,7 @@ impl VehicleEndpoint {
                 };
                 self.answer(&MavMessage::TIMESYNC(answer));
             }
-            #[expect(
-                deprecated,
-                reason = "older ground stations still measure their round trip with PING"
-            )]
+            #[expect(deprecated, reason = "older ground stations still measure their round trip with PING")]
             Ok(MavMessage::PING(ping)) if ping.target_system == 0 => {
                 let answer = PING_DATA {
                     target_system: frame.source().system_id,
@@ -236,10 +207,9 @@ impl VehicleEndpoint {
                 // The vehicle says its reason itself, for the log and every ground.
                 (commands::mav_result(&vehicle.request(asked)), None)
             }
-            Ok(Command::SetInterval {
-                message_id,
-                interval_us,
-            }) => self.set_interval(message_id, interval_us),
+            Ok(Command::SetInterval { message_id, interval_us }) => {
+                self.set_interval(message_id, interval_us)
+            }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(message_id, of, vehicle),
         };
         if let Some(frame) = CommandAnswer::to(request, result).encode(&mut self.encoder) {
@@ -251,11 +221,7 @@ impl VehicleEndpoint {
     }
 
     fn set_interval(&mut self, message_id: u32, interval_us: f32) -> (MavResult, Option<String>) {
-        let Some(place) = self
-            .streams
-            .iter()
-            .position(|stream| stream.message_id == message_id)
-        else {
+        let Some(place) = self.streams.iter().position(|stream| stream.message_id == message_id) else {
             return (
                 MavResult::MAV_RESULT_FAILED,
                 Some(format!("message {message_id} is not sent by this vehicle")),
@@ -298,21 +264,10 @@ impl VehicleEndpoint {
                 }
             }
             let known = of as usize <= Phase::ALL.len();
-            return (
-                if known {
-                    MavResult::MAV_RESULT_ACCEPTED
-                } else {
-                    MavResult::MAV_RESULT_DENIED
-                },
-                None,
-            );
+            return (if known { MavResult::MAV_RESULT_ACCEPTED } else { MavResult::MAV_RESULT_DENIED }, None);
         }
         if message_id == MESSAGE_INTERVAL_DATA::ID {
-            let interval = self
-                .streams
-                .iter()
-                .find(|stream| stream.message_id == of)
-                .map(|s| s.interval_s);
+            let interval = self.streams.iter().find(|stream| stream.message_id == of).map(|s| s.interval_s);
             let interval_us = match interval {
                 Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
                 Some(None) => -1,
@@ -320,10 +275,7 @@ impl VehicleEndpoint {
                 None => 0,
             };
             let message_id = u16::try_from(of).unwrap_or(u16::MAX);
-            self.answer(&MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA {
-                interval_us,
-                message_id,
-            }));
+            self.answer(&MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA { interval_us, message_id }));
             return (MavResult::MAV_RESULT_ACCEPTED, None);
         }
         match telemetry::message(message_id, &vehicle.snapshot()) {
@@ -355,33 +307,21 @@ impl VehicleEndpoint {
     }
 
     fn hurry(&mut self, message_id: u32) {
-        for stream in self
-            .streams
-            .iter_mut()
-            .filter(|stream| stream.message_id == message_id)
-        {
+        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.due_s = f64::NEG_INFINITY;
         }
     }
 }
 
 /// The answer to a PING that asks for one. Deprecated, but older ground stations still measure with it.
-#[expect(
-    deprecated,
-    reason = "the standard has replaced PING by TIMESYNC; older ground stations have not"
-)]
+#[expect(deprecated, reason = "the standard has replaced PING by TIMESYNC; older ground stations have not")]
 fn pong(message: &MavMessage, asker: Address) -> Option<MavMessage> {
     let MavMessage::PING(ping) = message else {
         return None;
     };
     let (target_system, target_component) = (asker.system_id, asker.component_id);
-    (ping.target_system == 0).then(|| {
-        MavMessage::PING(PING_DATA {
-            target_system,
-            target_component,
-            ..ping.clone()
-        })
-    })
+    (ping.target_system == 0)
+        .then(|| MavMessage::PING(PING_DATA { target_system, target_component, ..ping.clone() }))
 }
 
 #[cfg(test)]

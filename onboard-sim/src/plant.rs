@@ -56,10 +56,7 @@ impl Plant {
     pub fn new(profile: &Profile, draw: &Draw) -> Self {
         Self {
             // The truth is always the consistent model, whatever the controller believes.
-            model: PlanarModel {
-                params: PlanarParams::from_profile(profile),
-                kind: ModelKind::Consistent,
-            },
+            model: PlanarModel { params: PlanarParams::from_profile(profile), kind: ModelKind::Consistent },
             motor: profile.motor,
             thrust_scale: draw.thrust_scale,
             gimbal_limit_rad: profile.gimbal.limit_rad(),
@@ -134,9 +131,7 @@ impl Plant {
 
     /// True thrust now, N.
     pub fn thrust_n(&self) -> f64 {
-        self.ignited_at_s.map_or(0.0, |at_s| {
-            self.thrust_scale * self.motor.thrust_at_n(self.time_s - at_s)
-        })
+        self.ignited_at_s.map_or(0.0, |at_s| self.thrust_scale * self.motor.thrust_at_n(self.time_s - at_s))
     }
 
     /// Mass, kg.
@@ -165,9 +160,7 @@ impl Plant {
     }
 
     fn move_servos(&mut self) {
-        let target = self
-            .gimbal_commanded_rad
-            .clamp(-self.gimbal_limit_rad, self.gimbal_limit_rad);
+        let target = self.gimbal_commanded_rad.clamp(-self.gimbal_limit_rad, self.gimbal_limit_rad);
         self.gimbal_rad = match self.gimbal_rate_rad_s {
             None => target,
             Some(rate) => slewed(self.gimbal_rad, target, rate),
@@ -179,9 +172,8 @@ impl Plant {
 
     /// Mean over the step that begins now, so that the burn's end inside a step keeps its impulse.
     fn mean_thrust_n(&self) -> f64 {
-        self.ignited_at_s.map_or(0.0, |at_s| {
-            self.thrust_scale * self.motor.mean_thrust_n(self.time_s - at_s, STEP_S)
-        })
+        self.ignited_at_s
+            .map_or(0.0, |at_s| self.thrust_scale * self.motor.mean_thrust_n(self.time_s - at_s, STEP_S))
     }
 
     fn lifts_off(&self, thrust_n: f64) -> bool {
@@ -212,17 +204,8 @@ impl Plant {
         }
         let touching = self.model.rk4_step(&before, self.gimbal_rad, thrust_n, above_s);
         self.hold = Hold::Ground;
-        self.state = PlanarState {
-            z_m: 0.0,
-            u_m_s: 0.0,
-            w_m_s: 0.0,
-            q_rad_s: 0.0,
-            ..touching
-        };
-        Some(Impact {
-            time_s: self.time_s + above_s,
-            state: touching,
-        })
+        self.state = PlanarState { z_m: 0.0, u_m_s: 0.0, w_m_s: 0.0, q_rad_s: 0.0, ..touching };
+        Some(Impact { time_s: self.time_s + above_s, state: touching })
     }
 }
 
@@ -258,25 +241,13 @@ mod tests {
         let (mut profile, _) = calibrated();
         profile.vehicle.drag_coefficient = 0.0;
         let mut plant = Plant::new(&profile, &draw(&profile, 0));
-        let upright = PlanarState {
-            z_m: 5.0,
-            theta_rad: core::f64::consts::FRAC_PI_2,
-            ..PlanarState::default()
-        };
+        let upright =
+            PlanarState { z_m: 5.0, theta_rad: core::f64::consts::FRAC_PI_2, ..PlanarState::default() };
         plant.release(upright);
-        let impact = std::iter::repeat_with(|| plant.step())
-            .take(2_000)
-            .find_map(|impact| impact)
-            .unwrap();
+        let impact = std::iter::repeat_with(|| plant.step()).take(2_000).find_map(|impact| impact).unwrap();
         let gravity = profile.environment.gravity_m_s2;
-        assert!(
-            (impact.state.u_m_s + (2.0 * gravity * 5.0).sqrt()).abs() < 1e-9,
-            "{impact:?}"
-        );
-        assert!(
-            (impact.time_s - (2.0 * 5.0 / gravity).sqrt()).abs() < 1e-9,
-            "{impact:?}"
-        );
+        assert!((impact.state.u_m_s + (2.0 * gravity * 5.0).sqrt()).abs() < 1e-9, "{impact:?}");
+        assert!((impact.time_s - (2.0 * 5.0 / gravity).sqrt()).abs() < 1e-9, "{impact:?}");
         assert!(impact.state.z_m >= 0.0 && impact.state.z_m < 1e-9);
         assert!(plant.in_contact() && plant.thrust_below_weight());
     }
@@ -288,14 +259,8 @@ mod tests {
         let mut plant = Plant::new(&profile, &draw(&profile, 0));
         plant.release(profile.start.planar_state());
         plant.ignite();
-        let impact = std::iter::repeat_with(|| plant.step())
-            .take(6_000)
-            .find_map(|impact| impact)
-            .unwrap();
-        assert!(
-            (impact.time_s - 3.2).abs() < 0.05 && (impact.state.u_m_s + 4.3).abs() < 0.05,
-            "{impact:?}"
-        );
+        let impact = std::iter::repeat_with(|| plant.step()).take(6_000).find_map(|impact| impact).unwrap();
+        assert!((impact.time_s - 3.2).abs() < 0.05 && (impact.state.u_m_s + 4.3).abs() < 0.05, "{impact:?}");
     }
 
     #[test]
@@ -311,15 +276,9 @@ mod tests {
             assert!((now - last).abs() <= 400f64.to_radians() * STEP_S + 1e-12);
             last = now;
         }
-        assert!(
-            (last - profile.gimbal.limit_rad()).abs() < 1e-12,
-            "stops at its limit, not at 1 rad"
-        );
+        assert!((last - profile.gimbal.limit_rad()).abs() < 1e-12, "stops at its limit, not at 1 rad");
         let fins_deg = plant.fins_rad().1[0].to_degrees();
-        assert!(
-            (fins_deg - 0.2 * profile.fins.rate_limit_deg_s).abs() < 1e-9,
-            "{fins_deg}"
-        );
+        assert!((fins_deg - 0.2 * profile.fins.rate_limit_deg_s).abs() < 1e-9, "{fins_deg}");
     }
 
     #[test]

@@ -16,9 +16,7 @@ pub struct Draw {
 
 /// Draws the truth of one flight. The same profile and seed give the same bits.
 pub fn draw(profile: &Profile, seed: u64) -> Draw {
-    let mut normal = Normal {
-        random: ChaCha12Rng::seed_from_u64(seed),
-    };
+    let mut normal = Normal { random: ChaCha12Rng::seed_from_u64(seed) };
     let sigma = &profile.dispersion;
     let nominal = profile.start.planar_state();
     // Drawn in a fixed order, each whether it scatters or not: a sigma changed to nought moves no other draw.
@@ -76,10 +74,7 @@ mod tests {
         assert!(sigma > 0.0);
         // Four standard errors of each.
         assert!(mean.abs() < 4.0 * sigma / (n as f64).sqrt(), "{mean}");
-        assert!(
-            (variance.sqrt() / sigma - 1.0).abs() < 4.0 / (2.0 * n as f64).sqrt(),
-            "{variance}"
-        );
+        assert!((variance.sqrt() / sigma - 1.0).abs() < 4.0 / (2.0 * n as f64).sqrt(), "{variance}");
         assert_eq!(draw(&profile, 7), draw(&profile, 7));
         assert_ne!(draw(&profile, 7), draw(&profile, 8));
     }

@@ -86,10 +86,7 @@ fn sys_status(snapshot: &Snapshot) -> MavMessage {
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS;
     let mut healthy = present;
-    healthy.set(
-        MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK,
-        snapshot.checks_failed == 0,
-    );
+    healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
@@ -164,26 +161,19 @@ fn current_mode(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn autopilot_version() -> MavMessage {
-    let version = env!("CARGO_PKG_VERSION")
-        .split('.')
-        .map(|part| part.parse::<u32>().unwrap_or(0));
+    let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION,
         // Major, minor, patch, then 0 for a development version.
-        flight_sw_version: version
-            .take(3)
-            .fold(0, |packed, part| (packed << 8) | (part & 0xff))
-            << 8,
+        flight_sw_version: version.take(3).fold(0, |packed, part| (packed << 8) | (part & 0xff)) << 8,
         ..AUTOPILOT_VERSION_DATA::default()
     })
 }
 
 fn flight_status(snapshot: &Snapshot) -> MavMessage {
-    let seconds = snapshot
-        .countdown_s
-        .or(snapshot.since_ignition_s.map(|since_s| -since_s));
+    let seconds = snapshot.countdown_s.or(snapshot.since_ignition_s.map(|since_s| -since_s));
     let locks = snapshot.interlocks;
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
@@ -207,10 +197,7 @@ fn interlocks(locks: Interlocks) -> TdInterlock {
     let mut bits = TdInterlock::empty();
     bits.set(TdInterlock::TD_INTERLOCK_PIN_OUT, locks.pin_out);
     bits.set(TdInterlock::TD_INTERLOCK_ARMED, locks.armed);
-    bits.set(
-        TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
-        locks.landing_motor_inhibited,
-    );
+    bits.set(TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED, locks.landing_motor_inhibited);
     bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
     bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
     bits.set(TdInterlock::TD_INTERLOCK_DEGRADED, locks.degraded);
@@ -301,19 +288,17 @@ fn td_status(status: flight::nmpc::SolveStatus) -> TdSolverStatus {
 fn touchdown_prediction(snapshot: &Snapshot) -> Option<MavMessage> {
     let output = snapshot.output.as_ref().filter(|output| output.plan.len > 0)?;
     let end = &output.predicted_touchdown.state;
-    Some(MavMessage::TD_TOUCHDOWN_PREDICTION(
-        TD_TOUCHDOWN_PREDICTION_DATA {
-            time_boot_ms: boot_ms(snapshot.time_s),
-            time_to_go_ms: (1000.0 * output.predicted_touchdown.time_from_now_s).round() as i32,
-            x_m: end.x_m as f32,
-            altitude_m: end.z_m as f32,
-            pitch_rad: end.theta_rad as f32,
-            u_m_s: end.u_m_s as f32,
-            w_m_s: end.w_m_s as f32,
-            q_rad_s: end.q_rad_s as f32,
-            limits_violated: TdLimit::from_bits_truncate(snapshot.predicted_violations),
-        },
-    ))
+    Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        time_to_go_ms: (1000.0 * output.predicted_touchdown.time_from_now_s).round() as i32,
+        x_m: end.x_m as f32,
+        altitude_m: end.z_m as f32,
+        pitch_rad: end.theta_rad as f32,
+        u_m_s: end.u_m_s as f32,
+        w_m_s: end.w_m_s as f32,
+        q_rad_s: end.q_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(snapshot.predicted_violations),
+    }))
 }
 
 fn predicted_path(snapshot: &Snapshot) -> Option<MavMessage> {

@@ -39,38 +39,17 @@ impl CommandRequest {
             i32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]) as f32
         };
         let (params, confirmation) = match frame.message_id() {
-            COMMAND_LONG_ID => (
-                [
-                    float(0),
-                    float(4),
-                    float(8),
-                    float(12),
-                    float(16),
-                    float(20),
-                    float(24),
-                ],
-                payload[32],
-            ),
-            COMMAND_INT_ID => (
-                [
-                    float(0),
-                    float(4),
-                    float(8),
-                    float(12),
-                    integer(16),
-                    integer(20),
-                    float(24),
-                ],
-                0,
-            ),
+            COMMAND_LONG_ID => {
+                ([float(0), float(4), float(8), float(12), float(16), float(20), float(24)], payload[32])
+            }
+            COMMAND_INT_ID => {
+                ([float(0), float(4), float(8), float(12), integer(16), integer(20), float(24)], 0)
+            }
             _ => return None,
         };
         Some(Self {
             source: frame.source(),
-            target: Address {
-                system_id: payload[30],
-                component_id: payload[31],
-            },
+            target: Address { system_id: payload[30], component_id: payload[31] },
             command: u16::from_le_bytes([payload[28], payload[29]]),
             params,
             confirmation,
@@ -99,12 +78,7 @@ pub struct CommandAnswer {
 impl CommandAnswer {
     /// The answer to `request`.
     pub fn to(request: &CommandRequest, result: MavResult) -> Self {
-        Self {
-            command: request.command,
-            result: result as u8,
-            progress: 0,
-            target: request.source,
-        }
+        Self { command: request.command, result: result as u8, progress: 0, target: request.source }
     }
 
     /// The COMMAND_ACK frame.
@@ -135,10 +109,7 @@ impl CommandAnswer {
             command: u16::from_le_bytes([payload[0], payload[1]]),
             result: payload[2],
             progress: payload[3],
-            target: Address {
-                system_id: payload[8],
-                component_id: payload[9],
-            },
+            target: Address { system_id: payload[8], component_id: payload[9] },
         })
     }
 
@@ -251,13 +222,7 @@ impl CommandSender {
             target_component: target.component_id,
             confirmation: 0,
         };
-        self.pending.push(Pending {
-            message,
-            resend,
-            attempts: 0,
-            due_at: now,
-            in_progress: false,
-        });
+        self.pending.push(Pending { message, resend, attempts: 0, due_at: now, in_progress: false });
     }
 
     /// What is to be sent now; call it a few times a second.
@@ -276,19 +241,13 @@ impl CommandSender {
                 };
             let command = pending.message.command as u16;
             if !may_send {
-                events.push(CommandEvent::TimedOut {
-                    command,
-                    attempts: pending.attempts,
-                });
+                events.push(CommandEvent::TimedOut { command, attempts: pending.attempts });
                 return false;
             }
             pending.message.confirmation = u8::try_from(pending.attempts).unwrap_or(u8::MAX);
             pending.attempts += 1;
             pending.due_at = now + ANSWER_TIMEOUT;
-            events.push(CommandEvent::Sent {
-                command,
-                attempt: pending.attempts,
-            });
+            events.push(CommandEvent::Sent { command, attempt: pending.attempts });
             messages.push(MavMessage::COMMAND_LONG(pending.message.clone()));
             true
         });
@@ -297,34 +256,22 @@ impl CommandSender {
 
     /// Takes note of an answer.
     pub fn on_answer(&mut self, answer: &CommandAnswer, now: Duration) {
-        let Some(index) = self
-            .pending
-            .iter()
-            .position(|p| p.message.command as u16 == answer.command)
-        else {
+        let Some(index) = self.pending.iter().position(|p| p.message.command as u16 == answer.command) else {
             return;
         };
         if answer.result == MavResult::MAV_RESULT_IN_PROGRESS as u8 {
             self.pending[index].in_progress = true;
             self.pending[index].due_at = now + PROGRESS_TIMEOUT;
-            self.events.push(CommandEvent::InProgress {
-                command: answer.command,
-                progress: answer.progress,
-            });
+            self.events.push(CommandEvent::InProgress { command: answer.command, progress: answer.progress });
         } else {
             self.pending.remove(index);
-            self.events.push(CommandEvent::Answered {
-                command: answer.command,
-                result: answer.result,
-            });
+            self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
         }
     }
 
     /// Whether this command still waits for its answer.
     pub fn is_pending(&self, command: MavCmd) -> bool {
-        self.pending
-            .iter()
-            .any(|pending| pending.message.command == command)
+        self.pending.iter().any(|pending| pending.message.command == command)
     }
 
     /// What happened since the last call.

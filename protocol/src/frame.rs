@@ -35,11 +35,7 @@ impl Frame {
 
     /// Protocol version by its start marker.
     pub fn version(&self) -> MavlinkVersion {
-        if self.bytes[0] == MAGIC_V1 {
-            MavlinkVersion::V1
-        } else {
-            MavlinkVersion::V2
-        }
+        if self.bytes[0] == MAGIC_V1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 }
     }
 
     /// The sender's sequence number.
@@ -50,10 +46,7 @@ impl Frame {
     /// The sender.
     pub fn source(&self) -> Address {
         let at = if self.is_v1() { 3 } else { 5 };
-        Address {
-            system_id: self.bytes[at],
-            component_id: self.bytes[at + 1],
-        }
+        Address { system_id: self.bytes[at], component_id: self.bytes[at + 1] }
     }
 
     /// Message id.
@@ -89,10 +82,8 @@ impl Frame {
     /// # Errors
     /// A field holds a value that the dialect does not define.
     pub fn decode(&self) -> Result<MavMessage, DecodeError> {
-        MavMessage::parse(self.version(), self.message_id(), self.payload()).map_err(|error| DecodeError {
-            message_id: self.message_id(),
-            reason: error.to_string(),
-        })
+        MavMessage::parse(self.version(), self.message_id(), self.payload())
+            .map_err(|error| DecodeError { message_id: self.message_id(), reason: error.to_string() })
     }
 
     fn is_v1(&self) -> bool {
@@ -165,9 +156,7 @@ impl Framer {
     pub fn next_frame(&mut self) -> Option<Frame> {
         loop {
             let candidate = &self.buffer[self.start..];
-            let marker = candidate
-                .iter()
-                .position(|byte| matches!(*byte, MAGIC_V1 | MAGIC_V2));
+            let marker = candidate.iter().position(|byte| matches!(*byte, MAGIC_V1 | MAGIC_V2));
             let Some(skipped) = marker else {
                 self.counters.garbage_bytes += candidate.len() as u64;
                 self.start = self.buffer.len();
@@ -271,11 +260,7 @@ impl Encoder {
     pub fn encode(&mut self, message: &MavMessage) -> Frame {
         let mut payload = [0; 255];
         let len = message.ser(MavlinkVersion::V2, &mut payload);
-        self.frame(
-            message.message_id(),
-            MavMessage::extra_crc(message.message_id()),
-            &payload[..len],
-        )
+        self.frame(message.message_id(), MavMessage::extra_crc(message.message_id()), &payload[..len])
     }
 
     /// The frame of a payload built by hand, for values that the typed messages cannot hold.
@@ -287,11 +272,7 @@ impl Encoder {
             return None;
         }
         // MAVLink 2 cuts trailing zeros, but never the first byte.
-        let len = payload
-            .iter()
-            .rposition(|byte| *byte != 0)
-            .map_or(1, |last| last + 1)
-            .min(payload.len());
+        let len = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1).min(payload.len());
         Some(self.frame(message_id, extra, &payload[..len]))
     }
 

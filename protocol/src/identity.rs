@@ -10,16 +10,10 @@ pub struct Address {
 }
 
 /// The vehicle's autopilot (MAV_COMP_ID_AUTOPILOT1; some clients take no other for an autopilot).
-pub const VEHICLE: Address = Address {
-    system_id: 1,
-    component_id: 1,
-};
+pub const VEHICLE: Address = Address { system_id: 1, component_id: 1 };
 
 /// The ground station (MAV_COMP_ID_MISSIONPLANNER, as other ground stations use).
-pub const GROUND: Address = Address {
-    system_id: 255,
-    component_id: 190,
-};
+pub const GROUND: Address = Address { system_id: 255, component_id: 190 };
 
 /// Bytes per second that the default telemetry may take: what a SiK radio at 57,600 baud carries
 /// downwards without error correction.

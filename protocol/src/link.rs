@@ -73,13 +73,7 @@ impl LinkStats {
             if gap < 128 { u64::from(gap) } else { 0 }
         });
         if known.is_some() || self.sources.len() < MAX_SOURCES {
-            self.sources.insert(
-                source,
-                Source {
-                    last_sequence: sequence,
-                    last_seen: now,
-                },
-            );
+            self.sources.insert(source, Source { last_sequence: sequence, last_seen: now });
         }
         let bucket = self.bucket(now);
         bucket.received += 1;
@@ -88,9 +82,7 @@ impl LinkStats {
 
     /// Time since the last frame of this component; `None` if it was never heard.
     pub fn age(&self, source: Address, now: Duration) -> Option<Duration> {
-        self.sources
-            .get(&source)
-            .map(|source| now.saturating_sub(source.last_seen))
+        self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
     }
 
     /// Every component heard on this link.
@@ -115,11 +107,7 @@ impl LinkStats {
             rx_bytes_s: sum.rx_bytes as f64 / span_s,
             tx_bytes_s: sum.tx_bytes as f64 / span_s,
             rx_frames_s: sum.received as f64 / span_s,
-            loss: if expected == 0 {
-                0.0
-            } else {
-                sum.lost as f64 / expected as f64
-            },
+            loss: if expected == 0 { 0.0 } else { sum.lost as f64 / expected as f64 },
         }
     }
 
@@ -127,10 +115,7 @@ impl LinkStats {
         self.first_activity.get_or_insert(now);
         let second = now.as_secs();
         if self.buckets.back().is_none_or(|bucket| bucket.second < second) {
-            self.buckets.push_back(Bucket {
-                second,
-                ..Bucket::default()
-            });
+            self.buckets.push_back(Bucket { second, ..Bucket::default() });
         }
         while self.buckets.len() > WINDOW.as_secs() as usize {
             self.buckets.pop_front();

@@ -82,11 +82,7 @@ impl Reassembler {
         let piece = bytes[..end.unwrap_or(CHUNK_LEN)].to_vec();
         let severity = chunk.severity as u8;
         if chunk.id == 0 {
-            return vec![Text {
-                source,
-                severity,
-                text: printable(&piece),
-            }];
+            return vec![Text { source, severity, text: printable(&piece) }];
         }
         let sequence = usize::from(chunk.chunk_seq);
         if sequence >= MAX_CHUNKS {
@@ -95,11 +91,7 @@ impl Reassembler {
         let mut ready = self.expire(now);
         if self.partial.len() >= Self::MAX_PARTIAL
             && !self.partial.contains_key(&(source, chunk.id))
-            && let Some(oldest) = self
-                .partial
-                .iter()
-                .min_by_key(|(_, p)| p.first_seen)
-                .map(|(key, _)| *key)
+            && let Some(oldest) = self.partial.iter().min_by_key(|(_, p)| p.first_seen).map(|(key, _)| *key)
             && let Some(partial) = self.partial.remove(&oldest)
         {
             ready.push(partial.into_text(oldest.0));
@@ -142,30 +134,20 @@ impl Reassembler {
 
 impl Partial {
     fn is_whole(&self) -> bool {
-        self.ended_at
-            .is_some_and(|end| self.chunks[..=end].iter().all(Option::is_some))
+        self.ended_at.is_some_and(|end| self.chunks[..=end].iter().all(Option::is_some))
     }
 
     fn into_text(self, source: Address) -> Text {
         let end = self
             .ended_at
-            .unwrap_or_else(|| {
-                self.chunks
-                    .iter()
-                    .rposition(Option::is_some)
-                    .map_or(0, |last| last + 1)
-            })
+            .unwrap_or_else(|| self.chunks.iter().rposition(Option::is_some).map_or(0, |last| last + 1))
             .min(MAX_CHUNKS - 1);
         // Put together as bytes first: a character may be cut by a chunk's edge.
         let mut bytes = Vec::new();
         for chunk in &self.chunks[..=end] {
             bytes.extend_from_slice(chunk.as_deref().unwrap_or(b"[...]"));
         }
-        Text {
-            source,
-            severity: self.severity,
-            text: printable(&bytes),
-        }
+        Text { source, severity: self.severity, text: printable(&bytes) }
     }
 }
 
@@ -174,13 +156,7 @@ impl Partial {
 pub fn printable(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes)
         .chars()
-        .map(|c| {
-            if c.is_control() || is_bidi_control(c) {
-                char::REPLACEMENT_CHARACTER
-            } else {
-                c
-            }
-        })
+        .map(|c| if c.is_control() || is_bidi_control(c) { char::REPLACEMENT_CHARACTER } else { c })
         .collect()
 }
 

@@ -23,16 +23,9 @@ impl Bench {
     fn new() -> Self {
         let profile = Profile::builtin("paper-calibrated").unwrap();
         let mut vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
-        vehicle.set_log_state(LogState {
-            running: true,
-            space_bytes: u64::MAX,
-        });
+        vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
         vehicle.pull_pin();
-        let mut bench = Self {
-            vehicle,
-            endpoint: VehicleEndpoint::new(),
-            ground: Encoder::new(GROUND),
-        };
+        let mut bench = Self { vehicle, endpoint: VehicleEndpoint::new(), ground: Encoder::new(GROUND) };
         bench.run(0.2);
         bench
     }
@@ -62,10 +55,7 @@ impl Bench {
         let mut bytes = [0; 255];
         let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
-        let frame = self
-            .ground
-            .encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len])
-            .unwrap();
+        let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
         self.endpoint.on_frame(&frame, &mut self.vehicle);
         let sent = self.run(0.1);
         let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
@@ -85,19 +75,13 @@ fn texts(frames: &[Frame]) -> Vec<String> {
 }
 
 fn count(frames: &[Frame], message_id: u32) -> usize {
-    frames
-        .iter()
-        .filter(|frame| frame.message_id() == message_id)
-        .count()
+    frames.iter().filter(|frame| frame.message_id() == message_id).count()
 }
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_kept() {
-    let total: f64 = VehicleEndpoint::new()
-        .streams
-        .iter()
-        .map(|stream| stream.bytes_s(stream.interval_s))
-        .sum();
+    let total: f64 =
+        VehicleEndpoint::new().streams.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum();
     assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
     let mut bench = Bench::new();
     let sent = bench.run(10.0);
@@ -107,11 +91,7 @@ fn the_standard_rates_fit_the_radio_and_are_kept() {
         }
         let expected = 10.0 * standard.rate_hz;
         let found = count(&sent, standard.message_id) as f64;
-        assert!(
-            (found - expected).abs() <= 1.0,
-            "message {}: {found} of {expected}",
-            standard.message_id
-        );
+        assert!((found - expected).abs() <= 1.0, "message {}: {found} of {expected}", standard.message_id);
     }
 }
 
@@ -126,10 +106,7 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
         worst = worst.max(second);
     }
     assert_eq!(bench.vehicle.phase(), Phase::Safed);
-    assert!(
-        worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES,
-        "{worst} B in one second"
-    );
+    assert!(worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{worst} B in one second");
 }
 
 #[test]
@@ -148,14 +125,8 @@ fn a_refusal_is_answered_and_explained_in_words() {
     let mut bench = Bench::new();
     let (result, words) = bench.ask(300, 0.0, 0.0);
     assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
-    assert!(
-        words.contains("start refused: cannot start in PAD_IDLE"),
-        "{words}"
-    );
-    bench.vehicle.set_log_state(LogState {
-        running: false,
-        space_bytes: 0,
-    });
+    assert!(words.contains("start refused: cannot start in PAD_IDLE"), "{words}");
+    bench.vehicle.set_log_state(LogState { running: false, space_bytes: 0 });
     // Force codes open nothing.
     for code in [0.0, 21196.0, 2989.0] {
         let (result, words) = bench.ask(400, 1.0, code);
@@ -171,10 +142,7 @@ fn a_refusal_is_answered_and_explained_in_words() {
 fn commands_this_vehicle_or_even_the_dialect_does_not_know_are_unsupported() {
     let mut bench = Bench::new();
     for command in [MavCmd::MAV_CMD_NAV_TAKEOFF as u16, 12_345, u16::MAX] {
-        assert_eq!(
-            bench.ask(command, 0.0, 0.0).0,
-            MavResult::MAV_RESULT_UNSUPPORTED as u8
-        );
+        assert_eq!(bench.ask(command, 0.0, 0.0).0, MavResult::MAV_RESULT_UNSUPPORTED as u8);
     }
 }
 

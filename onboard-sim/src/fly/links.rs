@@ -22,17 +22,10 @@ impl Links {
             let name = endpoint.to_string();
             let transport = Transport::open(endpoint.clone())
                 .await
-                .map_err(|source| FlyError::Link {
-                    link: name.clone(),
-                    source,
-                })?;
+                .map_err(|source| FlyError::Link { link: name.clone(), source })?;
             open.push((transport, Framer::new(), name));
         }
-        Ok(Self {
-            open,
-            recorder,
-            tx_bytes: 0,
-        })
+        Ok(Self { open, recorder, tx_bytes: 0 })
     }
 
     pub(super) fn receive(&mut self, time_s: f64) -> Vec<Frame> {
@@ -45,20 +38,12 @@ impl Links {
                     Received::Up(peer) => {
                         note(self.recorder.as_ref(), time_s, &format!("link {name} up: {peer}"));
                     }
-                    Received::Down(why) => note(
-                        self.recorder.as_ref(),
-                        time_s,
-                        &format!("link {name} down: {why}"),
-                    ),
+                    Received::Down(why) => {
+                        note(self.recorder.as_ref(), time_s, &format!("link {name} down: {why}"))
+                    }
                 }
                 while let Some(frame) = framer.next_frame() {
-                    record_raw(
-                        self.recorder.as_ref(),
-                        Direction::Rx,
-                        name,
-                        frame.as_bytes(),
-                        time_s,
-                    );
+                    record_raw(self.recorder.as_ref(), Direction::Rx, name, frame.as_bytes(), time_s);
                     frames.push(frame);
                 }
                 if datagram {

@@ -44,9 +44,7 @@ impl std::str::FromStr for Speed {
         }
         match given.parse::<f64>() {
             Ok(factor) if (0.01..=1000.0).contains(&factor) => Ok(Self::Factor(factor)),
-            _ => Err(format!(
-                "speed `{given}`: must be `max` or a factor from 0.01 to 1000"
-            )),
+            _ => Err(format!("speed `{given}`: must be `max` or a factor from 0.01 to 1000")),
         }
     }
 }
@@ -75,10 +73,7 @@ pub struct FlyOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
     /// No such profile.
-    #[error(
-        "no profile `{given}`: not a file, and the built-in ones are {}",
-        builtin_names()
-    )]
+    #[error("no profile `{given}`: not a file, and the built-in ones are {}", builtin_names())]
     NoProfile {
         /// What was asked for.
         given: String,
@@ -108,11 +103,7 @@ pub enum FlyError {
 }
 
 fn builtin_names() -> String {
-    BUILTIN
-        .iter()
-        .map(|(name, _)| *name)
-        .collect::<Vec<_>>()
-        .join(", ")
+    BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
 /// How a flight ended.
@@ -156,14 +147,10 @@ pub fn load_profile(name_or_path: &str) -> Result<(Profile, String), FlyError> {
         return Ok((Profile::from_toml(text, name_or_path)?, text.to_owned()));
     }
     if !Path::new(name_or_path).exists() {
-        return Err(FlyError::NoProfile {
-            given: name_or_path.to_owned(),
-        });
+        return Err(FlyError::NoProfile { given: name_or_path.to_owned() });
     }
-    let text = std::fs::read_to_string(name_or_path).map_err(|source| FlyError::ReadProfile {
-        path: name_or_path.to_owned(),
-        source,
-    })?;
+    let text = std::fs::read_to_string(name_or_path)
+        .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?;
     Ok((Profile::from_toml(&text, name_or_path)?, text))
 }
 
@@ -180,12 +167,7 @@ pub fn log_header(
         ("seed".to_owned(), seed.to_string()),
         ("start_unix_ns".to_owned(), start_unix_ns.to_string()),
     ]);
-    LogHeader {
-        writer: writer.to_owned(),
-        start_unix_ns,
-        run,
-        profile_toml: Some(profile_toml.to_owned()),
-    }
+    LogHeader { writer: writer.to_owned(), start_unix_ns, run, profile_toml: Some(profile_toml.to_owned()) }
 }
 
 /// Flies, reporting nothing but the summary. See [`fly_observed`].
@@ -214,10 +196,7 @@ pub async fn fly_observed(
     let mut links = Links::open(&options.links, options.recorder.clone()).await?;
     let mut endpoint = VehicleEndpoint::new();
     let mut solve_times = SolveTimes::default();
-    let mut pilot = AutoPilot {
-        wanted: options.auto_start,
-        refused: None,
-    };
+    let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
 
@@ -268,10 +247,7 @@ pub async fn fly_observed(
         (None, Some(reason)) => Outcome::Refused(reason),
         (None, None) if vehicle.aborted() => Outcome::Aborted,
         (None, None) => {
-            debug_assert!(
-                stopped,
-                "a flight that is over has a verdict, a refusal or an abort"
-            );
+            debug_assert!(stopped, "a flight that is over has a verdict, a refusal or an abort");
             Outcome::Stopped
         }
     };

@@ -22,13 +22,7 @@ impl Pace {
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]
     pub(super) fn new(speed: Speed, frame_s: f64) -> Self {
         let now = Instant::now();
-        Self {
-            speed,
-            frame: Duration::from_secs_f64(frame_s),
-            began: now,
-            due: now,
-            over_since: None,
-        }
+        Self { speed, frame: Duration::from_secs_f64(frame_s), began: now, due: now, over_since: None }
     }
 
     pub(super) fn clock(&self) -> Instant {

@@ -21,23 +21,14 @@ pub(super) fn record_raw(
     time_s: f64,
 ) {
     if let Some(recorder) = recorder {
-        let frame = RawFrame {
-            direction,
-            endpoint: "vehicle",
-            link: link.to_owned(),
-            bytes: bytes.to_vec(),
-        };
+        let frame = RawFrame { direction, endpoint: "vehicle", link: link.to_owned(), bytes: bytes.to_vec() };
         recorder.record(Record::RawFrame(frame), nanoseconds(time_s));
     }
 }
 
 pub(super) fn note(recorder: Option<&Recorder>, time_s: f64, words: &str) {
     if let Some(recorder) = recorder {
-        let event = Event {
-            level: EventLevel::Info,
-            name: "vehicle".to_owned(),
-            message: words.to_owned(),
-        };
+        let event = Event { level: EventLevel::Info, name: "vehicle".to_owned(), message: words.to_owned() };
         recorder.record(Record::Event(event), nanoseconds(time_s));
     }
 }
@@ -102,18 +93,9 @@ fn truth(snapshot: &Snapshot) -> v1::PlantTruth {
 /// A flight without a log is the operator's choice, not a failed log.
 pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     let Some(recorder) = recorder else {
-        return LogState {
-            running: true,
-            space_bytes: u64::MAX,
-        };
+        return LogState { running: true, space_bytes: u64::MAX };
     };
-    let directory = recorder
-        .path()
-        .parent()
-        .filter(|path| !path.as_os_str().is_empty());
+    let directory = recorder.path().parent().filter(|path| !path.as_os_str().is_empty());
     let space_bytes = fs4::available_space(directory.unwrap_or(Path::new("."))).unwrap_or(0);
-    LogState {
-        running: recorder.is_running() && recorder.dropped() == 0,
-        space_bytes,
-    }
+    LogState { running: recorder.is_running() && recorder.dropped() == 0, space_bytes }
 }

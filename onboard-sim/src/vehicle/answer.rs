@@ -42,10 +42,7 @@ pub struct Answer {
 
 impl Answer {
     fn accepted() -> Self {
-        Self {
-            result: Result::Accepted,
-            reason: None,
-        }
+        Self { result: Result::Accepted, reason: None }
     }
 }
 
@@ -65,13 +62,9 @@ impl Vehicle {
         }
         let checks = self.arming_checks();
         let event = match request {
-            Request::Arm => Event::ArmRequested {
-                checks_passed: arming::all_passed(&checks),
-            },
+            Request::Arm => Event::ArmRequested { checks_passed: arming::all_passed(&checks) },
             Request::Disarm => Event::DisarmRequested,
-            Request::Start => Event::StartRequested {
-                countdown_s: self.profile.start.countdown_s,
-            },
+            Request::Start => Event::StartRequested { countdown_s: self.profile.start.countdown_s },
             Request::Abort => self.abort_event(),
         };
         match self.happen(event) {
@@ -89,10 +82,7 @@ impl Vehicle {
                     _ => Result::Denied,
                 };
                 self.say(Severity::Warning, format!("{} refused: {reason}", event.name()));
-                Answer {
-                    result,
-                    reason: Some(reason),
-                }
+                Answer { result, reason: Some(reason) }
             }
         }
     }
@@ -101,10 +91,7 @@ impl Vehicle {
     /// height.
     pub(super) fn abort_event(&self) -> Event {
         let gate_open = self.mode.phase.in_descent() && arming::all_passed(&self.gate_checks());
-        Event::AbortRequested {
-            above_commit_height: false,
-            gate_open,
-        }
+        Event::AbortRequested { above_commit_height: false, gate_open }
     }
 
     /// Puts an event to the phase table and does what follows from it; returns the refusal, if any.
@@ -124,10 +111,7 @@ impl Vehicle {
             self.say(Severity::Critical, words.to_owned());
         }
         if self.mode.phase != from.phase {
-            self.events.push(super::VehicleEvent::PhaseChanged {
-                from: from.phase,
-                to: self.mode.phase,
-            });
+            self.events.push(super::VehicleEvent::PhaseChanged { from: from.phase, to: self.mode.phase });
         }
         None
     }
@@ -146,23 +130,14 @@ impl Vehicle {
             Effect::Disarm => self.say(Severity::Notice, "disarmed".to_owned()),
             Effect::StartCountdown => {
                 let countdown_s = self.profile.start.countdown_s;
-                self.say(
-                    Severity::Notice,
-                    format!("countdown started: release in {countdown_s} s"),
-                );
+                self.say(Severity::Notice, format!("countdown started: release in {countdown_s} s"));
             }
             Effect::CancelCountdown => self.say(Severity::Warning, "countdown cancelled".to_owned()),
             Effect::ShowPadWait => {
-                self.say(
-                    Severity::Critical,
-                    "ABORT on the pad: keep away for 60 s".to_owned(),
-                );
+                self.say(Severity::Critical, "ABORT on the pad: keep away for 60 s".to_owned());
             }
             Effect::RecordLoss => {
-                self.say(
-                    Severity::Critical,
-                    "vehicle will be lost: landing motor inhibited".to_owned(),
-                );
+                self.say(Severity::Critical, "vehicle will be lost: landing motor inhibited".to_owned());
             }
             Effect::DeployChute => self.say(Severity::Critical, "parachute deployed".to_owned()),
             // A start at ignition has no ascent motor.

@@ -35,10 +35,7 @@ impl Vehicle {
         if self.mode.phase == Phase::Safe {
             self.happen(Event::SelfTestPassed);
         }
-        if self
-            .mode
-            .countdown_remaining_s(time_s)
-            .is_some_and(|left_s| left_s <= 0.0)
+        if self.mode.countdown_remaining_s(time_s).is_some_and(|left_s| left_s <= 0.0)
             && self.happen(Event::ReleasedAt(StartPoint::Ignition)).is_none()
         {
             self.plant.release(self.draw.release);
@@ -71,9 +68,8 @@ impl Vehicle {
 
     fn run_controller(&mut self, sample: u64, stopwatch: &mut dyn FnMut() -> Duration) {
         let deadline_s = self.profile.nmpc.sample_time_s;
-        let since_ignition_s = self
-            .ignition_sample
-            .map_or(0.0, |ignition| (sample - ignition) as f64 * deadline_s);
+        let since_ignition_s =
+            self.ignition_sample.map_or(0.0, |ignition| (sample - ignition) as f64 * deadline_s);
         let input = ControllerInput {
             tick: self.tick,
             time_s: self.time_s(),
@@ -91,23 +87,14 @@ impl Vehicle {
 
         let level_before = self.output.as_ref().map(|output| output.level);
         if self.mode.phase.in_landing_burn() && level_before != Some(output.level) {
-            self.say(
-                Severity::Notice,
-                format!("controller level {}", output.level.name()),
-            );
+            self.say(Severity::Notice, format!("controller level {}", output.level.name()));
         }
         self.deadline_missed = solve_time_s > deadline_s && self.policy == DeadlinePolicy::Enforce;
         self.next_gimbal_rad = if self.deadline_missed {
             // What hardware has at hand when an answer is late: the next command of the plan before.
-            self.say(
-                Severity::Warning,
-                format!("deadline missed by {:.3} s", solve_time_s - deadline_s),
-            );
+            self.say(Severity::Warning, format!("deadline missed by {:.3} s", solve_time_s - deadline_s));
             let before = self.output.as_ref().map(|output| output.plan.used_gimbal_rad());
-            before
-                .and_then(|plan| plan.get(1))
-                .copied()
-                .unwrap_or(self.gimbal_applied_rad)
+            before.and_then(|plan| plan.get(1)).copied().unwrap_or(self.gimbal_applied_rad)
         } else {
             output.gimbal_command_rad
         };
@@ -161,10 +148,7 @@ impl Vehicle {
 
     fn touch(&mut self, impact: Impact) {
         let vertical_m_s = impact.state.ground_velocity_m_s().1;
-        self.say(
-            Severity::Notice,
-            format!("ground contact at {vertical_m_s:.2} m/s"),
-        );
+        self.say(Severity::Notice, format!("ground contact at {vertical_m_s:.2} m/s"));
         self.impacts.push(impact);
     }
 
@@ -175,16 +159,10 @@ impl Vehicle {
             .iter()
             .map(|impact| (*impact, LandingVerdict::judge(&self.limits, &impact.state)))
             .collect();
-        let worst = judged
-            .iter()
-            .find(|(_, verdict)| !verdict.landed())
-            .or(judged.first());
+        let worst = judged.iter().find(|(_, verdict)| !verdict.landed()).or(judged.first());
         if let Some((impact, verdict)) = worst.copied() {
             self.verdict = Some((impact, verdict));
-            self.events.push(VehicleEvent::Verdict {
-                impact,
-                verdict: Box::new(verdict),
-            });
+            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
         }
     }
 }

@@ -118,24 +118,17 @@ impl Vehicle {
         policy: DeadlinePolicy,
     ) -> std::result::Result<Self, VehicleError> {
         if profile.start.at != StartPoint::Ignition {
-            return Err(VehicleError::Start {
-                profile: profile.name.clone(),
-                at: profile.start.at,
-            });
+            return Err(VehicleError::Start { profile: profile.name.clone(), at: profile.start.at });
         }
         let sample_time_s = profile.nmpc.sample_time_s;
         let substeps = (sample_time_s / STEP_S).round();
         if substeps < 1.0 || (substeps * STEP_S - sample_time_s).abs() > 1e-9 {
-            return Err(VehicleError::SampleTime {
-                profile: profile.name.clone(),
-                sample_time_s,
-            });
+            return Err(VehicleError::SampleTime { profile: profile.name.clone(), sample_time_s });
         }
         let substeps = substeps as u64;
         let shortest = (FRAME_MIN_S / STEP_S).round() as u64;
-        let substeps_per_frame = (shortest..=substeps)
-            .find(|length| substeps.is_multiple_of(*length))
-            .unwrap_or(substeps);
+        let substeps_per_frame =
+            (shortest..=substeps).find(|length| substeps.is_multiple_of(*length)).unwrap_or(substeps);
         let config = ControllerConfig::from_profile(profile);
         Ok(Self {
             limits: TouchdownLimits::from_profile(profile),
@@ -143,10 +136,7 @@ impl Vehicle {
             mode: Mode::power_up(0.0),
             controller: ControllerState::new(&config),
             policy,
-            log: LogState {
-                running: false,
-                space_bytes: 0,
-            },
+            log: LogState { running: false, space_bytes: 0 },
             frame: 0,
             frames_per_sample: substeps / substeps_per_frame,
             substeps_per_frame,
@@ -222,10 +212,7 @@ impl Vehicle {
     pub fn arming_checks(&self) -> Vec<Check> {
         let state = self.plant.state();
         let solver = self.output.as_ref().map(|output| output.solver);
-        let rehearsed = self
-            .output
-            .as_ref()
-            .filter(|output| output.level == ControlLevel::Rehearsal);
+        let rehearsed = self.output.as_ref().filter(|output| output.level == ControlLevel::Rehearsal);
         let input = ArmingInput {
             pin_out: self.mode.interlocks.pin_out,
             abort_latched: self.mode.interlocks.abort_latched,

@@ -132,8 +132,5 @@ pub(crate) fn violations(verdict: &LandingVerdict) -> u16 {
 }
 
 fn bits(flags: impl Iterator<Item = bool>) -> u16 {
-    flags
-        .take(16)
-        .enumerate()
-        .fold(0, |bits, (place, set)| bits | (u16::from(set) << place))
+    flags.take(16).enumerate().fold(0, |bits, (place, set)| bits | (u16::from(set) << place))
 }

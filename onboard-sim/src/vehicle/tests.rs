@@ -14,10 +14,7 @@ fn still() -> impl FnMut() -> Duration {
 
 fn vehicle_of(profile: &Profile) -> Vehicle {
     let mut vehicle = Vehicle::new(profile, draw(profile, 1), DeadlinePolicy::Observe).unwrap();
-    vehicle.set_log_state(LogState {
-        running: true,
-        space_bytes: u64::MAX,
-    });
+    vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     vehicle.pull_pin();
     vehicle
 }
@@ -65,22 +62,12 @@ fn the_nominal_flight_passes_its_phases_and_lands_inside_table_2() {
     let mut vehicle = in_phase(Phase::PadArmed);
     vehicle.request(Request::Start);
     let events = run_until(&mut vehicle, Vehicle::is_over);
-    let expected = [
-        Phase::PadArmed,
-        Phase::LandArmed,
-        Phase::Ignition,
-        Phase::Powered,
-        Phase::Touchdown,
-        Phase::Safed,
-    ];
+    let expected =
+        [Phase::PadArmed, Phase::LandArmed, Phase::Ignition, Phase::Powered, Phase::Touchdown, Phase::Safed];
     assert_eq!(phases(&events), expected);
     let (impact, verdict) = vehicle.verdict().unwrap();
     assert!(verdict.landed(), "{impact:?}: {}", verdict.summary());
-    assert!(
-        events
-            .iter()
-            .any(|event| matches!(event, VehicleEvent::Verdict { .. }))
-    );
+    assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict { .. })));
 }
 
 #[test]
@@ -123,24 +110,14 @@ fn two_flights_of_one_seed_are_equal_to_the_bit() {
 #[test]
 fn a_failed_check_refuses_arming_and_says_which() {
     let mut vehicle = in_phase(Phase::PadIdle);
-    vehicle.set_log_state(LogState {
-        running: false,
-        space_bytes: 0,
-    });
+    vehicle.set_log_state(LogState { running: false, space_bytes: 0 });
     let answer = vehicle.request(Request::Arm);
     assert_eq!(answer.result, Result::NotNow);
     assert!(answer.reason.unwrap().starts_with("log: found not running"));
     assert_eq!(vehicle.phase(), Phase::PadIdle);
-    vehicle.set_log_state(LogState {
-        running: true,
-        space_bytes: u64::MAX,
-    });
+    vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted);
-    assert_eq!(
-        vehicle.request(Request::Arm).result,
-        Result::Accepted,
-        "armed already"
-    );
+    assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted, "armed already");
 }
 
 #[test]
@@ -148,21 +125,14 @@ fn a_landing_that_cannot_be_is_refused_on_the_pad_with_its_bound() {
     let mut vehicle = vehicle_of(&Profile::builtin("paper-as-printed").unwrap());
     run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
     let reason = vehicle.request(Request::Arm).reason.unwrap();
-    assert!(
-        reason.contains("not landable: best touchdown speed 4.3 m/s"),
-        "{reason}"
-    );
+    assert!(reason.contains("not landable: best touchdown speed 4.3 m/s"), "{reason}");
 }
 
 #[test]
 fn a_countdown_can_be_cancelled_without_a_latch() {
     let mut vehicle = in_phase(Phase::PadArmed);
     assert_eq!(vehicle.request(Request::Start).result, Result::Accepted);
-    assert_eq!(
-        vehicle.request(Request::Start).result,
-        Result::Accepted,
-        "running already"
-    );
+    assert_eq!(vehicle.request(Request::Start).result, Result::Accepted, "running already");
     assert_eq!(vehicle.request(Request::Disarm).result, Result::Accepted);
     assert_eq!(vehicle.phase(), Phase::PadIdle);
     assert!(!vehicle.aborted());
@@ -175,10 +145,7 @@ fn a_countdown_can_be_cancelled_without_a_latch() {
 
 #[test]
 fn start_and_disarm_are_refused_where_they_do_not_belong() {
-    assert_eq!(
-        in_phase(Phase::PadIdle).request(Request::Start).result,
-        Result::Denied
-    );
+    assert_eq!(in_phase(Phase::PadIdle).request(Request::Start).result, Result::Denied);
     let mut flying = in_phase(Phase::Powered);
     for request in [Request::Arm, Request::Disarm, Request::Start] {
         let answer = flying.request(request);
@@ -198,11 +165,7 @@ fn an_abort_on_the_pad_disarms_latches_and_shows_the_wait() {
         assert!(!after.interlocks.armed && after.interlocks.landing_motor_inhibited);
         assert_eq!(after.pad_wait_s, Some(60.0));
         assert_eq!(after.abort_effect, AbortEffect::None);
-        assert_eq!(
-            vehicle.request(Request::Abort).result,
-            Result::Accepted,
-            "repeated until answered"
-        );
+        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted, "repeated until answered");
         let refused = vehicle.request(Request::Arm);
         assert_ne!(refused.result, Result::Accepted);
         assert!(refused.reason.unwrap().contains("abort"));
@@ -229,11 +192,7 @@ fn an_abort_under_thrust_holds_upright_and_never_opens_a_parachute() {
         let mut vehicle = in_phase(phase);
         assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::UprightOnly);
         assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
-        assert_eq!(
-            vehicle.request(Request::Abort).result,
-            Result::Accepted,
-            "repeated until answered"
-        );
+        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted, "repeated until answered");
         let events = run_until(&mut vehicle, Vehicle::is_over);
         assert!(!phases(&events).contains(&Phase::Chute));
         assert!(events.iter().any(|event| matches!(
@@ -267,11 +226,7 @@ fn a_gate_that_does_not_open_lights_nothing() {
     vehicle.request(Request::Arm);
     vehicle.request(Request::Start);
     let events = run_until(&mut vehicle, Vehicle::is_over);
-    assert!(
-        !phases(&events).contains(&Phase::Ignition),
-        "{:?}",
-        phases(&events)
-    );
+    assert!(!phases(&events).contains(&Phase::Ignition), "{:?}", phases(&events));
     assert!(!vehicle.verdict().unwrap().1.landed());
     let gate_words = events.iter().any(|event| {
         matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("ignition gate closed: tilt"))
@@ -283,10 +238,7 @@ fn a_gate_that_does_not_open_lights_nothing() {
 fn a_late_output_is_not_applied_when_deadlines_are_enforced() {
     let profile = Profile::builtin("paper-calibrated").unwrap();
     let mut vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Enforce).unwrap();
-    vehicle.set_log_state(LogState {
-        running: true,
-        space_bytes: u64::MAX,
-    });
+    vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     vehicle.pull_pin();
     run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
     vehicle.request(Request::Arm);
@@ -317,20 +269,10 @@ fn a_late_output_is_not_applied_when_deadlines_are_enforced() {
 fn a_profile_that_starts_elsewhere_is_refused_by_name() {
     let mut profile = Profile::builtin("paper-calibrated").unwrap();
     profile.start.at = StartPoint::Apogee;
-    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe)
-        .err()
-        .unwrap();
-    assert!(
-        error.to_string().contains("start.at = Apogee is not simulated"),
-        "{error}"
-    );
+    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).err().unwrap();
+    assert!(error.to_string().contains("start.at = Apogee is not simulated"), "{error}");
     profile.start.at = StartPoint::Ignition;
     profile.nmpc.sample_time_s = 0.0995;
-    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe)
-        .err()
-        .unwrap();
-    assert!(
-        error.to_string().contains("whole number of milliseconds"),
-        "{error}"
-    );
+    let error = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).err().unwrap();
+    assert!(error.to_string().contains("whole number of milliseconds"), "{error}");
 }

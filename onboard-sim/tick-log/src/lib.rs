@@ -67,14 +67,8 @@ pub fn input_to_log(input: &ControllerInput) -> v1::ControllerInput {
 /// # Errors
 /// The phase is not one of this build's.
 pub fn input_from_log(input: &v1::ControllerInput) -> Result<ControllerInput, TickLogError> {
-    let unknown = TickLogError::UnknownPhase {
-        tick: input.tick,
-        phase: input.phase,
-    };
-    let phase = u8::try_from(input.phase)
-        .ok()
-        .and_then(Phase::from_index)
-        .ok_or(unknown)?;
+    let unknown = TickLogError::UnknownPhase { tick: input.tick, phase: input.phase };
+    let phase = u8::try_from(input.phase).ok().and_then(Phase::from_index).ok_or(unknown)?;
     Ok(ControllerInput {
         tick: input.tick,
         time_s: input.time_s,
@@ -167,21 +161,11 @@ mod tests {
 
     /// Any bit pattern: NaN payloads, both zeros, infinities, subnormals.
     fn any_bits() -> impl Strategy<Value = f64> {
-        prop_oneof![
-            any::<u64>().prop_map(f64::from_bits),
-            Just(0.0),
-            Just(-0.0),
-            Just(f64::NAN)
-        ]
+        prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(0.0), Just(-0.0), Just(f64::NAN)]
     }
 
     fn bits(input: &ControllerInput) -> Vec<u64> {
-        let mut bits: Vec<u64> = input
-            .state
-            .to_array()
-            .iter()
-            .map(|value| value.to_bits())
-            .collect();
+        let mut bits: Vec<u64> = input.state.to_array().iter().map(|value| value.to_bits()).collect();
         bits.extend([
             input.tick,
             input.time_s.to_bits(),
@@ -224,11 +208,7 @@ mod tests {
 
     #[test]
     fn an_unknown_phase_is_refused_by_its_number() {
-        let input = v1::ControllerInput {
-            tick: 7,
-            phase: 13,
-            ..v1::ControllerInput::default()
-        };
+        let input = v1::ControllerInput { tick: 7, phase: 13, ..v1::ControllerInput::default() };
         let error = input_from_log(&input).unwrap_err().to_string();
         assert_eq!(error, "tick 7: phase 13 is unknown; this build knows 0 to 12");
     }

@@ -11,14 +11,7 @@ pub fn build_info() -> BTreeMap<String, String> {
         ("target", env!("TOUCHDOWN_TARGET")),
         ("target_features", env!("TOUCHDOWN_TARGET_FEATURES")),
         ("lock_sha256", env!("TOUCHDOWN_LOCK_SHA256")),
-        (
-            "profile",
-            if cfg!(debug_assertions) {
-                "debug"
-            } else {
-                "release"
-            },
-        ),
+        ("profile", if cfg!(debug_assertions) { "debug" } else { "release" }),
     ]
     .into_iter()
     .map(|(key, value)| (key.to_owned(), value.to_owned()))

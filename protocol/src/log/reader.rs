@@ -155,10 +155,7 @@ impl<R: Read> LogReader<R> {
                 // A hole in a file reads as an endless row of such records.
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
                     let reason = "a record of type 0, which does not exist".to_owned();
-                    self.finish(Some(Damage::Corrupt {
-                        near_byte: self.bytes_read,
-                        reason,
-                    }));
+                    self.finish(Some(Damage::Corrupt { near_byte: self.bytes_read, reason }));
                     break;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => parse(opcode, data),
@@ -182,23 +179,21 @@ impl<R: Read> LogReader<R> {
         self.ended = true;
         // Damage in the summary behind the data costs nothing that we read.
         if !self.saw_data_end {
-            self.damage = damage.or(Some(Damage::Truncated {
-                bytes: self.bytes_read,
-            }));
+            self.damage = Some(damage.unwrap_or_else(|| self.cut()));
         }
+    }
+
+    /// The input ended too early; with less than the magic read, it was no log in the first place.
+    fn cut(&self) -> Damage {
+        let shorter_than_magic = self.bytes_read < mcap::MAGIC.len() as u64;
+        if shorter_than_magic { Damage::NotMcap } else { Damage::Truncated { bytes: self.bytes_read } }
     }
 
     fn describe(&self, error: &mcap::McapError) -> Damage {
         match error {
             mcap::McapError::BadMagic => Damage::NotMcap,
-            mcap::McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Damage::NotMcap,
-            mcap::McapError::UnexpectedEof => Damage::Truncated {
-                bytes: self.bytes_read,
-            },
-            other => Damage::Corrupt {
-                near_byte: self.bytes_read,
-                reason: other.to_string(),
-            },
+            mcap::McapError::UnexpectedEof => self.cut(),
+            other => Damage::Corrupt { near_byte: self.bytes_read, reason: other.to_string() },
         }
     }
 
@@ -226,14 +221,12 @@ impl<R: Read> LogReader<R> {
                 sequence: header.sequence,
                 data: data.into_owned(),
             }),
-            McapRecord::Metadata(metadata) => Some(LogItem::Metadata {
-                name: metadata.name,
-                entries: metadata.metadata,
-            }),
-            McapRecord::Attachment { header, data, .. } => Some(LogItem::Attachment {
-                name: header.name,
-                data: data.into_owned(),
-            }),
+            McapRecord::Metadata(metadata) => {
+                Some(LogItem::Metadata { name: metadata.name, entries: metadata.metadata })
+            }
+            McapRecord::Attachment { header, data, .. } => {
+                Some(LogItem::Attachment { name: header.name, data: data.into_owned() })
+            }
             McapRecord::DataEnd(_) => {
                 self.saw_data_end = true;
                 Some(LogItem::DataEnd)
@@ -246,10 +239,7 @@ impl<R: Read> LogReader<R> {
 fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
     // The parser trusts an attachment to be long enough for its own fields.
     if opcode == mcap::records::op::ATTACHMENT && !attachment_fits(data) {
-        return Err(mcap::McapError::BadAttachmentLength {
-            header: 0,
-            available: data.len() as u64,
-        });
+        return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
     mcap::parse_record(opcode, data).map(McapRecord::into_owned)
 }

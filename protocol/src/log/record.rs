@@ -107,11 +107,7 @@ pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform 
         timestamp: Some(timestamp(time_ns)),
         parent_frame_id: "world".to_owned(),
         child_frame_id: "rocket".to_owned(),
-        translation: Some(foxglove::messages::Vector3 {
-            x: truth.state.x_m,
-            y: 0.0,
-            z: truth.state.z_m,
-        }),
+        translation: Some(foxglove::messages::Vector3 { x: truth.state.x_m, y: 0.0, z: truth.state.z_m }),
         rotation: Some(foxglove::messages::Quaternion {
             x: 0.0,
             y: display_sin(half),
@@ -144,18 +140,12 @@ fn timestamp(time_ns: u64) -> foxglove::messages::Timestamp {
     foxglove::messages::Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "for a picture only; nothing decides by it"
-)]
+#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
 fn display_sin(angle_rad: f64) -> f64 {
     angle_rad.sin()
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "for a picture only; nothing decides by it"
-)]
+#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
 fn display_cos(angle_rad: f64) -> f64 {
     angle_rad.cos()
 }

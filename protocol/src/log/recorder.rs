@@ -73,21 +73,12 @@ impl Recorder {
     /// # Errors
     /// The file exists or cannot be made, or its header cannot be written.
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
-        let create_error = |source| RecorderError::Create {
-            path: path.to_owned(),
-            source,
-        };
-        let file = File::options()
-            .write(true)
-            .read(true)
-            .create_new(true)
-            .open(path)
-            .map_err(create_error)?;
+        let create_error = |source| RecorderError::Create { path: path.to_owned(), source };
+        let file =
+            File::options().write(true).read(true).create_new(true).open(path).map_err(create_error)?;
         let disk = file.try_clone().map_err(create_error)?;
-        let writer = LogWriter::new(BufWriter::new(file), header).map_err(|source| RecorderError::Write {
-            path: path.to_owned(),
-            source,
-        })?;
+        let writer = LogWriter::new(BufWriter::new(file), header)
+            .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
         let (orders, inbox) = sync_channel(QUEUE_RECORDS);
         let shared = Arc::new(Shared {
             path: path.to_owned(),
@@ -134,11 +125,7 @@ impl Recorder {
 
     /// Writes a record if there is room, else counts it as dropped.
     pub fn try_record(&self, record: Record, time_ns: u64) {
-        if self
-            .orders
-            .try_send(Order::Write(Box::new(record), time_ns))
-            .is_err()
-        {
+        if self.orders.try_send(Order::Write(Box::new(record), time_ns)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -169,10 +156,7 @@ impl Recorder {
     }
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the flush timer is about the disk, not about the flight"
-)]
+#[expect(clippy::disallowed_methods, reason = "the flush timer is about the disk, not about the flight")]
 fn write_until_finished(
     mut writer: LogWriter<BufWriter<File>>,
     disk: &File,
@@ -201,9 +185,7 @@ fn write_until_finished(
             Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
                 let mut output = writer.finish()?;
                 output.flush().map_err(mcap::McapError::from)?;
-                return disk
-                    .sync_data()
-                    .map_err(|error| mcap::McapError::from(error).into());
+                return disk.sync_data().map_err(|error| mcap::McapError::from(error).into());
             }
         }
     }

@@ -65,11 +65,7 @@ impl<W: Write + Seek> LogWriter<W> {
         let mut writer = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
-            .library(format!(
-                "touchdown {} {}",
-                header.writer,
-                env!("CARGO_PKG_VERSION")
-            ))
+            .library(format!("touchdown {} {}", header.writer, env!("CARGO_PKG_VERSION")))
             .create(output)?;
         writer.write_metadata(&mcap::records::Metadata {
             name: METADATA_BUILD.to_owned(),
@@ -167,12 +163,7 @@ impl<W: Write + Seek> LogWriter<W> {
         buffer.reserve(message.encoded_len());
         message.encode_raw(&mut buffer);
         let schema = format!("{}.{message_name}", v1_package());
-        let channel = self.channel(
-            topic,
-            "protobuf",
-            Some((&schema, DESCRIPTORS_V1)),
-            &BTreeMap::new(),
-        )?;
+        let channel = self.channel(topic, "protobuf", Some((&schema, DESCRIPTORS_V1)), &BTreeMap::new())?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
         written
@@ -188,13 +179,8 @@ impl<W: Write + Seek> LogWriter<W> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         let encoded = message.encode(&mut buffer);
-        encoded.map_err(|error| LogWriteError::Encode {
-            topic,
-            reason: error.to_string(),
-        })?;
-        let schema = schema
-            .as_ref()
-            .map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })?;
+        let schema = schema.as_ref().map(|schema| (schema.name.as_str(), schema.data.as_ref()));
         let channel = self.channel(topic, "protobuf", schema, &BTreeMap::new())?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
@@ -224,11 +210,7 @@ impl<W: Write + Seek> LogWriter<W> {
         schema: Option<(&str, &[u8])>,
         metadata: &BTreeMap<String, String>,
     ) -> Result<(u16, u32), LogWriteError> {
-        let distinction = metadata
-            .values()
-            .map(String::as_str)
-            .collect::<Vec<_>>()
-            .join(" ");
+        let distinction = metadata.values().map(String::as_str).collect::<Vec<_>>().join(" ");
         let key = (topic.to_owned(), distinction);
         if let Some((id, sequence)) = self.channels.get_mut(&key) {
             *sequence += 1;
@@ -236,11 +218,7 @@ impl<W: Write + Seek> LogWriter<W> {
         }
         let schema_id = match schema {
             Some((name, data)) => {
-                let schema_encoding = if encoding == "protobuf" {
-                    "protobuf"
-                } else {
-                    "text"
-                };
+                let schema_encoding = if encoding == "protobuf" { "protobuf" } else { "text" };
                 self.writer.add_schema(name, schema_encoding, data)?
             }
             None => 0,
@@ -257,12 +235,7 @@ impl<W: Write + Seek> LogWriter<W> {
         data: &[u8],
     ) -> Result<(), LogWriteError> {
         // publish_time equals log_time: one known reader takes only that.
-        let header = MessageHeader {
-            channel_id,
-            sequence,
-            log_time,
-            publish_time: log_time,
-        };
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }
 }

@@ -42,14 +42,10 @@ impl FromStr for Endpoint {
     type Err = EndpointError;
 
     fn from_str(given: &str) -> Result<Self, EndpointError> {
-        let refuse = |problem| EndpointError {
-            given: given.to_owned(),
-            problem,
-        };
+        let refuse = |problem| EndpointError { given: given.to_owned(), problem };
         let (kind, rest) = given.split_once(':').ok_or_else(|| refuse("no kind of link"))?;
-        let (head, tail) = rest
-            .rsplit_once(':')
-            .ok_or_else(|| refuse("the part after the last colon is missing"))?;
+        let (head, tail) =
+            rest.rsplit_once(':').ok_or_else(|| refuse("the part after the last colon is missing"))?;
         if head.is_empty() {
             return Err(refuse("the address is empty"));
         }
@@ -58,23 +54,14 @@ impl FromStr for Endpoint {
                 tail.parse::<u16>()
                     .map_err(|_not_a_port| refuse("the port is not a number from 0 to 65535"))?;
                 let address = rest.to_owned();
-                Ok(if kind == "udpin" {
-                    Self::UdpIn(address)
-                } else {
-                    Self::UdpOut(address)
-                })
+                Ok(if kind == "udpin" { Self::UdpIn(address) } else { Self::UdpOut(address) })
             }
             "serial" => {
-                let baud = tail
-                    .parse()
-                    .map_err(|_not_a_rate| refuse("the baud rate is not a number"))?;
+                let baud = tail.parse().map_err(|_not_a_rate| refuse("the baud rate is not a number"))?;
                 if !(1_200..=4_000_000).contains(&baud) {
                     return Err(refuse("the baud rate is not between 1200 and 4000000"));
                 }
-                Ok(Self::Serial {
-                    path: head.to_owned(),
-                    baud,
-                })
+                Ok(Self::Serial { path: head.to_owned(), baud })
             }
             _ => Err(refuse("unknown kind of link")),
         }
@@ -97,21 +84,11 @@ mod tests {
 
     #[test]
     fn names_are_read_and_written_alike() {
-        for name in [
-            "udpin:0.0.0.0:14550",
-            "udpout:[::1]:14550",
-            "serial:/dev/ttyUSB0:57600",
-        ] {
+        for name in ["udpin:0.0.0.0:14550", "udpout:[::1]:14550", "serial:/dev/ttyUSB0:57600"] {
             let endpoint: Endpoint = name.parse().unwrap();
             assert_eq!(endpoint.to_string(), name);
         }
-        assert_eq!(
-            "serial:/dev/ttyUSB0:57600"
-                .parse::<Endpoint>()
-                .unwrap()
-                .capacity_bytes_s(),
-            Some(5760)
-        );
+        assert_eq!("serial:/dev/ttyUSB0:57600".parse::<Endpoint>().unwrap().capacity_bytes_s(), Some(5760));
     }
 
     #[test]
@@ -127,10 +104,7 @@ mod tests {
             "serial::57600",
         ] {
             let error = name.parse::<Endpoint>().unwrap_err().to_string();
-            assert!(
-                error.contains("udpin:ADDRESS:PORT") && error.contains(name),
-                "{error}"
-            );
+            assert!(error.contains("udpin:ADDRESS:PORT") && error.contains(name), "{error}");
         }
     }
 }

@@ -80,15 +80,8 @@ impl Transport {
             Endpoint::UdpOut(address) => udp::connect(address, inbox, outbox).await?,
             Endpoint::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
         }
-        let sender = TransportSender {
-            queue,
-            dropped: Arc::new(AtomicU64::new(0)),
-        };
-        Ok(Self {
-            endpoint,
-            received,
-            sender,
-        })
+        let sender = TransportSender { queue, dropped: Arc::new(AtomicU64::new(0)) };
+        Ok(Self { endpoint, received, sender })
     }
 
     /// Where it leads; for `udpin` with port 0, with the port that the system chose.

@@ -32,11 +32,7 @@ async fn run(path: String, baud: u32, inbox: Sender<Received>, mut outbox: Recei
         };
         // Said once, not twice a second.
         if trouble != last_trouble {
-            if inbox
-                .send(Received::Down(format!("{path}: {trouble}")))
-                .await
-                .is_err()
-            {
+            if inbox.send(Received::Down(format!("{path}: {trouble}"))).await.is_err() {
                 return;
             }
             last_trouble = trouble;

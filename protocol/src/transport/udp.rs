@@ -30,16 +30,9 @@ pub(super) async fn connect(
     outbox: Receiver<Vec<u8>>,
 ) -> io::Result<()> {
     let peer = lookup_host(address).await?.next().ok_or_else(|| {
-        io::Error::new(
-            io::ErrorKind::NotFound,
-            format!("the name in `{address}` has no address"),
-        )
+        io::Error::new(io::ErrorKind::NotFound, format!("the name in `{address}` has no address"))
     })?;
-    let any: SocketAddr = if peer.is_ipv4() {
-        ([0, 0, 0, 0], 0).into()
-    } else {
-        ([0u16; 8], 0).into()
-    };
+    let any: SocketAddr = if peer.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
     // Not connected: an ICMP "port unreachable" from a ground that starts later must not end the link.
     let socket = UdpSocket::bind(any).await?;
     tokio::spawn(run(socket, vec![peer], true, inbox, outbox));

@@ -89,7 +89,11 @@ impl ControllerState {
             .chain(multipliers)
             .copied()
             .chain(states);
-        let words = [flown.first_interval as u64, u64::from(solution.status.index())];
+        let words = [
+            flown.first_interval as u64,
+            u64::from(flown.usable),
+            u64::from(solution.status.index()),
+        ];
         words
             .into_iter()
             .chain(numbers.map(f64::to_bits))
@@ -111,6 +115,8 @@ fn fnv(hash: u64, word: u64) -> u64 {
 struct FlownPlan {
     /// Samples between ignition and the plan's beginning.
     first_interval: usize,
+    /// The plan is worth flying, not only worth starting the next solve from.
+    usable: bool,
     solution: Solution,
 }
 
@@ -147,9 +153,10 @@ pub enum ControlLevel {
     Rehearsal = 1,
     /// A converged plan that lands.
     Converged = 2,
-    /// The best plan found: not converged, or unable to meet every end condition.
+    /// The best plan found: not converged, or missing its end conditions by a little.
     BestFeasible = 3,
-    /// The previous plan, shifted to the present: nothing could be solved at this tick.
+    /// The previous plan, shifted to the present: no plan worth flying was found at this tick, and the vehicle is
+    /// where the previous one wanted it, or nobody knows where it is.
     ShiftedPlan = 4,
     /// The upright law.
     Stabiliser = 5,
@@ -269,6 +276,26 @@ pub struct ControllerOutput {
     pub predicted_touchdown: PredictedTouchdown,
     /// The plan.
     pub plan: Plan,
+}
+
+impl ControllerOutput {
+    /// The gimbal angle to apply when this is the last output that came in time and `missed` have come too late
+    /// since, rad: the plan's own next inputs, and then centred.
+    ///
+    /// Holding the last command instead may turn the vehicle by radians per second within one sample.
+    pub fn command_after_misses_rad(&self, missed: usize) -> f64 {
+        if missed == 0 {
+            return self.gimbal_command_rad;
+        }
+        // A rehearsed plan is not being flown.
+        let flown = !matches!(self.level, ControlLevel::Idle | ControlLevel::Rehearsal);
+        self.plan
+            .used_gimbal_rad()
+            .get(missed)
+            .copied()
+            .filter(|_| flown)
+            .unwrap_or(0.0)
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,14 @@ use crate::phase::Phase;
 /// Largest miss of an end or path condition that still counts as a plan that lands, m, rad, m/s or rad/s.
 const LANDING_MISS: f64 = 1e-3;
 
+/// Largest miss of an end or path condition of a plan worth flying, m, rad, m/s or rad/s. Close to the ground some
+/// centimetres may be out of reach; a plan that misses by more is no landing.
+const USABLE_MISS: f64 = 0.3;
+
+/// How far the vehicle may be from the previous plan for its inputs to be worth repeating: position m, pitch rad,
+/// velocity m/s, pitch rate rad/s.
+const NEAR_THE_PLAN: [f64; 6] = [0.5, 0.5, 0.1, 0.3, 0.3, 0.3];
+
 /// Advances the controller by one tick.
 ///
 /// Never fails and never returns a command that is not a number: what cannot be planned is flown by a lower
@@ -109,12 +117,16 @@ fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
     }
     let warm = moment.warm_start(state.flown.as_ref());
     let solution = solve(&problem, warm.as_ref());
-    if solution.inputs_rad.is_empty() {
-        let report = report_of(&solution);
-        return fall_back(state, input, &moment, report);
+    if is_usable(&solution) {
+        let decision = planned(&state.config, &moment, &solution);
+        state.flown = keep(&moment, solution);
+        return decision;
     }
-    let decision = planned(&state.config, &moment, &solution);
-    state.flown = keep(&moment, solution);
+    let decision = fall_back(state, input, &moment, report_of(&solution));
+    // What was found may still be where the next solve should start from, unless the previous plan is better.
+    if decision.level != ControlLevel::ShiftedPlan && !solution.inputs_rad.is_empty() {
+        state.flown = keep(&moment, solution);
+    }
     decision
 }
 
@@ -265,22 +277,40 @@ fn report_of(solution: &Solution) -> SolverReport {
 }
 
 fn keep(moment: &Moment, solution: Solution) -> Option<FlownPlan> {
+    let usable = is_usable(&solution);
+    let first_interval = moment.first_interval;
     (!solution.inputs_rad.is_empty()).then_some(FlownPlan {
-        first_interval: moment.first_interval,
+        first_interval,
+        usable,
         solution,
     })
 }
 
-/// Nothing could be planned: the previous plan if it reaches this far and can still be trusted, else upright.
+fn is_usable(solution: &Solution) -> bool {
+    !solution.inputs_rad.is_empty() && solution.condition_miss <= USABLE_MISS
+}
+
+/// Nothing worth flying was planned: the previous plan if it reaches this far and can be trusted, else upright.
 fn fall_back(
     state: &ControllerState,
     input: &ControllerInput,
     moment: &Moment,
     report: SolverReport,
 ) -> Decision {
-    // A plan towards a landing that is known to be impossible is not worth following.
-    if report.status != SolveStatus::NotLandable
-        && let Some((states, inputs_rad)) = moment.shifted_plan(state.flown.as_ref())
+    let near = |planned: &PlanarState| match predict(&state.config, input, moment) {
+        Some(predicted) => predicted
+            .to_array()
+            .iter()
+            .zip(planned.to_array())
+            .zip(NEAR_THE_PLAN)
+            .all(|((value, planned), tolerance)| (value - planned).abs() <= tolerance),
+        // Nobody knows where the vehicle is; the plan is the best guess.
+        None => true,
+    };
+    let previous = state.flown.as_ref().filter(|flown| flown.usable);
+    if let Some((states, inputs_rad)) = moment.shifted_plan(previous)
+        && report.status != SolveStatus::NotLandable
+        && states.first().is_some_and(near)
     {
         return Decision {
             gimbal_rad: inputs_rad.first().copied().unwrap_or(0.0),

@@ -179,16 +179,33 @@ fn the_bound_is_no_obstacle_where_a_landing_exists() {
 #[test]
 fn the_floor_holds_where_the_cost_alone_would_dive() {
     let mut profile = paper_profile();
-    let low = PlanarState { z_m: 0.6, u_m_s: -1.1, ..nominal_start() };
+    let low = PlanarState {
+        z_m: 0.6,
+        u_m_s: -1.1,
+        ..nominal_start()
+    };
     let solved = |profile: &Profile| solve(&Problem::from_profile(profile, low, 3.0, 20, 1.0), None);
-    let lowest = |solution: &Solution| solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m));
+    let lowest = |solution: &Solution| {
+        solution
+            .states
+            .iter()
+            .fold(f64::INFINITY, |z, state| z.min(state.z_m))
+    };
     let free = solved(&profile);
     profile.nmpc.limits.altitude_min_m = Some(0.0);
     let floored = solved(&profile);
-    assert_eq!((free.status, floored.status), (SolveStatus::Converged, SolveStatus::Converged));
+    assert_eq!(
+        (free.status, floored.status),
+        (SolveStatus::Converged, SolveStatus::Converged)
+    );
     assert!(lowest(&free) < -0.02, "{}", lowest(&free));
     assert!(lowest(&floored) > -1e-6, "{}", lowest(&floored));
-    assert!(floored.floor_multipliers.iter().any(|multiplier| *multiplier > 0.0));
+    assert!(
+        floored
+            .floor_multipliers
+            .iter()
+            .any(|multiplier| *multiplier > 0.0)
+    );
     assert!(floored.cost > free.cost);
 }
 
@@ -197,7 +214,10 @@ fn the_floor_holds_where_the_cost_alone_would_dive() {
 fn the_paper_optimum_dips_underground_and_the_flown_plan_does_not() {
     let lowest = |profile: &Profile| {
         let solution = solve(&from_ignition(profile, nominal_start()), None);
-        solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m))
+        solution
+            .states
+            .iter()
+            .fold(f64::INFINITY, |z, state| z.min(state.z_m))
     };
     assert!(lowest(&paper_profile()) < -0.005);
     assert!(lowest(&Profile::builtin("paper-calibrated").unwrap()) > -1e-6);

@@ -1,0 +1,199 @@
+//! Commands, texts and link figures, on a simulated clock.
+
+use std::time::Duration;
+
+use proptest::prelude::*;
+use protocol::command::{CommandAnswer, CommandEvent, CommandRequest, CommandSender, Resend};
+use protocol::dialect::{HEARTBEAT_DATA, MavCmd, MavMessage, MavResult, MavSeverity};
+use protocol::frame::{Encoder, Frame};
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::link::LinkStats;
+use protocol::text::{Reassembler, chunks, printable};
+
+const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+
+fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+fn answer(command: MavCmd, result: MavResult) -> CommandAnswer {
+    CommandAnswer { command: command as u16, result: result as u8, progress: 0, target: GROUND }
+}
+
+/// Sends for `seconds` without an answer; returns when something was sent.
+fn unanswered(resend: Resend, seconds: u64) -> (Vec<u64>, Vec<CommandEvent>) {
+    let mut sender = CommandSender::new();
+    sender.submit(VEHICLE, ARM, [1.0; 7], resend, ms(0));
+    let times = (0..seconds * 100).map(|tick| tick * 10).filter(|now| !sender.poll(ms(*now)).is_empty());
+    (times.collect(), sender.take_events())
+}
+
+#[test]
+fn an_arm_is_sent_once_and_given_up() {
+    let (times, events) = unanswered(Resend::Never, 5);
+    assert_eq!(times, [0]);
+    assert_eq!(events.last(), Some(&CommandEvent::TimedOut { command: 400, attempts: 1 }));
+}
+
+#[test]
+fn an_ordinary_command_is_sent_again_three_times_half_a_second_apart() {
+    let (times, events) = unanswered(Resend::Times(3), 5);
+    assert_eq!(times, [0, 500, 1000, 1500]);
+    assert_eq!(events.last(), Some(&CommandEvent::TimedOut { command: 400, attempts: 4 }));
+}
+
+#[test]
+fn an_abort_is_sent_until_it_is_answered() {
+    let mut sender = CommandSender::new();
+    sender.submit(VEHICLE, ABORT, [1.0; 7], Resend::UntilAnswered, ms(0));
+    let mut confirmations = Vec::new();
+    for now in (0..200_000).step_by(100) {
+        for message in sender.poll(ms(now)) {
+            let MavMessage::COMMAND_LONG(command) = message else { panic!("{message:?}") };
+            confirmations.push(command.confirmation);
+        }
+    }
+    assert_eq!(confirmations.len(), 400);
+    assert_eq!(&confirmations[..3], &[0, 1, 2]);
+    assert_eq!(confirmations.last(), Some(&255), "the count of resends saturates");
+    assert!(sender.is_pending(ABORT));
+    // An answer to something else does not end it.
+    sender.on_answer(&answer(ARM, MavResult::MAV_RESULT_ACCEPTED), ms(200_000));
+    assert!(sender.is_pending(ABORT));
+    sender.on_answer(&answer(ABORT, MavResult::MAV_RESULT_ACCEPTED), ms(200_000));
+    assert!(!sender.is_pending(ABORT));
+    assert!(sender.poll(ms(300_000)).is_empty());
+}
+
+#[test]
+fn a_command_in_progress_gets_three_more_seconds_and_no_resend() {
+    let mut sender = CommandSender::new();
+    sender.submit(VEHICLE, ARM, [0.0; 7], Resend::Times(3), ms(0));
+    assert_eq!(sender.poll(ms(0)).len(), 1);
+    sender.on_answer(&answer(ARM, MavResult::MAV_RESULT_IN_PROGRESS), ms(100));
+    assert!(sender.poll(ms(3_000)).is_empty());
+    assert!(sender.is_pending(ARM));
+    assert!(sender.poll(ms(3_200)).is_empty());
+    assert!(matches!(sender.take_events().last(), Some(CommandEvent::TimedOut { .. })));
+}
+
+#[test]
+fn requests_and_answers_survive_the_wire() {
+    let mut encoder = Encoder::new(VEHICLE);
+    let request = CommandRequest {
+        source: GROUND,
+        target: VEHICLE,
+        command: 65_000,
+        params: [0.0; 7],
+        confirmation: 0,
+    };
+    let frame = CommandAnswer::to(&request, MavResult::MAV_RESULT_UNSUPPORTED).encode(&mut encoder).unwrap();
+    assert!(frame.decode().is_err(), "the dialect does not know 65000");
+    let read = CommandAnswer::from_frame(&frame).unwrap();
+    assert_eq!((read.command, read.target, read.result_words()), (65_000, GROUND, "unsupported"));
+}
+
+#[test]
+fn addresses_take_their_own_ids_and_the_broadcast() {
+    let of = |system_id, component_id| Address { system_id, component_id };
+    for target in [of(0, 0), of(1, 0), of(0, 1), of(1, 1)] {
+        assert!(VEHICLE.accepts(target), "{target:?}");
+    }
+    for target in [of(2, 1), of(1, 2), of(255, 0)] {
+        assert!(!VEHICLE.accepts(target), "{target:?}");
+    }
+}
+
+#[test]
+fn a_missing_chunk_is_marked_after_its_time() {
+    let text = "a".repeat(50) + &"b".repeat(50) + &"c".repeat(20);
+    let parts = chunks(MavSeverity::MAV_SEVERITY_WARNING, &text, 7);
+    assert_eq!(parts.len(), 3);
+    let mut reassembler = Reassembler::new();
+    assert!(reassembler.push(VEHICLE, &parts[2], ms(0)).is_empty());
+    assert!(reassembler.push(VEHICLE, &parts[0], ms(10)).is_empty());
+    assert!(reassembler.expire(ms(1_900)).is_empty());
+    let late = reassembler.expire(ms(2_100));
+    assert_eq!(late[0].text, "a".repeat(50) + "[...]" + &"c".repeat(20));
+    assert_eq!(late[0].severity, 4);
+}
+
+#[test]
+fn a_flood_of_unfinished_texts_stays_bounded() {
+    let mut reassembler = Reassembler::new();
+    let mut shown = 0;
+    for id in 1..=1_000 {
+        let parts = chunks(MavSeverity::MAV_SEVERITY_INFO, &"x".repeat(120), id);
+        shown += reassembler.push(VEHICLE, &parts[0], ms(u64::from(id))).len();
+    }
+    assert_eq!(shown, 1_000 - Reassembler::MAX_PARTIAL);
+}
+
+#[test]
+fn a_terminal_cannot_be_commanded_over_the_radio() {
+    let hostile = b"ok\x1b[2J\x07\r\n\x9b1mred \xff\xfe \xe2\x80\xae evil";
+    let shown = printable(hostile);
+    assert!(shown.starts_with("ok"));
+    assert!(shown.chars().all(|c| !c.is_control() && c != '\u{202e}'), "{shown:?}");
+}
+
+fn heartbeats(encoder: &mut Encoder, count: usize) -> Vec<Frame> {
+    (0..count).map(|_| encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()))).collect()
+}
+
+#[test]
+fn loss_and_rate_are_those_of_the_last_ten_seconds() {
+    let mut stats = LinkStats::new();
+    let mut encoder = Encoder::new(VEHICLE);
+    // Ten frames a second for 30 s; every fifth is lost during the last ten.
+    for (k, frame) in heartbeats(&mut encoder, 300).iter().enumerate() {
+        let now = ms(100 * k as u64);
+        if k < 200 || k % 5 != 0 {
+            stats.on_rx_bytes(frame.as_bytes().len(), now);
+            stats.on_frame(frame, now);
+        }
+    }
+    let figures = stats.figures(ms(29_900));
+    assert!((figures.loss - 0.2).abs() < 0.01, "{figures:?}");
+    assert!((figures.rx_frames_s - 8.0).abs() < 0.5, "{figures:?}");
+    assert_eq!(stats.age(VEHICLE, ms(30_900)), Some(ms(1_000)));
+    assert_eq!(stats.age(GROUND, ms(30_900)), None);
+    let silent = stats.figures(ms(60_000));
+    assert!(silent.rx_bytes_s.abs() < f64::EPSILON && silent.loss.abs() < f64::EPSILON);
+}
+
+#[test]
+fn a_restarted_sender_is_not_taken_for_loss() {
+    let mut stats = LinkStats::new();
+    for frame in heartbeats(&mut Encoder::new(VEHICLE), 200) {
+        stats.on_frame(&frame, ms(0));
+    }
+    // From 199 back to 0 is a jump of 56 forwards: below half the range it counts as loss, above it does not.
+    for frame in heartbeats(&mut Encoder::new(VEHICLE), 60) {
+        stats.on_frame(&frame, ms(1_000));
+    }
+    assert!(stats.figures(ms(1_000)).loss < 0.2);
+}
+
+proptest! {
+    #[test]
+    fn any_text_survives_its_chunks_in_any_order(
+        text in "[ -~äßλ]{0,130}",
+        id in 1u16..,
+        order in any::<prop::sample::Index>(),
+    ) {
+        let mut parts = chunks(MavSeverity::MAV_SEVERITY_NOTICE, &text, id);
+        let turn = order.index(parts.len());
+        parts.rotate_left(turn);
+        let mut reassembler = Reassembler::new();
+        let shown: Vec<_> = parts.iter().flat_map(|part| reassembler.push(VEHICLE, part, ms(0))).collect();
+        prop_assert_eq!(shown.len(), 1);
+        prop_assert_eq!(&shown[0].text, &text);
+    }
+
+    #[test]
+    fn whatever_arrives_becomes_printable(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(printable(&bytes).chars().all(|c| !c.is_control()));
+    }
+}

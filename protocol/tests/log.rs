@@ -1,0 +1,179 @@
+//! Logs: what goes in comes out, and what a killed recorder leaves can be read.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use proptest::prelude::*;
+use prost::Message as _;
+use protocol::log::reader::{Damage, LogItem, LogReader};
+use protocol::log::record::{
+    Direction, Event, EventLevel, RawFrame, Record, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH,
+    TOPIC_RAW_RX,
+};
+use protocol::log::recorder::{Recorder, RecorderError};
+use protocol::log::v1;
+use protocol::log::writer::{LogHeader, LogWriter};
+
+fn header() -> LogHeader {
+    LogHeader {
+        writer: "test".to_owned(),
+        start_unix_ns: 1_700_000_000_000_000_000,
+        run: BTreeMap::from([("seed".to_owned(), "7".to_owned())]),
+        profile_toml: Some("name = \"x\"".to_owned()),
+    }
+}
+
+fn operator(k: u64) -> Record {
+    Record::OperatorAction(v1::OperatorAction {
+        time_s: k as f64,
+        kind: "key".to_owned(),
+        detail: format!("{k}"),
+    })
+}
+
+fn written(records: &[Record]) -> Vec<u8> {
+    let mut writer = LogWriter::new(Cursor::new(Vec::new()), &header()).unwrap();
+    for (k, record) in records.iter().enumerate() {
+        writer.write(record, k as u64 * 1_000_000).unwrap();
+        if k % 10 == 9 {
+            writer.flush().unwrap();
+        }
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+struct Contents {
+    messages: Vec<(String, Vec<u8>)>,
+    metadata: Vec<String>,
+    attachments: Vec<String>,
+    damage: Option<Damage>,
+}
+
+fn read(bytes: &[u8]) -> Contents {
+    let mut reader = LogReader::new(bytes);
+    let mut contents =
+        Contents { messages: Vec::new(), metadata: Vec::new(), attachments: Vec::new(), damage: None };
+    while let Some(item) = reader.next_item().unwrap() {
+        match item {
+            LogItem::Message { channel_id, data, .. } => {
+                contents.messages.push((reader.channel(channel_id).unwrap().topic.clone(), data));
+            }
+            LogItem::Metadata { name, .. } => contents.metadata.push(name),
+            LogItem::Attachment { name, .. } => contents.attachments.push(name),
+            LogItem::Library(_) | LogItem::DataEnd => {}
+        }
+    }
+    contents.damage = reader.damage().cloned();
+    contents
+}
+
+#[test]
+fn a_whole_log_is_read_as_written() {
+    let frame = RawFrame {
+        direction: Direction::Rx,
+        endpoint: "ground",
+        link: "udpin:x:1".to_owned(),
+        bytes: vec![0xFD, 1, 2],
+    };
+    let event = Event { level: EventLevel::Fatal, name: "vehicle".to_owned(), message: "abort".to_owned() };
+    let truth = v1::PlantTruth { fin_actual_rad: vec![0.5; 4], ..v1::PlantTruth::default() };
+    let bytes = written(&[
+        operator(1),
+        Record::RawFrame(frame),
+        Record::Event(event),
+        Record::PlantTruth(Box::new(truth.clone())),
+    ]);
+    let contents = read(&bytes);
+    assert_eq!(contents.damage, None);
+    assert_eq!(contents.metadata, ["build", "run"]);
+    assert_eq!(contents.attachments, ["profile.toml", "touchdown.xml"]);
+    let topics: Vec<_> = contents.messages.iter().map(|(topic, _)| topic.as_str()).collect();
+    assert_eq!(topics, [TOPIC_OPERATOR, TOPIC_RAW_RX, TOPIC_EVENTS, TOPIC_PLANT_TRUTH, "/tf"]);
+    assert_eq!(contents.messages[1].1, [0xFD, 1, 2]);
+    assert_eq!(v1::PlantTruth::decode(contents.messages[3].1.as_slice()).unwrap(), truth);
+}
+
+/// The encoder may drop a field that equals its default, and -0.0 equals 0.0: the schema must not let it.
+#[test]
+fn both_zeros_and_every_nan_survive() {
+    for bits in
+        [0.0f64.to_bits(), (-0.0f64).to_bits(), f64::NAN.to_bits(), 0x7FF0_0000_0000_0001, u64::MAX, 1]
+    {
+        let state = v1::PlanarState { u_m_s: f64::from_bits(bits), ..v1::PlanarState::default() };
+        let plan = v1::Plan { gimbal_rad: vec![f64::from_bits(bits)], ..v1::Plan::default() };
+        let state = v1::PlanarState::decode(state.encode_to_vec().as_slice()).unwrap();
+        let plan = v1::Plan::decode(plan.encode_to_vec().as_slice()).unwrap();
+        assert_eq!(state.u_m_s.to_bits(), bits);
+        assert_eq!(plan.gimbal_rad[0].to_bits(), bits);
+    }
+}
+
+#[test]
+fn every_cut_leaves_what_was_flushed_before_it() {
+    let records: Vec<_> = (0..100).map(operator).collect();
+    let bytes = written(&records);
+    let whole: Vec<_> = read(&bytes).messages;
+    let mut most = 0;
+    for cut in 0..bytes.len() {
+        let contents = read(&bytes[..cut]);
+        assert_eq!(contents.messages[..], whole[..contents.messages.len()], "cut at {cut}");
+        assert!(contents.messages.len() >= most, "more bytes never give less");
+        most = contents.messages.len();
+        if cut < 8 {
+            assert_eq!(contents.damage, Some(Damage::NotMcap), "cut at {cut}");
+        }
+        if most < 100 {
+            assert!(contents.damage.is_some(), "cut at {cut}");
+        }
+    }
+    assert_eq!(most, 100);
+}
+
+#[test]
+fn foreign_files_are_called_so() {
+    for foreign in [&b""[..], b"\x89PNG\r\n\x1a\n and more", b"time,altitude\n0,15\n"] {
+        let contents = read(foreign);
+        assert_eq!(contents.damage, Some(Damage::NotMcap));
+        assert!(contents.messages.is_empty());
+    }
+}
+
+#[test]
+fn a_recorder_never_overwrites_and_ends_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flight.mcap");
+    let recorder = Recorder::create(&path, &header()).unwrap();
+    for k in 0..20_000 {
+        recorder.record(operator(k), k);
+    }
+    assert!(matches!(Recorder::create(&path, &header()), Err(RecorderError::Create { .. })));
+    assert_eq!(recorder.finish().unwrap(), path);
+    recorder.finish().unwrap();
+    assert_eq!(recorder.dropped(), 0);
+    recorder.try_record(operator(0), 0);
+    assert_eq!(recorder.dropped(), 1, "what comes after the end is counted");
+    let contents = read(&std::fs::read(&path).unwrap());
+    assert_eq!((contents.messages.len(), contents.damage), (20_000, None));
+}
+
+proptest! {
+    #[test]
+    fn random_bytes_are_never_more_than_damage(bytes in prop::collection::vec(any::<u8>(), 0..400), magic: bool) {
+        let mut file = if magic { mcap::MAGIC.to_vec() } else { Vec::new() };
+        file.extend(bytes);
+        prop_assert!(read(&file).damage.is_some());
+    }
+
+    /// One flipped bit costs a chunk or the rest, never a wrong message: a checksum stands before each.
+    #[test]
+    fn a_flipped_bit_never_changes_a_message(at in any::<prop::sample::Index>(), bit in 0u32..8) {
+        let records: Vec<_> = (0..30).map(operator).collect();
+        let mut bytes = written(&records);
+        let whole: Vec<_> = read(&bytes).messages.into_iter().map(|(_, data)| data).collect();
+        let place = at.index(bytes.len());
+        bytes[place] ^= 1u8 << bit;
+        for (_, data) in read(&bytes).messages {
+            prop_assert!(whole.contains(&data));
+        }
+    }
+}
