@@ -44,45 +44,20 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
     vec![
-        Check::condition(
-            "abort latch",
-            !input.abort_latched,
-            "clear",
-            "latched: restart to clear it",
-        ),
+        Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
         Check::condition("pin", input.pin_out, "out", "in"),
         Check::condition("self-test", input.self_test_passed, "passed", "not passed"),
-        Check::at_most(
-            "tilt from vertical",
-            input.tilt_rad.to_degrees(),
-            limits.tilt_max_deg,
-            "deg",
-        ),
-        Check::at_most(
-            "rotation",
-            input.rotation_rad_s.to_degrees(),
-            limits.rotation_max_deg_s,
-            "deg/s",
-        ),
+        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
+        Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
         Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
-        Check::condition(
-            "estimator",
-            input.estimator_converged,
-            "converged",
-            "not converged",
-        ),
+        Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
         Check {
             name: "fins answering",
             passed: answering == input.fins_answering.len(),
             found: format!("{answering} of 4"),
             required: "4 of 4".to_owned(),
         },
-        Check::condition(
-            "igniter continuity",
-            input.igniter_continuity,
-            "closed circuit",
-            "open circuit",
-        ),
+        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
         Check::condition("log", input.log_running, "running", "not running"),
         Check {
             name: "log space",
@@ -122,10 +97,7 @@ mod tests {
 
     fn ready() -> ArmingInput {
         let profile = Profile::builtin("paper-calibrated").unwrap();
-        let down = PlanarState {
-            theta_rad: core::f64::consts::FRAC_PI_2,
-            ..PlanarState::default()
-        };
+        let down = PlanarState { theta_rad: core::f64::consts::FRAC_PI_2, ..PlanarState::default() };
         ArmingInput {
             pin_out: true,
             abort_latched: false,
@@ -140,10 +112,7 @@ mod tests {
             log_space_bytes: 1 << 30,
             controller_warm: true,
             controller_found: "converged".to_owned(),
-            predicted_landing: Some(LandingVerdict::judge(
-                &TouchdownLimits::from_profile(&profile),
-                &down,
-            )),
+            predicted_landing: Some(LandingVerdict::judge(&TouchdownLimits::from_profile(&profile), &down)),
         }
     }
 
@@ -169,12 +138,9 @@ mod tests {
             ("self-test: found not passed", |input| {
                 input.self_test_passed = false;
             }),
-            (
-                "tilt from vertical: found 6.00 deg, required at most 5 deg",
-                |input| {
-                    input.tilt_rad = 6.0_f64.to_radians();
-                },
-            ),
+            ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
+                input.tilt_rad = 6.0_f64.to_radians();
+            }),
             ("tilt from vertical: found NaN deg", |input| {
                 input.tilt_rad = f64::NAN;
             }),
@@ -210,11 +176,7 @@ mod tests {
             let mut input = ready();
             spoil(&mut input);
             let checks = arming_checks(&ArmingLimits::default(), &input);
-            assert_eq!(
-                checks.iter().filter(|check| !check.passed).count(),
-                1,
-                "{expected}"
-            );
+            assert_eq!(checks.iter().filter(|check| !check.passed).count(), 1, "{expected}");
             let refusal = first_refusal(&checks).unwrap();
             assert!(refusal.starts_with(expected), "{refusal}");
         }

@@ -17,12 +17,7 @@ impl Check {
     /// A check of a yes-or-no condition, in the words for each.
     pub(crate) fn condition(name: &'static str, passed: bool, yes: &str, no: &str) -> Self {
         let found = if passed { yes } else { no };
-        Self {
-            name,
-            passed,
-            found: found.to_owned(),
-            required: yes.to_owned(),
-        }
+        Self { name, passed, found: found.to_owned(), required: yes.to_owned() }
     }
 
     /// A check of a magnitude against a limit. A value that is not a number fails.

@@ -48,24 +48,14 @@ pub fn gate_checks(limits: &GateLimits, input: &GateInput) -> Vec<Check> {
             found: format!("{:.2} m/s", input.vertical_speed_m_s),
             required: "below 0 m/s".to_owned(),
         },
-        Check::at_most(
-            "tilt from vertical",
-            input.tilt_rad.to_degrees(),
-            limits.tilt_max_deg,
-            "deg",
-        ),
+        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
         Check::at_most(
             "pitch rate",
             input.pitch_rate_rad_s.to_degrees(),
             limits.pitch_rate_max_deg_s,
             "deg/s",
         ),
-        Check::at_most(
-            "speed error",
-            speed_error_percent,
-            100.0 * limits.speed_error_max_fraction,
-            "%",
-        ),
+        Check::at_most("speed error", speed_error_percent, 100.0 * limits.speed_error_max_fraction, "%"),
         Check::at_most(
             "height disagreement",
             input.height_disagreement_m,
@@ -78,20 +68,10 @@ pub fn gate_checks(limits: &GateLimits, input: &GateInput) -> Vec<Check> {
             "feasible from here",
             "not feasible from here",
         ),
-        Check::at_most(
-            "predicted touchdown",
-            input.predicted_touchdown_x_m,
-            limits.fence_radius_m,
-            "m",
-        ),
+        Check::at_most("predicted touchdown", input.predicted_touchdown_x_m, limits.fence_radius_m, "m"),
         Check::condition("fins", input.fins_confirmed, "confirmed", "not confirmed"),
         Check::condition("parachute", input.parachute_stowed, "stowed", "not stowed"),
-        Check::condition(
-            "igniter continuity",
-            input.igniter_continuity,
-            "closed circuit",
-            "open circuit",
-        ),
+        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
         Check::condition("estimator", input.estimator_healthy, "healthy", "not healthy"),
     ]
 }

@@ -84,11 +84,7 @@ mod tests {
         let model = PlanarModel::from_profile(&profile);
         let pole = libm::exp(-0.4);
         let error = 0.01;
-        let mut state = PlanarState {
-            theta_rad: FRAC_PI_2 + error,
-            z_m: 15.0,
-            ..PlanarState::default()
-        };
+        let mut state = PlanarState { theta_rad: FRAC_PI_2 + error, z_m: 15.0, ..PlanarState::default() };
         // x_k = (1 + a k) pole^k error for a double pole; a follows from the first step.
         let mut first = None;
         for k in 1..=20 {
@@ -96,10 +92,7 @@ mod tests {
             state = model.rk4_step(&state, gimbal_rad, 33.3, 0.1);
             let scaled = (state.theta_rad - FRAC_PI_2) / (error * libm::pow(pole, f64::from(k)));
             let slope = *first.get_or_insert(scaled - 1.0);
-            assert!(
-                (scaled - 1.0 - slope * f64::from(k)).abs() < 1e-9,
-                "{k}: {scaled}"
-            );
+            assert!((scaled - 1.0 - slope * f64::from(k)).abs() < 1e-9, "{k}: {scaled}");
         }
     }
 

@@ -80,19 +80,8 @@ impl LandingVerdict {
         Self {
             results: [
                 within("x", state.x_m, limits.x_m, "m"),
-                judged(
-                    "altitude",
-                    state.z_m,
-                    limits.altitude_min_m,
-                    limits.altitude_max_m,
-                    "m",
-                ),
-                within(
-                    "pitch error",
-                    pitch_error_deg,
-                    limits.pitch_error_rad.to_degrees(),
-                    "deg",
-                ),
+                judged("altitude", state.z_m, limits.altitude_min_m, limits.altitude_max_m, "m"),
+                within("pitch error", pitch_error_deg, limits.pitch_error_rad.to_degrees(), "deg"),
                 within("u", state.u_m_s, limits.u_m_s, "m/s"),
                 within("w", state.w_m_s, limits.w_m_s, "m/s"),
                 within(
@@ -126,11 +115,7 @@ impl LandingVerdict {
                 )
             })
             .collect();
-        if broken.is_empty() {
-            "inside every limit".to_owned()
-        } else {
-            broken.join(", ")
-        }
+        if broken.is_empty() { "inside every limit".to_owned() } else { broken.join(", ") }
     }
 }
 
@@ -143,10 +128,7 @@ mod tests {
     }
 
     fn upright() -> PlanarState {
-        PlanarState {
-            theta_rad: FRAC_PI_2,
-            ..PlanarState::default()
-        }
+        PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() }
     }
 
     /// Tables 3 to 6 of the landing paper under its own Table 2: 3 of the 7 distinct start states land.
@@ -179,62 +161,14 @@ mod tests {
     #[test]
     fn each_limit_fails_alone() {
         let states = [
-            (
-                "x",
-                PlanarState {
-                    x_m: -20.1,
-                    ..upright()
-                },
-            ),
-            (
-                "altitude",
-                PlanarState {
-                    z_m: 0.21,
-                    ..upright()
-                },
-            ),
-            (
-                "altitude",
-                PlanarState {
-                    z_m: -0.006,
-                    ..upright()
-                },
-            ),
-            (
-                "pitch error",
-                PlanarState {
-                    theta_rad: FRAC_PI_2 - 0.1,
-                    ..upright()
-                },
-            ),
-            (
-                "u",
-                PlanarState {
-                    u_m_s: -0.41,
-                    ..upright()
-                },
-            ),
-            (
-                "w",
-                PlanarState {
-                    w_m_s: 0.11,
-                    ..upright()
-                },
-            ),
-            (
-                "pitch rate",
-                PlanarState {
-                    q_rad_s: 0.036,
-                    ..upright()
-                },
-            ),
-            (
-                "u",
-                PlanarState {
-                    u_m_s: f64::NAN,
-                    ..upright()
-                },
-            ),
+            ("x", PlanarState { x_m: -20.1, ..upright() }),
+            ("altitude", PlanarState { z_m: 0.21, ..upright() }),
+            ("altitude", PlanarState { z_m: -0.006, ..upright() }),
+            ("pitch error", PlanarState { theta_rad: FRAC_PI_2 - 0.1, ..upright() }),
+            ("u", PlanarState { u_m_s: -0.41, ..upright() }),
+            ("w", PlanarState { w_m_s: 0.11, ..upright() }),
+            ("pitch rate", PlanarState { q_rad_s: 0.036, ..upright() }),
+            ("u", PlanarState { u_m_s: f64::NAN, ..upright() }),
         ];
         assert!(LandingVerdict::judge(&limits(), &upright()).landed());
         for (name, state) in states {

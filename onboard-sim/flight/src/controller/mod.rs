@@ -64,10 +64,7 @@ pub struct ControllerState {
 impl ControllerState {
     /// The state before the first tick.
     pub fn new(config: &ControllerConfig) -> Self {
-        Self {
-            config: config.clone(),
-            flown: None,
-        }
+        Self { config: config.clone(), flown: None }
     }
 
     /// The configuration.
@@ -83,21 +80,10 @@ impl ControllerState {
         let solution = &flown.solution;
         let states = solution.states.iter().flat_map(|state| state.to_array());
         let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers);
-        let numbers = solution
-            .inputs_rad
-            .iter()
-            .chain(multipliers)
-            .copied()
-            .chain(states);
-        let words = [
-            flown.first_interval as u64,
-            u64::from(flown.usable),
-            u64::from(solution.status.index()),
-        ];
-        words
-            .into_iter()
-            .chain(numbers.map(f64::to_bits))
-            .fold(FNV_OFFSET, fnv)
+        let numbers = solution.inputs_rad.iter().chain(multipliers).copied().chain(states);
+        let words =
+            [flown.first_interval as u64, u64::from(flown.usable), u64::from(solution.status.index())];
+        words.into_iter().chain(numbers.map(f64::to_bits)).fold(FNV_OFFSET, fnv)
     }
 }
 
@@ -105,9 +91,9 @@ impl ControllerState {
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 
 fn fnv(hash: u64, word: u64) -> u64 {
-    word.to_le_bytes().iter().fold(hash, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+    word.to_le_bytes()
+        .iter()
+        .fold(hash, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// A plan and where in the landing it begins.
@@ -239,10 +225,7 @@ impl SolverReport {
     pub fn summary(&self) -> String {
         match self.status {
             SolveStatus::NotLandable => {
-                format!(
-                    "not landable: best touchdown speed {:.1} m/s",
-                    self.best_touchdown_speed_m_s
-                )
+                format!("not landable: best touchdown speed {:.1} m/s", self.best_touchdown_speed_m_s)
             }
             SolveStatus::Converged if !self.landing_feasible => "converged, but misses the ground".to_owned(),
             status => status.name().to_owned(),
@@ -289,12 +272,7 @@ impl ControllerOutput {
         }
         // A rehearsed plan is not being flown.
         let flown = !matches!(self.level, ControlLevel::Idle | ControlLevel::Rehearsal);
-        self.plan
-            .used_gimbal_rad()
-            .get(missed)
-            .copied()
-            .filter(|_| flown)
-            .unwrap_or(0.0)
+        self.plan.used_gimbal_rad().get(missed).copied().filter(|_| flown).unwrap_or(0.0)
     }
 }
 

@@ -21,14 +21,8 @@ pub struct Plan {
 impl Plan {
     /// No plan.
     pub fn none() -> Self {
-        const REST: PlanarState = PlanarState {
-            x_m: 0.0,
-            z_m: 0.0,
-            theta_rad: 0.0,
-            u_m_s: 0.0,
-            w_m_s: 0.0,
-            q_rad_s: 0.0,
-        };
+        const REST: PlanarState =
+            PlanarState { x_m: 0.0, z_m: 0.0, theta_rad: 0.0, u_m_s: 0.0, w_m_s: 0.0, q_rad_s: 0.0 };
         Self {
             len: 0,
             starts_in_s: 0.0,
@@ -58,11 +52,7 @@ impl Plan {
 
     /// The states in use; empty without a plan.
     pub fn used_states(&self) -> &[PlanarState] {
-        if self.len == 0 {
-            &[]
-        } else {
-            self.states.get(..=self.len).unwrap_or_default()
-        }
+        if self.len == 0 { &[] } else { self.states.get(..=self.len).unwrap_or_default() }
     }
 
     /// The gimbal angles in use, rad.

@@ -88,11 +88,7 @@ fn rehearse(state: &mut ControllerState) -> Decision {
     let solution = solve(&problem, warm.as_ref());
     let decision = planned(config, &moment, &solution);
     state.flown = keep(&moment, solution);
-    Decision {
-        gimbal_rad: 0.0,
-        level: ControlLevel::Rehearsal,
-        ..decision
-    }
+    Decision { gimbal_rad: 0.0, level: ControlLevel::Rehearsal, ..decision }
 }
 
 /// Plans the rest of the landing and takes the plan's first input, or the best that is left.
@@ -102,10 +98,7 @@ fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
         return stabilise(state, input, &moment, SolverReport::NOT_RUN);
     }
     let Some(predicted) = predict(&state.config, input, &moment) else {
-        let report = SolverReport {
-            status: SolveStatus::BadInput,
-            ..SolverReport::NOT_RUN
-        };
+        let report = SolverReport { status: SolveStatus::BadInput, ..SolverReport::NOT_RUN };
         return fall_back(state, input, &moment, report);
     };
     if moment.intervals == 0 {
@@ -137,23 +130,11 @@ fn after_the_plan(
     moment: &Moment,
     predicted: PlanarState,
 ) -> Decision {
-    if state
-        .config
-        .profile
-        .motor
-        .mean_thrust_n(moment.starts_s, moment.sample_time_s)
-        > 0.0
-    {
+    if state.config.profile.motor.mean_thrust_n(moment.starts_s, moment.sample_time_s) > 0.0 {
         return stabilise(state, input, moment, SolverReport::NOT_RUN);
     }
-    let touchdown = PredictedTouchdown {
-        time_from_now_s: moment.sample_time_s,
-        state: predicted,
-    };
-    Decision {
-        touchdown,
-        ..Decision::idle()
-    }
+    let touchdown = PredictedTouchdown { time_from_now_s: moment.sample_time_s, state: predicted };
+    Decision { touchdown, ..Decision::idle() }
 }
 
 /// Where in the landing a tick is.
@@ -183,13 +164,7 @@ impl Moment {
     }
 
     fn problem(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64) -> Problem {
-        Problem::from_profile(
-            &config.profile,
-            predicted,
-            self.starts_s,
-            self.intervals,
-            thrust_scale,
-        )
+        Problem::from_profile(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale)
     }
 
     /// The flown plan shifted to this moment, if it reaches this far.
@@ -204,36 +179,21 @@ impl Moment {
     fn shifted_plan<'a>(&self, flown: Option<&'a FlownPlan>) -> Option<(&'a [PlanarState], &'a [f64])> {
         let flown = flown?;
         let elapsed = self.first_interval.checked_sub(flown.first_interval)?;
-        let inputs_rad = flown
-            .solution
-            .inputs_rad
-            .get(elapsed..)
-            .filter(|inputs| !inputs.is_empty())?;
+        let inputs_rad = flown.solution.inputs_rad.get(elapsed..).filter(|inputs| !inputs.is_empty())?;
         Some((flown.solution.states.get(elapsed..)?, inputs_rad))
     }
 }
 
 /// The state one sample ahead, under the angle the actuator holds; `None` unless everything is finite.
 fn predict(config: &ControllerConfig, input: &ControllerInput, moment: &Moment) -> Option<PlanarState> {
-    let inputs = [
-        input.gimbal_applied_rad,
-        input.thrust_scale,
-        input.time_since_ignition_s,
-    ];
+    let inputs = [input.gimbal_applied_rad, input.thrust_scale, input.time_since_ignition_s];
     if !(input.state.is_finite() && inputs.iter().all(|value| value.is_finite())) {
         return None;
     }
-    let nominal_n = config
-        .profile
-        .motor
-        .mean_thrust_n(input.time_since_ignition_s, moment.sample_time_s);
+    let nominal_n = config.profile.motor.mean_thrust_n(input.time_since_ignition_s, moment.sample_time_s);
     let thrust_n = input.thrust_scale * nominal_n;
-    let predicted = config.model.rk4_step(
-        &input.state,
-        input.gimbal_applied_rad,
-        thrust_n,
-        moment.sample_time_s,
-    );
+    let predicted =
+        config.model.rk4_step(&input.state, input.gimbal_applied_rad, thrust_n, moment.sample_time_s);
     predicted.is_finite().then_some(predicted)
 }
 
@@ -241,11 +201,7 @@ fn predict(config: &ControllerConfig, input: &ControllerInput, moment: &Moment) 
 fn planned(config: &ControllerConfig, moment: &Moment, solution: &Solution) -> Decision {
     let report = report_of(solution);
     let sample_time_s = config.sample_time_s();
-    let level = if report.converged() {
-        ControlLevel::Converged
-    } else {
-        ControlLevel::BestFeasible
-    };
+    let level = if report.converged() { ControlLevel::Converged } else { ControlLevel::BestFeasible };
     Decision {
         gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(0.0),
         level,
@@ -254,12 +210,7 @@ fn planned(config: &ControllerConfig, moment: &Moment, solution: &Solution) -> D
             time_from_now_s: (1 + moment.intervals) as f64 * sample_time_s,
             state: solution.states.last().copied().unwrap_or_default(),
         },
-        plan: Plan::through(
-            &solution.states,
-            &solution.inputs_rad,
-            sample_time_s,
-            sample_time_s,
-        ),
+        plan: Plan::through(&solution.states, &solution.inputs_rad, sample_time_s, sample_time_s),
     }
 }
 
@@ -279,11 +230,7 @@ fn report_of(solution: &Solution) -> SolverReport {
 fn keep(moment: &Moment, solution: Solution) -> Option<FlownPlan> {
     let usable = is_usable(&solution);
     let first_interval = moment.first_interval;
-    (!solution.inputs_rad.is_empty()).then_some(FlownPlan {
-        first_interval,
-        usable,
-        solution,
-    })
+    (!solution.inputs_rad.is_empty()).then_some(FlownPlan { first_interval, usable, solution })
 }
 
 fn is_usable(solution: &Solution) -> bool {
@@ -333,11 +280,7 @@ fn stabilise(
     moment: &Moment,
     report: SolverReport,
 ) -> Decision {
-    let upright = Decision {
-        level: ControlLevel::Stabiliser,
-        report,
-        ..Decision::idle()
-    };
+    let upright = Decision { level: ControlLevel::Stabiliser, report, ..Decision::idle() };
     let Some(predicted) = predict(&state.config, input, moment) else {
         return upright;
     };
@@ -348,10 +291,8 @@ fn stabilise(
     let mut inputs_rad = Vec::with_capacity(moment.intervals);
     let mut ahead = predicted;
     for k in 0..moment.intervals.max(1) {
-        let nominal_n = config
-            .profile
-            .motor
-            .mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
+        let nominal_n =
+            config.profile.motor.mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
         let thrust_n = input.thrust_scale * nominal_n;
         let gimbal_rad = config.stabiliser.gimbal(&ahead, thrust_n, limit_rad);
         inputs_rad.push(gimbal_rad);

@@ -26,13 +26,8 @@ impl PlanarModel {
         let [_, _, theta, u, w, q] = *state;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams {
-            mass_kg,
-            pitch_inertia_kg_m2,
-            thrust_arm_m,
-            drag_per_m,
-            gravity_m_s2,
-        } = self.params;
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+            self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let mut jacobian = [[0.0; 7]; 6];
         let sign = self.lateral_sign();
@@ -83,13 +78,8 @@ impl PlanarModel {
         let [wx, wz, _, wu, ww, wq] = *weights;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams {
-            mass_kg,
-            pitch_inertia_kg_m2,
-            thrust_arm_m,
-            drag_per_m,
-            gravity_m_s2,
-        } = self.params;
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+            self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let sign = self.lateral_sign();
         let mut hessian = [[0.0; 7]; 7];

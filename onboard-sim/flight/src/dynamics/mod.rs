@@ -43,26 +43,12 @@ pub struct PlanarState {
 impl PlanarState {
     /// The components in state order (x, z, theta, u, w, q), SI and radians.
     pub fn to_array(self) -> [f64; 6] {
-        [
-            self.x_m,
-            self.z_m,
-            self.theta_rad,
-            self.u_m_s,
-            self.w_m_s,
-            self.q_rad_s,
-        ]
+        [self.x_m, self.z_m, self.theta_rad, self.u_m_s, self.w_m_s, self.q_rad_s]
     }
 
     /// The state of components in state order (x, z, theta, u, w, q), SI and radians.
     pub fn from_array([x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s]: [f64; 6]) -> Self {
-        Self {
-            x_m,
-            z_m,
-            theta_rad,
-            u_m_s,
-            w_m_s,
-            q_rad_s,
-        }
+        Self { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s }
     }
 
     /// Whether every component is a finite number.
@@ -78,10 +64,7 @@ impl PlanarState {
     /// Velocity over the ground `(horizontal, up)`, m/s, in the consistent frame.
     pub fn ground_velocity_m_s(&self) -> (f64, f64) {
         let (sin, cos) = libm::sincos(self.theta_rad);
-        (
-            self.u_m_s * cos + self.w_m_s * sin,
-            self.u_m_s * sin - self.w_m_s * cos,
-        )
+        (self.u_m_s * cos + self.w_m_s * sin, self.u_m_s * sin - self.w_m_s * cos)
     }
 }
 
@@ -128,10 +111,7 @@ pub struct PlanarModel {
 impl PlanarModel {
     /// The model a profile's controller believes.
     pub fn from_profile(profile: &Profile) -> Self {
-        Self {
-            params: PlanarParams::from_profile(profile),
-            kind: profile.nmpc.model,
-        }
+        Self { params: PlanarParams::from_profile(profile), kind: profile.nmpc.model }
     }
 
     /// Time derivative of the state (x, z, theta, u, w, q), SI and radians.
@@ -139,27 +119,18 @@ impl PlanarModel {
         let [_, _, theta, u, w, q] = *state;
         let (sin_theta, cos_theta) = libm::sincos(theta);
         let (sin_delta, cos_delta) = libm::sincos(gimbal_rad);
-        let PlanarParams {
-            mass_kg,
-            pitch_inertia_kg_m2,
-            thrust_arm_m,
-            drag_per_m,
-            gravity_m_s2,
-        } = self.params;
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+            self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let speed = libm::sqrt(u * u + w * w);
         let (x_dot, z_dot, drag_m_s2) = match self.kind {
-            ModelKind::Consistent => (
-                u * cos_theta + w * sin_theta,
-                u * sin_theta - w * cos_theta,
-                -drag_per_m * speed * u,
-            ),
+            ModelKind::Consistent => {
+                (u * cos_theta + w * sin_theta, u * sin_theta - w * cos_theta, -drag_per_m * speed * u)
+            }
             // Eq. 22's rotation, and Eq. 18's drag, which is always towards the nose.
-            ModelKind::AsPrinted => (
-                u * cos_theta - w * sin_theta,
-                u * sin_theta + w * cos_theta,
-                drag_per_m * speed * speed,
-            ),
+            ModelKind::AsPrinted => {
+                (u * cos_theta - w * sin_theta, u * sin_theta + w * cos_theta, drag_per_m * speed * speed)
+            }
         };
         [
             x_dot,

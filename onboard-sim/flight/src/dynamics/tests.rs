@@ -8,24 +8,15 @@ const KINDS: [ModelKind; 2] = [ModelKind::Consistent, ModelKind::AsPrinted];
 
 fn model(kind: ModelKind) -> PlanarModel {
     let profile = Profile::builtin("paper-calibrated").unwrap();
-    PlanarModel {
-        kind,
-        ..PlanarModel::from_profile(&profile)
-    }
+    PlanarModel { kind, ..PlanarModel::from_profile(&profile) }
 }
 
 /// Energy gained over one second of coasting without drag, J/kg, from 30 deg off the vertical with sideways speed.
 fn coasting_energy_gain_j_kg(kind: ModelKind) -> f64 {
     let mut model = model(kind);
     model.params.drag_per_m = 0.0;
-    let mut state = PlanarState {
-        z_m: 15.0,
-        theta_rad: FRAC_PI_3,
-        u_m_s: -5.0,
-        w_m_s: 1.0,
-        q_rad_s: 0.3,
-        x_m: 0.0,
-    };
+    let mut state =
+        PlanarState { z_m: 15.0, theta_rad: FRAC_PI_3, u_m_s: -5.0, w_m_s: 1.0, q_rad_s: 0.3, x_m: 0.0 };
     let before = model.specific_energy_j_kg(&state);
     for _ in 0..1000 {
         state = model.rk4_step(&state, 0.1, 0.0, 1e-3);
@@ -50,16 +41,10 @@ fn val_energy_conservation_printed_model_breaks_it() {
 /// Tilted by phi, the printed set makes gravity act as g cos(2 phi) on the height instead of g.
 #[test]
 fn val_printed_model_halves_gravity_at_30_degrees() {
-    for (kind, expected) in [
-        (ModelKind::Consistent, -9.81),
-        (ModelKind::AsPrinted, -9.81 * 0.5),
-    ] {
+    for (kind, expected) in [(ModelKind::Consistent, -9.81), (ModelKind::AsPrinted, -9.81 * 0.5)] {
         let mut model = model(kind);
         model.params.drag_per_m = 0.0;
-        let rest = PlanarState {
-            theta_rad: FRAC_PI_2 - 30.0_f64.to_radians(),
-            ..PlanarState::default()
-        };
+        let rest = PlanarState { theta_rad: FRAC_PI_2 - 30.0_f64.to_radians(), ..PlanarState::default() };
         let step_s = 1e-3;
         let fallen = model.rk4_step(&rest, 0.0, 0.0, step_s);
         let acceleration = 2.0 * fallen.z_m / (step_s * step_s);
@@ -72,12 +57,7 @@ fn val_printed_model_halves_gravity_at_30_degrees() {
 fn val_closed_form_upright_burn() {
     let mut model = model(ModelKind::Consistent);
     model.params.drag_per_m = 0.0;
-    let mut state = PlanarState {
-        z_m: 15.0,
-        theta_rad: FRAC_PI_2,
-        u_m_s: -5.0,
-        ..PlanarState::default()
-    };
+    let mut state = PlanarState { z_m: 15.0, theta_rad: FRAC_PI_2, u_m_s: -5.0, ..PlanarState::default() };
     for _ in 0..20 {
         state = model.rk4_step(&state, 0.0, 30.0, 0.1);
     }
@@ -87,15 +67,7 @@ fn val_closed_form_upright_burn() {
 
 fn stage() -> impl Strategy<Value = ([f64; 6], f64)> {
     let range = |limit: f64| -limit..limit;
-    (
-        range(20.0),
-        0.0..20.0,
-        0.2..2.9,
-        range(8.0),
-        range(8.0),
-        range(3.0),
-        range(0.35),
-    )
+    (range(20.0), 0.0..20.0, 0.2..2.9, range(8.0), range(8.0), range(3.0), range(0.35))
         .prop_map(|(x, z, theta, u, w, q, delta)| ([x, z, theta, u, w, q], delta))
         .prop_filter("drag is not twice differentiable at rest", |(state, _)| {
             state[U_INDEX].abs() + state[W_INDEX].abs() > 0.1

@@ -41,11 +41,7 @@ impl Linearised {
         for interval in &intervals {
             for column in &mut columns {
                 *column = core::array::from_fn(|i| {
-                    interval.step[i]
-                        .iter()
-                        .zip(column.iter())
-                        .map(|(entry, value)| entry * value)
-                        .sum()
+                    interval.step[i].iter().zip(column.iter()).map(|(entry, value)| entry * value).sum()
                 });
             }
             columns.push(core::array::from_fn(|i| interval.step[i][INPUT_INDEX]));
@@ -54,27 +50,13 @@ impl Linearised {
 
         let mut rows = DMatrix::zeros(conditions.len(), count);
         for (index, condition) in conditions.iter().enumerate() {
-            for (j, column) in sensitivities
-                .get(condition.node)
-                .into_iter()
-                .flatten()
-                .enumerate()
-            {
+            for (j, column) in sensitivities.get(condition.node).into_iter().flatten().enumerate() {
                 rows[(index, j)] = condition.sign * column[condition.component];
             }
         }
-        let values = conditions
-            .iter()
-            .map(|row| row.value(&trajectory.states))
-            .collect();
+        let values = conditions.iter().map(|row| row.value(&trajectory.states)).collect();
         let gradient = Self::pull_back(problem, &intervals, &[], &[], |_, _| ());
-        Self {
-            intervals,
-            sensitivities,
-            gradient,
-            values,
-            rows,
-        }
+        Self { intervals, sensitivities, gradient, values, rows }
     }
 
     /// Gradient by the inputs of the cost minus the conditions times their multipliers, in one backward pass;
@@ -131,46 +113,28 @@ impl Linearised {
         let count = self.intervals.len();
         let mut hessian = DMatrix::zeros(count, count);
         let mut curved: Vec<[f64; 6]> = Vec::with_capacity(count);
-        Self::pull_back(
-            problem,
-            &self.intervals,
-            conditions,
-            multipliers,
-            |k, backward| {
-                let stage = self.intervals[k].hessian(problem, backward);
-                let columns = &self.sensitivities[k];
-                curved.clear();
-                curved.extend(columns.iter().map(|column| -> [f64; 6] {
-                    core::array::from_fn(|i| {
-                        stage[i]
-                            .iter()
-                            .zip(column)
-                            .map(|(entry, value)| entry * value)
-                            .sum()
-                    })
-                }));
-                for (j, curved_column) in curved.iter().enumerate() {
-                    for (i, column) in columns.iter().enumerate().take(j + 1) {
-                        let term: f64 = column
-                            .iter()
-                            .zip(curved_column)
-                            .map(|(left, right)| left * right)
-                            .sum();
-                        hessian[(i, j)] += term;
-                    }
+        Self::pull_back(problem, &self.intervals, conditions, multipliers, |k, backward| {
+            let stage = self.intervals[k].hessian(problem, backward);
+            let columns = &self.sensitivities[k];
+            curved.clear();
+            curved.extend(columns.iter().map(|column| -> [f64; 6] {
+                core::array::from_fn(|i| {
+                    stage[i].iter().zip(column).map(|(entry, value)| entry * value).sum()
+                })
+            }));
+            for (j, curved_column) in curved.iter().enumerate() {
+                for (i, column) in columns.iter().enumerate().take(j + 1) {
+                    let term: f64 = column.iter().zip(curved_column).map(|(left, right)| left * right).sum();
+                    hessian[(i, j)] += term;
                 }
-                let input_row = &stage[INPUT_INDEX];
-                for (j, column) in columns.iter().enumerate() {
-                    let term: f64 = input_row
-                        .iter()
-                        .zip(column)
-                        .map(|(left, right)| left * right)
-                        .sum();
-                    hessian[(j, k)] += term;
-                }
-                hessian[(k, k)] += input_row[INPUT_INDEX];
-            },
-        );
+            }
+            let input_row = &stage[INPUT_INDEX];
+            for (j, column) in columns.iter().enumerate() {
+                let term: f64 = input_row.iter().zip(column).map(|(left, right)| left * right).sum();
+                hessian[(j, k)] += term;
+            }
+            hessian[(k, k)] += input_row[INPUT_INDEX];
+        });
         hessian.fill_lower_triangle_with_upper_triangle();
         hessian
     }

@@ -31,11 +31,7 @@ impl Iterate {
     pub(super) fn of(problem: &Problem, conditions: &[Condition], inputs_rad: Vec<f64>) -> Self {
         let trajectory = Trajectory::of(problem, &inputs_rad);
         let merit = trajectory.merit(conditions, problem.solver.terminal_penalty);
-        Self {
-            inputs_rad,
-            trajectory,
-            merit,
-        }
+        Self { inputs_rad, trajectory, merit }
     }
 }
 
@@ -52,10 +48,7 @@ pub(super) fn line_search(
     let limit = problem.gimbal_limit_rad;
     let predicted = predicted_change(problem, conditions, linear, &step.step).min(0.0);
     let forgiven = MERIT_ROUNDING * reference.abs();
-    let largest = step
-        .step
-        .iter()
-        .fold(0.0_f64, |largest, component| largest.max(component.abs()));
+    let largest = step.step.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
     let mut fraction = 1.0;
     while fraction >= SHORTEST_STEP {
         let inputs_rad = current
@@ -98,13 +91,10 @@ fn corrected(
             multiplier < price && (conditions[*row].equality || multiplier > 0.0)
         })
         .collect();
-    let free: Vec<usize> = (0..candidate.inputs_rad.len())
-        .filter(|j| candidate.inputs_rad[*j].abs() < limit)
-        .collect();
+    let free: Vec<usize> =
+        (0..candidate.inputs_rad.len()).filter(|j| candidate.inputs_rad[*j].abs() < limit).collect();
     let rows = DMatrix::from_fn(held.len(), free.len(), |i, j| linear.rows[(held[i], free[j])]);
-    let missed = DVector::from_fn(held.len(), |i, _| {
-        conditions[held[i]].value(&candidate.trajectory.states)
-    });
+    let missed = DVector::from_fn(held.len(), |i, _| conditions[held[i]].value(&candidate.trajectory.states));
     let change = -rows.transpose() * Cholesky::new(&rows * rows.transpose())?.solve(&missed);
     let mut inputs_rad = candidate.inputs_rad.clone();
     for (j, change) in free.iter().zip(change.iter()) {
@@ -115,24 +105,14 @@ fn corrected(
 
 /// Change of the merit along a whole step, to first order in the cost and the conditions.
 fn predicted_change(problem: &Problem, conditions: &[Condition], linear: &Linearised, step: &[f64]) -> f64 {
-    let cost: f64 = linear
-        .gradient
-        .iter()
-        .zip(step)
-        .map(|(slope, component)| slope * component)
-        .sum();
+    let cost: f64 = linear.gradient.iter().zip(step).map(|(slope, component)| slope * component).sum();
     let broken: f64 = conditions
         .iter()
         .enumerate()
         .map(|(index, condition)| {
             let value = linear.values[index];
-            let moved: f64 = linear
-                .rows
-                .row(index)
-                .iter()
-                .zip(step)
-                .map(|(slope, component)| slope * component)
-                .sum();
+            let moved: f64 =
+                linear.rows.row(index).iter().zip(step).map(|(slope, component)| slope * component).sum();
             condition.violation(value + moved) - condition.violation(value)
         })
         .sum();

@@ -141,10 +141,7 @@ impl Solution {
 /// the problem has mirrored and multi-swing local minima, and the straight path between them is a saddle.
 pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
     if !problem.is_finite() {
-        return Solution {
-            status: SolveStatus::BadInput,
-            ..Solution::default()
-        };
+        return Solution { status: SolveStatus::BadInput, ..Solution::default() };
     }
     let best_touchdown_speed_m_s = best_touchdown_speed_m_s(problem);
     if best_touchdown_speed_m_s > problem.touchdown_speed_max_m_s {
@@ -167,13 +164,7 @@ fn cold(problem: &Problem) -> Solution {
     let amplitude_rad = problem.solver.guess_amplitude_rad;
     let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
         let inputs_rad = guess::bent(problem, amplitude_rad);
-        sqp::solve_from(
-            problem,
-            &WarmStart {
-                inputs_rad,
-                ..WarmStart::default()
-            },
-        )
+        sqp::solve_from(problem, &WarmStart { inputs_rad, ..WarmStart::default() })
     });
     let iterations = left.iterations + right.iterations;
     let qp_iterations = left.qp_iterations + right.qp_iterations;
@@ -182,11 +173,7 @@ fn cold(problem: &Problem) -> Solution {
         if priced.is_finite() { priced } else { f64::INFINITY }
     };
     let better = if price(&right) < price(&left) { right } else { left };
-    Solution {
-        iterations,
-        qp_iterations,
-        ..better
-    }
+    Solution { iterations, qp_iterations, ..better }
 }
 
 #[cfg(test)]

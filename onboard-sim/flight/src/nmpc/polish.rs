@@ -112,9 +112,7 @@ pub(super) fn polished(qp: &Qp<'_>, mut guess: ActiveSet) -> Option<QpSolution> 
 fn solved_on(qp: &Qp<'_>, set: &ActiveSet, round: u32) -> Option<QpSolution> {
     let count = qp.gradient.len();
     let free: Vec<usize> = (0..count).filter(|j| set.places[*j] == Place::Free).collect();
-    let held: Vec<usize> = (0..set.roles.len())
-        .filter(|row| set.roles[*row] == Role::Held)
-        .collect();
+    let held: Vec<usize> = (0..set.roles.len()).filter(|row| set.roles[*row] == Role::Held).collect();
     if free.len() < held.len() {
         return None;
     }
@@ -148,10 +146,7 @@ fn solved_on(qp: &Qp<'_>, set: &ActiveSet, round: u32) -> Option<QpSolution> {
     let range = transposed.rows(0, held.len()).transpose();
     let null = transposed.rows(held.len(), free.len() - held.len()).transpose();
     let diagonal = triangle.diagonal();
-    if diagonal
-        .iter()
-        .any(|entry| entry.abs() <= DEPENDENT * diagonal.amax())
-    {
+    if diagonal.iter().any(|entry| entry.abs() <= DEPENDENT * diagonal.amax()) {
         return None;
     }
     let along_range = triangle.tr_solve_upper_triangular(&-values)?;
@@ -170,11 +165,7 @@ fn solved_on(qp: &Qp<'_>, set: &ActiveSet, round: u32) -> Option<QpSolution> {
         step[*j] = *value;
     }
     let finite = step.iter().chain(&multipliers).all(|value| value.is_finite());
-    finite.then_some(QpSolution {
-        step,
-        multipliers,
-        iterations: round,
-    })
+    finite.then_some(QpSolution { step, multipliers, iterations: round })
 }
 
 /// Gradient of the subproblem's Lagrangian.

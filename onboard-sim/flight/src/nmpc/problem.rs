@@ -64,11 +64,7 @@ impl Condition {
 
     /// By how much a value breaks the condition.
     pub fn violation(&self, value: f64) -> f64 {
-        if self.equality {
-            value.abs()
-        } else {
-            (-value).max(0.0)
-        }
+        if self.equality { value.abs() } else { (-value).max(0.0) }
     }
 }
 
@@ -152,15 +148,9 @@ impl Problem {
             equality: false,
         };
         let between = |node, component, lowest, highest| {
-            [
-                at_least(node, component, lowest),
-                at_most(node, component, highest),
-            ]
+            [at_least(node, component, lowest), at_most(node, component, highest)]
         };
-        let mut conditions = vec![Condition {
-            equality: true,
-            ..at_least(end, Z, 0.0)
-        }];
+        let mut conditions = vec![Condition { equality: true, ..at_least(end, Z, 0.0) }];
         conditions.extend(between(end, X, -self.x_final_m, self.x_final_m));
         if let Some(limits) = self.final_box {
             let tilt = limits.pitch_error_deg.to_radians();
@@ -185,12 +175,8 @@ impl Problem {
     /// Running cost rate at a state and input.
     pub(super) fn cost_rate(&self, state: &[f64; 6], gimbal_rad: f64) -> f64 {
         let deviation = Self::deviation(state);
-        let state_part: f64 = self
-            .state_weights
-            .iter()
-            .zip(&deviation)
-            .map(|(weight, value)| weight * value * value)
-            .sum();
+        let state_part: f64 =
+            self.state_weights.iter().zip(&deviation).map(|(weight, value)| weight * value * value).sum();
         0.5 * (state_part + self.input_weight * gimbal_rad * gimbal_rad)
     }
 

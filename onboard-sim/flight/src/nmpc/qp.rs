@@ -23,13 +23,7 @@ pub(super) struct QpRow {
 impl QpRow {
     /// The linearised condition after a step.
     pub(super) fn after(&self, step: &[f64]) -> f64 {
-        self.value
-            + self
-                .gradient
-                .iter()
-                .zip(step)
-                .map(|(slope, component)| slope * component)
-                .sum::<f64>()
+        self.value + self.gradient.iter().zip(step).map(|(slope, component)| slope * component).sum::<f64>()
     }
 }
 
@@ -62,15 +56,8 @@ impl Qp<'_> {
         let elastics: usize = self.rows.iter().map(|row| if row.equality { 2 } else { 1 }).sum();
         let mut linear: Vec<f64> = self.gradient.iter().copied().collect();
         linear.extend(core::iter::repeat_n(self.price, elastics));
-        let mut solver = DefaultSolver::new(
-            &self.quadratic(elastics),
-            &linear,
-            &a,
-            &b,
-            &cones,
-            self.settings(),
-        )
-        .ok()?;
+        let mut solver =
+            DefaultSolver::new(&self.quadratic(elastics), &linear, &a, &b, &cones, self.settings()).ok()?;
         solver.solve();
         let solution = &solver.solution;
         let usable = matches!(
@@ -84,11 +71,7 @@ impl Qp<'_> {
         let step: Vec<f64> = solution.x.iter().take(count).copied().collect();
         let multipliers = self.multipliers(&solution.z);
         let finite = step.iter().chain(&multipliers).all(|value| value.is_finite());
-        (usable && finite).then_some(QpSolution {
-            step,
-            multipliers,
-            iterations: solution.iterations,
-        })
+        (usable && finite).then_some(QpSolution { step, multipliers, iterations: solution.iterations })
     }
 
     fn settings(&self) -> DefaultSettings<f64> {
@@ -149,16 +132,7 @@ impl Qp<'_> {
                 .rows
                 .iter()
                 .zip(&places)
-                .map(|(row, place)| {
-                    (
-                        *place,
-                        if row.equality {
-                            row.gradient[j]
-                        } else {
-                            -row.gradient[j]
-                        },
-                    )
-                })
+                .map(|(row, place)| (*place, if row.equality { row.gradient[j] } else { -row.gradient[j] }))
                 .collect();
             entries.sort_by_key(|(place, _)| *place);
             entries.push((first_bound + j, 1.0));
@@ -180,13 +154,7 @@ impl Qp<'_> {
                 sign += 1;
             }
         }
-        let a = CscMatrix::new(
-            first_sign + elastics,
-            count + elastics,
-            columns,
-            row_indices,
-            values,
-        );
+        let a = CscMatrix::new(first_sign + elastics, count + elastics, columns, row_indices, values);
         let cones = vec![
             SupportedConeT::ZeroConeT(equalities),
             SupportedConeT::NonnegativeConeT(first_sign + elastics - equalities),
@@ -201,11 +169,7 @@ impl Qp<'_> {
         self.rows
             .iter()
             .map(|row| {
-                let place = if row.equality {
-                    &mut equality
-                } else {
-                    &mut inequality
-                };
+                let place = if row.equality { &mut equality } else { &mut inequality };
                 *place += 1;
                 *place - 1
             })

@@ -59,19 +59,13 @@ impl Trajectory {
 
     /// Cost plus the price of every broken condition; infinite if the path is not finite.
     pub(super) fn merit(&self, conditions: &[Condition], price: f64) -> f64 {
-        let broken: f64 = conditions
-            .iter()
-            .map(|row| row.violation(row.value(&self.states)))
-            .sum();
+        let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
         let merit = self.cost + price * broken;
         if merit.is_finite() { merit } else { f64::INFINITY }
     }
 
     /// The largest violation of any condition, m.
     pub(super) fn worst_violation(&self, conditions: &[Condition]) -> f64 {
-        conditions
-            .iter()
-            .map(|row| row.violation(row.value(&self.states)))
-            .fold(0.0, f64::max)
+        conditions.iter().map(|row| row.violation(row.value(&self.states))).fold(0.0, f64::max)
     }
 }

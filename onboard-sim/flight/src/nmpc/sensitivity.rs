@@ -53,15 +53,7 @@ impl Interval {
                 add_scaled(&mut tangents[stage + 1], &slope, along_step * problem.step_s);
             }
         }
-        Self {
-            points,
-            gimbal_rad,
-            thrust_n,
-            jacobians,
-            tangents,
-            after,
-            step,
-        }
+        Self { points, gimbal_rad, thrust_n, jacobians, tangents, after, step }
     }
 
     /// Pulls the adjoint of the state after the interval, and the interval's own cost, back to its beginning.
@@ -82,11 +74,7 @@ impl Interval {
                 core::array::from_fn(|i| weight_s * after[i] + along_s * later_point_adjoint[i]);
             let jacobian = &self.jacobians[stage];
             let pulled = |column: usize| -> f64 {
-                slope_adjoint
-                    .iter()
-                    .zip(jacobian)
-                    .map(|(weight, row)| weight * row[column])
-                    .sum()
+                slope_adjoint.iter().zip(jacobian).map(|(weight, row)| weight * row[column]).sum()
             };
             let point_adjoint: [f64; 6] = core::array::from_fn(pulled);
             input_gradient += pulled(INPUT_INDEX);
@@ -96,11 +84,7 @@ impl Interval {
             slope_adjoints[stage] = slope_adjoint;
             later_point_adjoint = point_adjoint;
         }
-        Backward {
-            adjoint,
-            input_gradient,
-            slope_adjoints,
-        }
+        Backward { adjoint, input_gradient, slope_adjoints }
     }
 
     /// Second derivative, by the stage variables, of the interval's cost plus the adjoint times its step.
@@ -215,15 +199,7 @@ mod tests {
     }
 
     fn point() -> impl Strategy<Value = [f64; VARIABLES]> {
-        (
-            -20.0..20.0,
-            0.0..20.0,
-            0.5..2.6,
-            -6.0..-1.0,
-            -3.0..3.0,
-            -1.0..1.0,
-            -0.34..0.34,
-        )
+        (-20.0..20.0, 0.0..20.0, 0.5..2.6, -6.0..-1.0, -3.0..3.0, -1.0..1.0, -0.34..0.34)
             .prop_map(|(x, z, theta, u, w, q, delta)| [x, z, theta, u, w, q, delta])
     }
 

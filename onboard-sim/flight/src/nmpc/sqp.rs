@@ -31,13 +31,7 @@ pub(super) fn solve_from(problem: &Problem, warm: &WarmStart) -> Solution {
     let start = warm
         .inputs_rad
         .iter()
-        .map(|gimbal_rad| {
-            if gimbal_rad.is_finite() {
-                gimbal_rad.clamp(-limit, limit)
-            } else {
-                0.0
-            }
-        })
+        .map(|gimbal_rad| if gimbal_rad.is_finite() { gimbal_rad.clamp(-limit, limit) } else { 0.0 })
         .collect();
     let mut current = Iterate::of(problem, &conditions, start);
     let mut multipliers = fitted(&warm.end_multipliers, ends);
@@ -56,10 +50,7 @@ pub(super) fn solve_from(problem: &Problem, warm: &WarmStart) -> Solution {
         let tolerance = problem.solver.kkt_tolerance;
         let converged = residual.stationarity <= tolerance && residual.feasibility <= tolerance;
         if converged || best.as_ref().is_none_or(|(merit, _)| current.merit < *merit) {
-            best = Some((
-                current.merit,
-                solution_of(&conditions, ends, &current, &multipliers, residual),
-            ));
+            best = Some((current.merit, solution_of(&conditions, ends, &current, &multipliers, residual)));
         }
         if converged {
             break SolveStatus::Converged;
@@ -88,29 +79,15 @@ pub(super) fn solve_from(problem: &Problem, warm: &WarmStart) -> Solution {
         }
     };
     match best {
-        Some((_, best)) => Solution {
-            status,
-            iterations,
-            qp_iterations,
-            ..best
-        },
-        None => Solution {
-            status,
-            ..Solution::default()
-        },
+        Some((_, best)) => Solution { status, iterations, qp_iterations, ..best },
+        None => Solution { status, ..Solution::default() },
     }
 }
 
 /// Finite multipliers, as many as asked for.
 fn fitted(multipliers: &[f64], count: usize) -> Vec<f64> {
     (0..count)
-        .map(|row| {
-            multipliers
-                .get(row)
-                .copied()
-                .filter(|value| value.is_finite())
-                .unwrap_or(0.0)
-        })
+        .map(|row| multipliers.get(row).copied().filter(|value| value.is_finite()).unwrap_or(0.0))
         .collect()
 }
 
@@ -127,12 +104,7 @@ fn solution_of(
         kkt_stationarity: residual.stationarity,
         kkt_feasibility: residual.feasibility,
         condition_miss: iterate.trajectory.worst_violation(conditions),
-        states: iterate
-            .trajectory
-            .states
-            .iter()
-            .map(|state| PlanarState::from_array(*state))
-            .collect(),
+        states: iterate.trajectory.states.iter().map(|state| PlanarState::from_array(*state)).collect(),
         inputs_rad: iterate.inputs_rad.clone(),
         end_multipliers: end_multipliers.to_vec(),
         floor_multipliers: floor_multipliers.to_vec(),
@@ -153,31 +125,20 @@ fn residual(
         .lagrangian_gradient(multipliers)
         .iter()
         .zip(inputs_rad)
-        .map(|(slope, input)| {
-            if pushes_out(*slope, *input, limit) {
-                0.0
-            } else {
-                slope.abs()
-            }
-        })
+        .map(|(slope, input)| if pushes_out(*slope, *input, limit) { 0.0 } else { slope.abs() })
         .fold(0.0, f64::max);
     let price = problem.solver.terminal_penalty;
     let feasibility = conditions
         .iter()
         .zip(&linear.values)
         .zip(multipliers)
-        .map(
-            |((condition, value), multiplier)| match Role::of(condition.equality, *multiplier, price) {
-                Role::Held => value.abs(),
-                Role::Slack => (-value).max(0.0),
-                Role::Broken(sign) => (sign * value).max(0.0),
-            },
-        )
+        .map(|((condition, value), multiplier)| match Role::of(condition.equality, *multiplier, price) {
+            Role::Held => value.abs(),
+            Role::Slack => (-value).max(0.0),
+            Role::Broken(sign) => (sign * value).max(0.0),
+        })
         .fold(0.0, f64::max);
-    Residual {
-        stationarity,
-        feasibility,
-    }
+    Residual { stationarity, feasibility }
 }
 
 /// The Newton step and the multipliers after it, one a condition.
@@ -228,43 +189,30 @@ fn subproblem(
             true => Place::Lower,
         })
         .collect();
-    let roles = included
-        .iter()
-        .map(|row| Role::of(conditions[*row].equality, multipliers[*row], price))
-        .collect();
+    let roles =
+        included.iter().map(|row| Role::of(conditions[*row].equality, multipliers[*row], price)).collect();
     let guess = ActiveSet { places, roles };
     let solution = if let Some(solution) = polished(&newton, guess.clone()) {
         solution
     } else {
         let (hessian, gradient) = convexified(&exact, linear, conditions, multipliers, &pinned, price)?;
-        let convex = Qp {
-            hessian: &hessian,
-            gradient: &gradient,
-            ..newton
-        };
+        let convex = Qp { hessian: &hessian, gradient: &gradient, ..newton };
         if let Some(solution) = polished(&convex, guess) {
             solution
         } else {
             let rough = convex.solve()?;
             let iterations = rough.iterations;
             let shown = ActiveSet::of(&convex, &rough);
-            let polished = polished(&newton, shown.clone())
-                .or_else(|| polished(&convex, shown))
-                .unwrap_or(rough);
-            QpSolution {
-                iterations,
-                ..polished
-            }
+            let polished =
+                polished(&newton, shown.clone()).or_else(|| polished(&convex, shown)).unwrap_or(rough);
+            QpSolution { iterations, ..polished }
         }
     };
     let mut all = vec![0.0; conditions.len()];
     for (row, multiplier) in included.iter().zip(&solution.multipliers) {
         all[*row] = *multiplier;
     }
-    Some(QpSolution {
-        multipliers: all,
-        ..solution
-    })
+    Some(QpSolution { multipliers: all, ..solution })
 }
 
 /// Whether a slope only pushes an input against the limit it sits on.

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::condense::Linearised;
 use super::*;
 use crate::dynamics::ModelKind;
-use crate::profile::{FinalBox, Profile};
+use crate::profile::Profile;
 
 /// The landing problem as the landing paper poses it: nothing but end height, end distance and gimbal limit.
 fn paper_profile() -> Profile {
@@ -19,33 +19,27 @@ fn nominal_start() -> PlanarState {
 }
 
 fn pitched(deg: f64) -> PlanarState {
-    PlanarState {
-        theta_rad: deg.to_radians(),
-        ..nominal_start()
-    }
+    PlanarState { theta_rad: deg.to_radians(), ..nominal_start() }
 }
 
 fn sideways(w_m_s: f64) -> PlanarState {
-    PlanarState {
-        w_m_s,
-        ..nominal_start()
-    }
+    PlanarState { w_m_s, ..nominal_start() }
 }
 
 fn turning(deg_s: f64) -> PlanarState {
-    PlanarState {
-        q_rad_s: deg_s.to_radians(),
-        ..nominal_start()
-    }
+    PlanarState { q_rad_s: deg_s.to_radians(), ..nominal_start() }
 }
 
 fn from_ignition(profile: &Profile, start: PlanarState) -> Problem {
     Problem::from_profile(profile, start, 0.0, 50, 1.0)
 }
 
+/// A start's name, its state and its best known cost.
+type Case = (&'static str, fn() -> PlanarState, f64);
+
 /// The seven start states of the landing paper, section 3.3.2, and the best known cost from each: six solvers
 /// (IPOPT through `CasADi` and do-mpc, fatrop, acados with HPIPM and with DAQP, Clarabel) agree on them.
-const BEST_COSTS: [(&str, fn() -> PlanarState, f64); 7] = [
+const BEST_COSTS: [Case; 7] = [
     ("nominal", nominal_start, 8465.15),
     ("theta0 = 60 deg", || pitched(60.0), 8483.94),
     ("theta0 = 120 deg", || pitched(120.0), 8483.94),
@@ -66,24 +60,11 @@ fn val_solver_study_best_costs_of_the_seven_starts() {
             solution.cost, solution.iterations, solution.kkt_stationarity, solution.kkt_feasibility
         );
         assert_eq!(solution.status, SolveStatus::Converged, "{name}");
-        assert!(
-            (solution.cost - best_cost).abs() < 0.006,
-            "{name}: {}",
-            solution.cost
-        );
-        assert!(
-            solution.kkt_stationarity <= 1e-6 && solution.kkt_feasibility <= 1e-6,
-            "{name}"
-        );
+        assert!((solution.cost - best_cost).abs() < 0.006, "{name}: {}", solution.cost);
+        assert!(solution.kkt_stationarity <= 1e-6 && solution.kkt_feasibility <= 1e-6, "{name}");
         // The study's ends: |w| < 0.002 m/s, upright within 0.05 deg, u = 0.137 to 0.157 m/s, |x| <= 1.2 m.
-        assert!(
-            end.w_m_s.abs() < 0.002 && (0.1365..0.1570).contains(&end.u_m_s),
-            "{name}: {end:?}"
-        );
-        assert!(
-            (end.theta_rad.to_degrees() - 90.0).abs() < 0.05 && end.x_m.abs() <= 1.2,
-            "{name}: {end:?}"
-        );
+        assert!(end.w_m_s.abs() < 0.002 && (0.1365..0.1570).contains(&end.u_m_s), "{name}: {end:?}");
+        assert!((end.theta_rad.to_degrees() - 90.0).abs() < 0.05 && end.x_m.abs() <= 1.2, "{name}: {end:?}");
     }
 }
 
@@ -91,13 +72,7 @@ fn val_solver_study_best_costs_of_the_seven_starts() {
 fn val_solver_study_the_other_branch_from_a_turning_start() {
     let problem = from_ignition(&paper_profile(), turning(5.0));
     let inputs_rad = guess::bent(&problem, 0.3);
-    let solution = sqp::solve_from(
-        &problem,
-        &WarmStart {
-            inputs_rad,
-            ..WarmStart::default()
-        },
-    );
+    let solution = sqp::solve_from(&problem, &WarmStart { inputs_rad, ..WarmStart::default() });
     assert!((solution.cost - 8467.22).abs() < 0.006, "{}", solution.cost);
 }
 
@@ -120,11 +95,7 @@ fn a_shifted_solution_needs_no_iteration_when_nothing_happened() {
         let start = first.states[steps];
         let problem = Problem::from_profile(&profile, start, 0.1 * steps as f64, 50 - steps, 1.0);
         let later = solve(&problem, Some(&first.shifted(steps)));
-        assert_eq!(
-            (later.status, later.iterations),
-            (SolveStatus::Converged, 0),
-            "after {steps}"
-        );
+        assert_eq!((later.status, later.iterations), (SolveStatus::Converged, 0), "after {steps}");
         assert_eq!(later.inputs_rad, first.inputs_rad[steps..]);
     }
 }
@@ -143,10 +114,7 @@ fn a_kicked_warm_start_converges_in_a_few_iterations() {
         };
         let problem = Problem::from_profile(&profile, kicked, 0.1 * steps as f64, 50 - steps, 1.0);
         let later = solve(&problem, Some(&first.shifted(steps)));
-        println!(
-            "kick at {steps}: {:?} in {} iterations",
-            later.status, later.iterations
-        );
+        println!("kick at {steps}: {:?} in {} iterations", later.status, later.iterations);
         assert_eq!(later.status, SolveStatus::Converged, "after {steps}");
     }
 }
@@ -160,10 +128,7 @@ fn val_closed_form_the_printed_thrust_cannot_land() {
     assert_eq!(solution.status, SolveStatus::NotLandable);
     let without_drag = libm::sqrt(25.0 - 2.0 * (10.0 - 9.81) * 15.0);
     let bound = solution.best_touchdown_speed_m_s;
-    assert!(
-        bound < without_drag && without_drag - bound < 0.1,
-        "{bound} {without_drag}"
-    );
+    assert!(bound < without_drag && without_drag - bound < 0.1, "{bound} {without_drag}");
 }
 
 #[test]
@@ -179,33 +144,17 @@ fn the_bound_is_no_obstacle_where_a_landing_exists() {
 #[test]
 fn the_floor_holds_where_the_cost_alone_would_dive() {
     let mut profile = paper_profile();
-    let low = PlanarState {
-        z_m: 0.6,
-        u_m_s: -1.1,
-        ..nominal_start()
-    };
+    let low = PlanarState { z_m: 0.6, u_m_s: -1.1, ..nominal_start() };
     let solved = |profile: &Profile| solve(&Problem::from_profile(profile, low, 3.0, 20, 1.0), None);
-    let lowest = |solution: &Solution| {
-        solution
-            .states
-            .iter()
-            .fold(f64::INFINITY, |z, state| z.min(state.z_m))
-    };
+    let lowest =
+        |solution: &Solution| solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m));
     let free = solved(&profile);
     profile.nmpc.limits.altitude_min_m = Some(0.0);
     let floored = solved(&profile);
-    assert_eq!(
-        (free.status, floored.status),
-        (SolveStatus::Converged, SolveStatus::Converged)
-    );
+    assert_eq!((free.status, floored.status), (SolveStatus::Converged, SolveStatus::Converged));
     assert!(lowest(&free) < -0.02, "{}", lowest(&free));
     assert!(lowest(&floored) > -1e-6, "{}", lowest(&floored));
-    assert!(
-        floored
-            .floor_multipliers
-            .iter()
-            .any(|multiplier| *multiplier > 0.0)
-    );
+    assert!(floored.floor_multipliers.iter().any(|multiplier| *multiplier > 0.0));
     assert!(floored.cost > free.cost);
 }
 
@@ -214,10 +163,7 @@ fn the_floor_holds_where_the_cost_alone_would_dive() {
 fn the_paper_optimum_dips_underground_and_the_flown_plan_does_not() {
     let lowest = |profile: &Profile| {
         let solution = solve(&from_ignition(profile, nominal_start()), None);
-        solution
-            .states
-            .iter()
-            .fold(f64::INFINITY, |z, state| z.min(state.z_m))
+        solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m))
     };
     assert!(lowest(&paper_profile()) < -0.005);
     assert!(lowest(&Profile::builtin("paper-calibrated").unwrap()) > -1e-6);
@@ -227,11 +173,7 @@ fn the_paper_optimum_dips_underground_and_the_flown_plan_does_not() {
 #[test]
 fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
     let profile = paper_profile();
-    let start = PlanarState {
-        z_m: 0.5,
-        u_m_s: -0.5,
-        ..nominal_start()
-    };
+    let start = PlanarState { z_m: 0.5, u_m_s: -0.5, ..nominal_start() };
     let problem = Problem::from_profile(&profile, start, 4.7, 3, 1.0);
     let solution = solve(&problem, None);
     assert_eq!(solution.status, SolveStatus::Converged);
@@ -254,23 +196,13 @@ fn the_printed_model_can_be_solved_for_replication() {
 fn bad_numbers_are_a_status_not_a_panic() {
     let profile = paper_profile();
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
-        for start in [
-            sideways(bad),
-            PlanarState {
-                z_m: bad,
-                ..nominal_start()
-            },
-            pitched(bad),
-        ] {
+        for start in [sideways(bad), PlanarState { z_m: bad, ..nominal_start() }, pitched(bad)] {
             let solution = solve(&from_ignition(&profile, start), None);
             assert!(solution.status != SolveStatus::Converged, "{start:?}");
             assert!(solution.cost.is_finite());
         }
     }
-    let no_intervals = solve(
-        &Problem::from_profile(&profile, nominal_start(), 5.0, 0, 1.0),
-        None,
-    );
+    let no_intervals = solve(&Problem::from_profile(&profile, nominal_start(), 5.0, 0, 1.0), None);
     assert!(no_intervals.inputs_rad.is_empty());
 }
 
@@ -278,11 +210,8 @@ fn bad_numbers_are_a_status_not_a_panic() {
 fn lagrangian(problem: &Problem, inputs_rad: &[f64], multipliers: &[f64]) -> f64 {
     let trajectory = Trajectory::of(problem, inputs_rad);
     let conditions = problem.conditions();
-    let priced: f64 = conditions
-        .iter()
-        .zip(multipliers)
-        .map(|(row, y)| y * row.value(&trajectory.states))
-        .sum();
+    let priced: f64 =
+        conditions.iter().zip(multipliers).map(|(row, y)| y * row.value(&trajectory.states)).sum();
     trajectory.cost - priced
 }
 

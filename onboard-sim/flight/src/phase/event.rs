@@ -142,11 +142,7 @@ impl Effects {
 
     /// The set of the effects given.
     pub fn of(effects: &[Effect]) -> Self {
-        Self(
-            effects
-                .iter()
-                .fold(0, |bits, effect| bits | 1 << (*effect as u16)),
-        )
+        Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
     }
 
     /// Whether the effect is in the set.
@@ -161,9 +157,7 @@ impl Effects {
 
     /// The effects in the set, in index order.
     pub fn iter(self) -> impl Iterator<Item = Effect> {
-        Effect::ALL
-            .into_iter()
-            .filter(move |effect| self.contains(*effect))
+        Effect::ALL.into_iter().filter(move |effect| self.contains(*effect))
     }
 }
 

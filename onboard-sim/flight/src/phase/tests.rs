@@ -27,14 +27,9 @@ fn every_event() -> Vec<Event> {
     for flag in flags {
         events.push(Event::ArmRequested { checks_passed: flag });
         events.push(Event::IgnitionGate { open: flag });
-        events.push(Event::Contact {
-            thrust_below_weight: flag,
-        });
+        events.push(Event::Contact { thrust_below_weight: flag });
         for gate_open in flags {
-            events.push(Event::AbortRequested {
-                above_commit_height: flag,
-                gate_open,
-            });
+            events.push(Event::AbortRequested { above_commit_height: flag, gate_open });
         }
     }
     events
@@ -45,11 +40,7 @@ fn in_order(phase: Phase) -> Mode {
     let armed = !matches!(phase, Phase::Safe | Phase::PadIdle | Phase::Safed);
     Mode {
         phase,
-        interlocks: Interlocks {
-            pin_out: true,
-            armed,
-            ..Interlocks::default()
-        },
+        interlocks: Interlocks { pin_out: true, armed, ..Interlocks::default() },
         entered_at_s: 0.0,
         countdown_end_s: None,
     }
@@ -91,13 +82,9 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
         }
         (P::PadArmed, E::AbortRequested { .. }) => (P::PadIdle, &[InhibitLandingMotor, Disarm, ShowPadWait]),
         (P::Boost | P::Coast, E::AbortRequested { .. }) => (phase, &[InhibitLandingMotor]),
-        (
-            P::Deploy | P::AeroDescent | P::LandArmed,
-            E::AbortRequested {
-                above_commit_height: true,
-                ..
-            },
-        ) => (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute]),
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { above_commit_height: true, .. }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
+        }
         (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { gate_open: true, .. }) => {
             (P::Ignition, &[IgniteLandingMotor])
         }
@@ -114,9 +101,7 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
             | P::Ignition
             | P::Powered
             | P::Chute,
-            E::Contact {
-                thrust_below_weight: true,
-            },
+            E::Contact { thrust_below_weight: true },
         ) => (P::Touchdown, &[InhibitLandingMotor]),
         (P::Touchdown, E::SafingDone) => (P::Safed, &[Disarm]),
         _ => return None,
@@ -146,30 +131,21 @@ fn every_phase_answers_every_event_as_the_table_says() {
 
 /// Applies events in order, one second apart, from power-up, and expects each to be accepted.
 fn after(events: &[Event]) -> Mode {
-    events
-        .iter()
-        .enumerate()
-        .fold(Mode::power_up(0.0), |mode, (second, event)| {
-            let answer = transition(&mode, *event, second as f64);
-            assert_eq!(answer.refusal, None, "{event:?} in {}", mode.phase.name());
-            answer.mode
-        })
+    events.iter().enumerate().fold(Mode::power_up(0.0), |mode, (second, event)| {
+        let answer = transition(&mode, *event, second as f64);
+        assert_eq!(answer.refusal, None, "{event:?} in {}", mode.phase.name());
+        answer.mode
+    })
 }
 
-const ARM: [Event; 3] = [
-    Event::SelfTestPassed,
-    Event::PinPulled,
-    Event::ArmRequested { checks_passed: true },
-];
+const ARM: [Event; 3] =
+    [Event::SelfTestPassed, Event::PinPulled, Event::ArmRequested { checks_passed: true }];
 
 fn with_arm(rest: &[Event]) -> Vec<Event> {
     ARM.iter().chain(rest).copied().collect()
 }
 
-const ABORT: Event = Event::AbortRequested {
-    above_commit_height: false,
-    gate_open: false,
-};
+const ABORT: Event = Event::AbortRequested { above_commit_height: false, gate_open: false };
 
 #[test]
 fn a_simulation_released_at_ignition_flies_to_safed() {
@@ -179,9 +155,7 @@ fn a_simulation_released_at_ignition_flies_to_safed() {
         Event::IgnitionGate { open: true },
         Event::ThrustConfirmed,
         Event::Burnout,
-        Event::Contact {
-            thrust_below_weight: true,
-        },
+        Event::Contact { thrust_below_weight: true },
         Event::SafingDone,
     ]));
     assert_eq!(mode.phase, Phase::Safed);
@@ -201,9 +175,7 @@ fn a_pad_start_flies_the_whole_sequence() {
         Event::IgnitionGate { open: false },
         Event::IgnitionGate { open: true },
         Event::ThrustConfirmed,
-        Event::Contact {
-            thrust_below_weight: true,
-        },
+        Event::Contact { thrust_below_weight: true },
     ]));
     assert_eq!(mode.phase, Phase::Touchdown);
 }
@@ -212,10 +184,7 @@ fn a_pad_start_flies_the_whole_sequence() {
 fn the_countdown_must_run_out_before_a_release() {
     let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
     let release = Event::ReleasedAt(StartPoint::Ignition);
-    assert_eq!(
-        transition(&mode, release, 7.9).refusal,
-        Some(Refusal::CountdownNotElapsed)
-    );
+    assert_eq!(transition(&mode, release, 7.9).refusal, Some(Refusal::CountdownNotElapsed));
     assert_eq!(transition(&mode, release, 8.0).mode.phase, Phase::LandArmed);
     assert_eq!(mode.countdown_remaining_s(6.0), Some(2.0));
     assert_eq!(
@@ -237,10 +206,7 @@ fn disarming_cancels_the_countdown_and_latches_nothing() {
     let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
     let answer = transition(&counting, Event::DisarmRequested, 4.0);
     assert_eq!(answer.mode.phase, Phase::PadIdle);
-    assert_eq!(
-        answer.effects,
-        Effects::of(&[Effect::Disarm, Effect::CancelCountdown])
-    );
+    assert_eq!(answer.effects, Effects::of(&[Effect::Disarm, Effect::CancelCountdown]));
     assert_eq!(answer.mode.countdown_end_s, None);
     assert!(!answer.mode.interlocks.abort_latched);
     assert_eq!(transition(&answer.mode, ARM[2], 5.0).mode.phase, Phase::PadArmed);
@@ -262,23 +228,12 @@ fn a_pad_abort_latches_and_shows_the_wait() {
 #[test]
 fn refused_arming_says_why() {
     let reason = |mode: &Mode, checks_passed| {
-        transition(mode, Event::ArmRequested { checks_passed }, 9.0)
-            .refusal
-            .map(|refusal| refusal.reason())
+        transition(mode, Event::ArmRequested { checks_passed }, 9.0).refusal.map(|refusal| refusal.reason())
     };
     let idle = after(&ARM[..1]);
-    assert_eq!(
-        reason(&idle, true).unwrap(),
-        "the pin is in: pull it before arming"
-    );
-    assert_eq!(
-        reason(&after(&ARM[..2]), false).unwrap(),
-        "an arming check failed"
-    );
-    assert_eq!(
-        reason(&in_order(Phase::Powered), true).unwrap(),
-        "cannot arm in POWERED: only PAD_IDLE arms"
-    );
+    assert_eq!(reason(&idle, true).unwrap(), "the pin is in: pull it before arming");
+    assert_eq!(reason(&after(&ARM[..2]), false).unwrap(), "an arming check failed");
+    assert_eq!(reason(&in_order(Phase::Powered), true).unwrap(), "cannot arm in POWERED: only PAD_IDLE arms");
 }
 
 #[test]
@@ -297,10 +252,7 @@ fn an_abort_under_thrust_degrades_the_controller_and_keeps_the_phase() {
     let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
     assert_eq!(aborted.mode.phase, Phase::Powered);
     assert!(aborted.mode.interlocks.degraded && aborted.effects.is_empty());
-    assert_eq!(
-        transition(&aborted.mode, ABORT, 2.0).refusal,
-        Some(Refusal::AlreadyAborted)
-    );
+    assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
 }
 
 #[test]
@@ -309,21 +261,12 @@ fn no_light_is_latched_once_and_a_late_light_still_counts() {
     assert!(dark.interlocks.no_light_latched && dark.interlocks.landing_motor_inhibited);
     let again = transition(&dark, Event::NoThrustTimeout, 1.1);
     assert!(again.effects.is_empty() && again.mode == dark);
-    assert_eq!(
-        transition(&dark, Event::ThrustConfirmed, 1.2).mode.phase,
-        Phase::Powered
-    );
+    assert_eq!(transition(&dark, Event::ThrustConfirmed, 1.2).mode.phase, Phase::Powered);
 }
 
 #[test]
 fn contact_under_thrust_is_not_a_touchdown() {
-    let answer = transition(
-        &in_order(Phase::Powered),
-        Event::Contact {
-            thrust_below_weight: false,
-        },
-        1.0,
-    );
+    let answer = transition(&in_order(Phase::Powered), Event::Contact { thrust_below_weight: false }, 1.0);
     assert_eq!(answer.refusal, Some(Refusal::ThrustAboveWeight));
 }
 
@@ -339,10 +282,7 @@ fn names_and_numbers_of_phases_are_one_to_one() {
 #[test]
 fn a_set_of_effects_lists_what_it_was_made_of() {
     let effects = Effects::of(&[Effect::RecordLoss, Effect::IgniteAscentMotor]);
-    assert_eq!(
-        effects.iter().collect::<Vec<_>>(),
-        [Effect::IgniteAscentMotor, Effect::RecordLoss]
-    );
+    assert_eq!(effects.iter().collect::<Vec<_>>(), [Effect::IgniteAscentMotor, Effect::RecordLoss]);
 }
 
 fn any_event() -> impl Strategy<Value = Event> {

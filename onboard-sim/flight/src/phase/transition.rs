@@ -30,24 +30,12 @@ pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
                 next.phase = phase;
                 next.entered_at_s = time_s;
             }
-            Transition {
-                mode: next,
-                effects,
-                refusal: None,
-            }
+            Transition { mode: next, effects, refusal: None }
         }
-        Row::Refuse(refusal) => Transition {
-            mode: *mode,
-            effects: Effects::NONE,
-            refusal: Some(refusal),
-        },
+        Row::Refuse(refusal) => Transition { mode: *mode, effects: Effects::NONE, refusal: Some(refusal) },
     }
 }
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "it is a table: one row a line, in the order of a flight"
-)]
 #[expect(
     clippy::match_same_arms,
     reason = "rows of different phases stay apart even where they say the same"
@@ -67,37 +55,20 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Safe, E::SelfTestPassed) => go(P::PadIdle),
         (_, E::SelfTestPassed) => wrong("pass the self-test", "only SAFE waits for it"),
 
-        (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) => Row::Go(
-            latch(Interlocks {
-                pin_out: true,
-                ..locks
-            }),
-            phase,
-            Effects::NONE,
-        ),
-        (P::Safe | P::PadIdle, E::PinInserted) => Row::Go(
-            latch(Interlocks {
-                pin_out: false,
-                ..locks
-            }),
-            phase,
-            Effects::NONE,
-        ),
-        (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks {
-            pin_out: false,
-            ..locks
-        })),
+        (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) => {
+            Row::Go(latch(Interlocks { pin_out: true, ..locks }), phase, Effects::NONE)
+        }
+        (P::Safe | P::PadIdle, E::PinInserted) => {
+            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        }
+        (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
         (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the pad only"),
 
         (P::PadIdle, E::ArmRequested { checks_passed }) => match () {
             () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
             () if !locks.pin_out => Row::Refuse(Refusal::PinIn),
             () if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
-            () => Row::Go(
-                latch(Interlocks { armed: true, ..locks }),
-                P::PadArmed,
-                Effects::NONE,
-            ),
+            () => Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE),
         },
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
@@ -108,40 +79,22 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Some(_) => Row::Refuse(Refusal::CountdownRunning),
             None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
             None => Row::Go(
-                Mode {
-                    countdown_end_s: Some(time_s + countdown_s),
-                    ..*mode
-                },
+                Mode { countdown_end_s: Some(time_s + countdown_s), ..*mode },
                 phase,
                 Effects::of(&[Effect::StartCountdown]),
             ),
         },
         (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
 
-        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
-            Mode {
-                countdown_end_s: None,
-                ..*mode
-            },
-            phase,
-            Effects::of(&[Effect::IgniteAscentMotor]),
-        ),
-        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => Row::Go(
-            Mode {
-                countdown_end_s: None,
-                ..*mode
-            },
-            P::Deploy,
-            Effects::of(&[Effect::FinsOpen]),
-        ),
-        (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => Row::Go(
-            Mode {
-                countdown_end_s: None,
-                ..*mode
-            },
-            P::LandArmed,
-            Effects::of(&[Effect::FinsOpen]),
-        ),
+        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, phase, Effects::of(&[Effect::IgniteAscentMotor]))
+        }
+        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
+        }
+        (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::LandArmed, Effects::of(&[Effect::FinsOpen]))
+        }
         (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Ignition)) => {
             Row::Refuse(Refusal::CountdownNotElapsed)
         }
@@ -178,56 +131,30 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Ignition, E::ThrustConfirmed) => go(P::Powered),
         (_, E::ThrustConfirmed) => wrong("confirm thrust", "only IGNITION waits for it"),
         (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => Row::Go(
-            latch(Interlocks {
-                no_light_latched: true,
-                landing_motor_inhibited: true,
-                ..locks
-            }),
+            latch(Interlocks { no_light_latched: true, landing_motor_inhibited: true, ..locks }),
             phase,
             Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
         ),
         (P::Ignition, E::NoThrustTimeout) => go(phase),
         (_, E::NoThrustTimeout) => wrong("miss thrust", "only IGNITION waits for it"),
 
-        (
-            _,
-            E::AbortRequested {
-                above_commit_height,
-                gate_open,
-            },
-        ) => abort(mode, above_commit_height, gate_open, time_s),
+        (_, E::AbortRequested { above_commit_height, gate_open }) => {
+            abort(mode, above_commit_height, gate_open, time_s)
+        }
 
         // Ground.
         (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::Contact { .. }) => {
             wrong("touch down", "only a vehicle in the air touches down")
         }
-        (
-            _,
-            E::Contact {
-                thrust_below_weight: false,
-            },
-        ) => Row::Refuse(Refusal::ThrustAboveWeight),
-        (
-            _,
-            E::Contact {
-                thrust_below_weight: true,
-            },
-        ) => Row::Go(
-            latch(Interlocks {
-                landing_motor_inhibited: true,
-                ..locks
-            }),
+        (_, E::Contact { thrust_below_weight: false }) => Row::Refuse(Refusal::ThrustAboveWeight),
+        (_, E::Contact { thrust_below_weight: true }) => Row::Go(
+            latch(Interlocks { landing_motor_inhibited: true, ..locks }),
             P::Touchdown,
             Effects::of(&[Effect::InhibitLandingMotor]),
         ),
-        (P::Touchdown, E::SafingDone) => Row::Go(
-            latch(Interlocks {
-                armed: false,
-                ..locks
-            }),
-            P::Safed,
-            Effects::of(&[Effect::Disarm]),
-        ),
+        (P::Touchdown, E::SafingDone) => {
+            Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, Effects::of(&[Effect::Disarm]))
+        }
         (_, E::SafingDone) => wrong("safe", "only TOUCHDOWN is made safe"),
     }
 }
@@ -243,53 +170,30 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
     let locks = mode.interlocks;
     let may_burn = gate_open && locks.armed && !locks.landing_motor_inhibited && !locks.abort_latched;
     let inhibited = Mode {
-        interlocks: Interlocks {
-            landing_motor_inhibited: true,
-            abort_latched: true,
-            ..locks
-        },
+        interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..locks },
         countdown_end_s: None,
         ..*mode
     };
     match phase {
-        P::Touchdown | P::Safed => Row::Refuse(Refusal::WrongPhase {
-            action: "abort",
-            phase,
-            only: "the vehicle is on the ground",
-        }),
-        P::Chute => Row::Refuse(Refusal::WrongPhase {
-            action: "abort",
-            phase,
-            only: "the parachute is out already",
-        }),
+        P::Touchdown | P::Safed => {
+            Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the vehicle is on the ground" })
+        }
+        P::Chute => {
+            Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
+        }
         // The motor has been lit and cannot be stopped; a parachute under thrust would burn or tangle.
         P::Ignition | P::Powered if locks.degraded => Row::Refuse(Refusal::AlreadyAborted),
         P::Ignition | P::Powered => {
-            let interlocks = Interlocks {
-                abort_latched: true,
-                degraded: true,
-                ..locks
-            };
+            let interlocks = Interlocks { abort_latched: true, degraded: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
         }
         P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
         P::Safe | P::PadIdle | P::PadArmed => {
-            let interlocks = Interlocks {
-                armed: false,
-                ..inhibited.interlocks
-            };
+            let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
             let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
             let to = if phase == P::PadArmed { P::PadIdle } else { phase };
             // The wait runs from the abort, also where the phase stays.
-            Row::Go(
-                Mode {
-                    interlocks,
-                    entered_at_s: time_s,
-                    ..inhibited
-                },
-                to,
-                Effects::of(&effects),
-            )
+            Row::Go(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, Effects::of(&effects))
         }
         P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
         P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
@@ -304,15 +208,8 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
         }
         // Too low for the parachute: landing on the motor is the safest way down that is left.
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
-            let interlocks = Interlocks {
-                abort_latched: true,
-                ..locks
-            };
-            Row::Go(
-                Mode { interlocks, ..*mode },
-                P::Ignition,
-                Effects::of(&[Effect::IgniteLandingMotor]),
-            )
+            let interlocks = Interlocks { abort_latched: true, ..locks };
+            Row::Go(Mode { interlocks, ..*mode }, P::Ignition, Effects::of(&[Effect::IgniteLandingMotor]))
         }
         P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(
             inhibited,
@@ -323,23 +220,12 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
 }
 
 fn disarmed(mode: &Mode) -> Row {
-    let interlocks = Interlocks {
-        armed: false,
-        ..mode.interlocks
-    };
+    let interlocks = Interlocks { armed: false, ..mode.interlocks };
     let effects = match mode.countdown_end_s {
         Some(_) => Effects::of(&[Effect::Disarm, Effect::CancelCountdown]),
         None => Effects::of(&[Effect::Disarm]),
     };
-    Row::Go(
-        Mode {
-            interlocks,
-            countdown_end_s: None,
-            ..*mode
-        },
-        Phase::PadIdle,
-        effects,
-    )
+    Row::Go(Mode { interlocks, countdown_end_s: None, ..*mode }, Phase::PadIdle, effects)
 }
 
 fn countdown_over(mode: &Mode, time_s: f64) -> bool {

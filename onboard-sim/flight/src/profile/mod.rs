@@ -87,10 +87,8 @@ impl Profile {
     /// [`ProfileError::Parse`] if the text has not the shape of a profile; [`ProfileError::Value`] if a value is
     /// out of range.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ProfileError> {
-        let profile: Self = toml::from_str(text).map_err(|error| ProfileError::Parse {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        })?;
+        let profile: Self = toml::from_str(text)
+            .map_err(|error| ProfileError::Parse { origin: origin.to_owned(), message: error.to_string() })?;
         validate::validate(&profile).map_err(|bad| ProfileError::Value {
             origin: origin.to_owned(),
             key: bad.key,
@@ -110,10 +108,7 @@ impl Profile {
 
     /// The TOML text of the built-in profile of that name.
     pub fn builtin_toml(name: &str) -> Option<&'static str> {
-        BUILTIN
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(_, text)| *text)
+        BUILTIN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
     }
 }
 

@@ -56,11 +56,7 @@ pub struct Motor {
 impl Motor {
     /// Nominal thrust at a time since ignition, N.
     pub fn thrust_at_n(&self, time_since_ignition_s: f64) -> f64 {
-        if (0.0..self.burn_time_s).contains(&time_since_ignition_s) {
-            self.thrust_n
-        } else {
-            0.0
-        }
+        if (0.0..self.burn_time_s).contains(&time_since_ignition_s) { self.thrust_n } else { 0.0 }
     }
 
     /// Mean nominal thrust over `[from_s, from_s + duration_s]` since ignition, N: the impulse is kept when the
@@ -308,9 +304,7 @@ pub struct StabiliserGains {
 
 impl Default for StabiliserGains {
     fn default() -> Self {
-        Self {
-            decay_rate_per_s: 4.0,
-        }
+        Self { decay_rate_per_s: 4.0 }
     }
 }
 
@@ -350,12 +344,7 @@ pub struct ArmingLimits {
 
 impl Default for ArmingLimits {
     fn default() -> Self {
-        Self {
-            tilt_max_deg: 5.0,
-            rotation_max_deg_s: 2.0,
-            speed_max_m_s: 0.2,
-            log_space_min_bytes: 64 << 20,
-        }
+        Self { tilt_max_deg: 5.0, rotation_max_deg_s: 2.0, speed_max_m_s: 0.2, log_space_min_bytes: 64 << 20 }
     }
 }
 

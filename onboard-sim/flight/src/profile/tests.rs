@@ -33,10 +33,7 @@ fn builtins_differ_only_where_they_say() {
 fn an_unknown_key_is_named_with_its_origin() {
     let text = calibrated().replace("mass_kg = 3.0", "mass_kg = 3.0\nmass_lb = 6.6");
     let message = Profile::from_toml(&text, "my.toml").unwrap_err().to_string();
-    assert!(
-        message.contains("my.toml") && message.contains("mass_lb"),
-        "{message}"
-    );
+    assert!(message.contains("my.toml") && message.contains("mass_lb"), "{message}");
 }
 
 #[test]
@@ -51,51 +48,25 @@ fn values_out_of_range_are_refused_with_key_value_and_range() {
     let cases = [
         ("mass_kg = 3.0", "mass_kg = -3.0", "vehicle.mass_kg = -3"),
         ("mass_kg = 3.0", "mass_kg = nan", "vehicle.mass_kg = NaN"),
-        (
-            "horizon_steps = 50",
-            "horizon_steps = 201",
-            "nmpc.horizon_steps = 201: must be from 1 to 200",
-        ),
-        (
-            "horizon_steps = 50",
-            "horizon_steps = 0",
-            "nmpc.horizon_steps = 0",
-        ),
-        (
-            "actuation_delay_steps = 1",
-            "actuation_delay_steps = 2",
-            "nmpc.actuation_delay_steps = 2",
-        ),
-        (
-            "gimbal_deg = 20.0",
-            "gimbal_deg = 25.0",
-            "at most gimbal.limit_deg",
-        ),
+        ("horizon_steps = 50", "horizon_steps = 201", "nmpc.horizon_steps = 201: must be from 1 to 200"),
+        ("horizon_steps = 50", "horizon_steps = 0", "nmpc.horizon_steps = 0"),
+        ("actuation_delay_steps = 1", "actuation_delay_steps = 2", "nmpc.actuation_delay_steps = 2"),
+        ("gimbal_deg = 20.0", "gimbal_deg = 25.0", "at most gimbal.limit_deg"),
         ("altitude_m = 15.0", "altitude_m = inf", "start.altitude_m = inf"),
-        (
-            "cg_from_mid_m = 0.17",
-            "cg_from_mid_m = -0.5",
-            "vehicle.cg_from_mid_m = -0.5",
-        ),
+        ("cg_from_mid_m = 0.17", "cg_from_mid_m = -0.5", "vehicle.cg_from_mid_m = -0.5"),
         ("delta = 1.0", "delta = 0.0", "nmpc.weights.delta = 0"),
     ];
     for (from, to, expected) in cases {
         let text = calibrated().replacen(from, to, 1);
         assert_ne!(text, calibrated(), "{from} is not in the profile");
         let message = Profile::from_toml(&text, "my.toml").unwrap_err().to_string();
-        assert!(
-            message.starts_with("my.toml: ") && message.contains(expected),
-            "{message}"
-        );
+        assert!(message.starts_with("my.toml: ") && message.contains(expected), "{message}");
     }
 }
 
 #[test]
 fn mean_thrust_keeps_the_impulse_across_burn_out() {
-    let motor = Motor {
-        thrust_n: 30.0,
-        burn_time_s: 5.0,
-    };
+    let motor = Motor { thrust_n: 30.0, burn_time_s: 5.0 };
     let bits = |value: f64| value.to_bits();
     assert_eq!(bits(motor.mean_thrust_n(4.9, 0.1)), bits(30.0));
     assert!((motor.mean_thrust_n(4.95, 0.1) - 15.0).abs() < 1e-9);

@@ -15,15 +15,7 @@ pub(super) struct BadValue {
 type Check = Result<(), BadValue>;
 
 fn require(ok: bool, key: &'static str, found: impl Display, required: &'static str) -> Check {
-    if ok {
-        Ok(())
-    } else {
-        Err(BadValue {
-            key,
-            found: found.to_string(),
-            required,
-        })
-    }
+    if ok { Ok(()) } else { Err(BadValue { key, found: found.to_string(), required }) }
 }
 
 fn finite(key: &'static str, value: f64) -> Check {
@@ -31,30 +23,15 @@ fn finite(key: &'static str, value: f64) -> Check {
 }
 
 fn positive(key: &'static str, value: f64) -> Check {
-    require(
-        value.is_finite() && value > 0.0,
-        key,
-        value,
-        "a finite number above 0",
-    )
+    require(value.is_finite() && value > 0.0, key, value, "a finite number above 0")
 }
 
 fn not_negative(key: &'static str, value: f64) -> Check {
-    require(
-        value.is_finite() && value >= 0.0,
-        key,
-        value,
-        "a finite number, 0 or more",
-    )
+    require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more")
 }
 
 fn angle_below_right(key: &'static str, value_deg: f64) -> Check {
-    require(
-        value_deg > 0.0 && value_deg < 90.0,
-        key,
-        value_deg,
-        "above 0 and below 90",
-    )
+    require(value_deg > 0.0 && value_deg < 90.0, key, value_deg, "above 0 and below 90")
 }
 
 pub(super) fn validate(profile: &Profile) -> Check {
@@ -83,10 +60,7 @@ fn vehicle(profile: &Profile) -> Check {
         "finite and forward of the nozzle (above vehicle.nozzle_from_mid_m)",
     )?;
     positive("environment.gravity_m_s2", profile.environment.gravity_m_s2)?;
-    not_negative(
-        "environment.air_density_kg_m3",
-        profile.environment.air_density_kg_m3,
-    )?;
+    not_negative("environment.air_density_kg_m3", profile.environment.air_density_kg_m3)?;
     positive("motor.thrust_n", profile.motor.thrust_n)?;
     positive("motor.burn_time_s", profile.motor.burn_time_s)?;
     require(
@@ -103,16 +77,8 @@ fn actuators(profile: &Profile) -> Check {
         positive("gimbal.rate_limit_deg_s", rate)?;
     }
     let fins = &profile.fins;
-    for (key, value) in [
-        ("fins.closed_deg", fins.closed_deg),
-        ("fins.deployed_deg", fins.deployed_deg),
-    ] {
-        require(
-            (0.0..=90.0).contains(&value),
-            key,
-            value,
-            "from 0 (closed) to 90 (open)",
-        )?;
+    for (key, value) in [("fins.closed_deg", fins.closed_deg), ("fins.deployed_deg", fins.deployed_deg)] {
+        require((0.0..=90.0).contains(&value), key, value, "from 0 (closed) to 90 (open)")?;
     }
     positive("fins.rate_limit_deg_s", fins.rate_limit_deg_s)
 }
