@@ -149,6 +149,18 @@ impl Plant {
         !self.lifts_off(self.thrust_n())
     }
 
+    /// What a perfect accelerometer along the nose axis reads, m/s^2. On the ground or in the rig, the reaction
+    /// to gravity.
+    pub fn axial_specific_force_m_s2(&self) -> f64 {
+        let state = self.state;
+        let gravity_m_s2 = self.model.params.gravity_m_s2 * libm::sin(state.theta_rad);
+        if self.hold != Hold::Free {
+            return gravity_m_s2;
+        }
+        let udot = self.model.derivative(&state.to_array(), self.gimbal_rad, self.thrust_n())[3];
+        udot + gravity_m_s2 + state.q_rad_s * state.w_m_s
+    }
+
     /// Commanded and actual gimbal angle, rad.
     pub fn gimbal_rad(&self) -> (f64, f64) {
         (self.gimbal_commanded_rad, self.gimbal_rad)
@@ -177,9 +189,8 @@ impl Plant {
     }
 
     fn lifts_off(&self, thrust_n: f64) -> bool {
-        let along_nose_rad = self.state.theta_rad;
         let (sin_delta, cos_delta) = libm::sincos(self.gimbal_rad);
-        let (sin_theta, cos_theta) = libm::sincos(along_nose_rad);
+        let (sin_theta, cos_theta) = libm::sincos(self.state.theta_rad);
         let up_n = thrust_n * (cos_delta * sin_theta + sin_delta * cos_theta);
         up_n > self.model.params.mass_kg * self.model.params.gravity_m_s2
     }

@@ -251,7 +251,7 @@ fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
         cost: output.solver.cost as f32,
         kkt_stationarity: output.solver.kkt_stationarity as f32,
         kkt_feasibility: output.solver.kkt_feasibility as f32,
-        thrust_scale: 1.0,
+        thrust_scale: snapshot.thrust_scale as f32,
         solve_time_us: microseconds(snapshot.solve_time_s) as u32,
         deadline_margin_us: microseconds(snapshot.deadline_s - snapshot.solve_time_s) as i32,
         iterations: u16::try_from(output.solver.iterations).unwrap_or(u16::MAX),

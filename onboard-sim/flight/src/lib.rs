@@ -10,6 +10,7 @@
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`nmpc`]: the landing optimal-control problem and its solver.
 //! * [`stabiliser`]: the upright law that flies when no plan can be had.
+//! * [`thrust_estimate`]: how strong the motor is, from the accelerometer.
 //! * [`controller`]: one tick of the controller, from estimate to gimbal command.
 //! * [`verdict`]: the touchdown limits and whether a landing kept them.
 //!
@@ -25,4 +26,5 @@ pub mod nmpc;
 pub mod phase;
 pub mod profile;
 pub mod stabiliser;
+pub mod thrust_estimate;
 pub mod verdict;

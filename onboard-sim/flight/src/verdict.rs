@@ -40,6 +40,9 @@ impl TouchdownLimits {
     }
 }
 
+/// How far below the ground a plan may end and still end on it, m.
+pub const PLAN_HEIGHT_TOLERANCE_M: f64 = 1e-3;
+
 /// One limit and the value it was held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitResult {
@@ -92,6 +95,15 @@ impl LandingVerdict {
                 ),
             ],
         }
+    }
+
+    /// Judges the end of a plan. A plan meets the ground to its solver's tolerance only, so a height within
+    /// [`PLAN_HEIGHT_TOLERANCE_M`] below the lowest counts as the lowest.
+    pub fn judge_plan(limits: &TouchdownLimits, end: &PlanarState) -> Self {
+        let lowest_m = limits.altitude_min_m;
+        let on_ground = (lowest_m - PLAN_HEIGHT_TOLERANCE_M..lowest_m).contains(&end.z_m);
+        let z_m = if on_ground { lowest_m } else { end.z_m };
+        Self::judge(limits, &PlanarState { z_m, ..*end })
     }
 
     /// Whether every limit was kept.
@@ -156,6 +168,15 @@ mod tests {
             let verdict = LandingVerdict::judge(&limits(), &state);
             assert_eq!(verdict.landed(), lands, "{name}: {}", verdict.summary());
         }
+    }
+
+    #[test]
+    fn a_plan_meets_the_ground_to_its_tolerance_and_a_landing_exactly() {
+        let end = |z_m| PlanarState { z_m, ..upright() };
+        assert!(LandingVerdict::judge_plan(&limits(), &end(-1e-12)).landed());
+        assert!(!LandingVerdict::judge_plan(&limits(), &end(-0.002)).landed());
+        assert!(!LandingVerdict::judge_plan(&limits(), &end(f64::NAN)).landed());
+        assert!(!LandingVerdict::judge(&limits(), &end(-1e-12)).landed());
     }
 
     #[test]

@@ -121,9 +121,15 @@ fn fly(scenario: &Scenario) -> Flight {
         for plant_step in 0..PLANT_STEPS_PER_SAMPLE {
             let plant_s = time_s + f64::from(plant_step) * PLANT_STEP_S;
             let thrust_n = scenario.thrust_scale * profile.motor.mean_thrust_n(plant_s, PLANT_STEP_S);
-            state = model.rk4_step(&state, applied_rad, thrust_n, PLANT_STEP_S);
+            let before = state;
+            state = model.rk4_step(&before, applied_rad, thrust_n, PLANT_STEP_S);
             if state.z_m <= 0.0 {
-                return Flight { contact_s: plant_s + PLANT_STEP_S, contact: state, outputs, digests };
+                // At the instant of contact: its share of the step, by the heights on either side.
+                let share = before.z_m / (before.z_m - state.z_m);
+                let mut contact = model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
+                assert!(contact.z_m.abs() < 1e-6, "{contact:?}");
+                contact.z_m = 0.0;
+                return Flight { contact_s: plant_s + share * PLANT_STEP_S, contact, outputs, digests };
             }
         }
         applied_rad = pending_rad;

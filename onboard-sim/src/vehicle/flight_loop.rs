@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use flight::arming;
 use flight::controller::{self, ControllerInput};
+use flight::dynamics::PlanarParams;
 use flight::phase::{Event, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
+use flight::thrust_estimate::ThrustSample;
 use flight::verdict::LandingVerdict;
 
 use super::{
@@ -77,9 +79,9 @@ impl Vehicle {
             time_since_ignition_s: since_ignition_s,
             state: self.plant.state(),
             gimbal_applied_rad: self.gimbal_applied_rad,
-            thrust_scale: 1.0,
+            thrust_scale: self.thrust.scale(),
             degraded: self.mode.interlocks.degraded,
-            deadline_missed: self.deadline_missed,
+            deadline_missed: self.misses > 0,
         };
         let began = stopwatch();
         let output = controller::step(&mut self.controller, &input);
@@ -89,13 +91,15 @@ impl Vehicle {
         if self.mode.phase.in_landing_burn() && level_before != Some(output.level) {
             self.say(Severity::Notice, format!("controller level {}", output.level.name()));
         }
-        self.deadline_missed = solve_time_s > deadline_s && self.policy == DeadlinePolicy::Enforce;
-        self.next_gimbal_rad = if self.deadline_missed {
-            // What hardware has at hand when an answer is late: the next command of the plan before.
+        let late = solve_time_s > deadline_s && self.policy == DeadlinePolicy::Enforce;
+        self.next_gimbal_rad = if late {
+            self.misses += 1;
             self.say(Severity::Warning, format!("deadline missed by {:.3} s", solve_time_s - deadline_s));
-            let before = self.output.as_ref().map(|output| output.plan.used_gimbal_rad());
-            before.and_then(|plan| plan.get(1)).copied().unwrap_or(self.gimbal_applied_rad)
+            let before = self.in_time.as_ref();
+            before.map_or(0.0, |before| before.command_after_misses_rad(self.misses))
         } else {
+            self.misses = 0;
+            self.in_time = Some(output.clone());
             output.gimbal_command_rad
         };
         if !self.mode.phase.on_pad() {
@@ -116,6 +120,7 @@ impl Vehicle {
     /// What the flight computer senses between samples.
     fn look_around(&mut self) {
         let time_s = self.time_s();
+        self.weigh_the_motor(time_s);
         let in_phase_s = time_s - self.mode.entered_at_s;
         match self.mode.phase {
             Phase::Ignition if self.plant.thrust_n() > 0.0 && in_phase_s >= THRUST_CONFIRM_S => {
@@ -144,6 +149,27 @@ impl Vehicle {
                 self.judge();
             }
         }
+    }
+
+    /// Learns the motor's strength, once thrust is confirmed and until contact.
+    fn weigh_the_motor(&mut self, time_s: f64) {
+        let Some(ignition) = self.ignition_sample.filter(|_| self.mode.phase == Phase::Powered) else {
+            return;
+        };
+        let since_ignition_s = time_s - ignition as f64 * self.profile.nmpc.sample_time_s;
+        let sample = ThrustSample {
+            axial_specific_force_m_s2: self.plant.axial_specific_force_m_s2(),
+            state: self.plant.state(),
+            gimbal_rad: self.plant.gimbal_rad().1,
+            // In contact the ground pushes too.
+            nominal_thrust_n: if self.plant.in_contact() {
+                0.0
+            } else {
+                self.profile.motor.thrust_at_n(since_ignition_s)
+            },
+            interval_s: self.frame_s(),
+        };
+        self.thrust.update(&PlanarParams::from_profile(&self.profile), &sample);
     }
 
     fn touch(&mut self, impact: Impact) {

@@ -2,7 +2,7 @@
 //!
 //! Pure but for the stopwatch that its caller hands in to time the controller. Time is simulated and moves in
 //! frames ([`Vehicle::frame_s`], 20 ms for a 100 ms sample); a controller tick falls on every few frames.
-//! Its estimate is the plant's true state: sensors are a matter of their own.
+//! Its state estimate is the plant's true state and its accelerometer is perfect: sensors are a matter of their own.
 
 mod answer;
 mod events;
@@ -18,6 +18,7 @@ use flight::controller::{ControlLevel, ControllerConfig, ControllerOutput, Contr
 use flight::gate::{GateInput, gate_checks};
 use flight::phase::{Mode, Phase, StartPoint};
 use flight::profile::Profile;
+use flight::thrust_estimate::ThrustEstimate;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
 
 pub use answer::{Answer, Request, Result};
@@ -96,11 +97,14 @@ pub struct Vehicle {
     ignition_sample: Option<u64>,
     output: Option<ControllerOutput>,
     solve_time_s: f64,
+    thrust: ThrustEstimate,
     /// The command that the actuators get at the next sample.
     next_gimbal_rad: f64,
     gimbal_applied_rad: f64,
     fin_command_rad: [f64; 4],
-    deadline_missed: bool,
+    /// The last output that came in time, and the ticks missed since.
+    in_time: Option<ControllerOutput>,
+    misses: usize,
     impacts: Vec<Impact>,
     burned_out: bool,
     verdict: Option<(Impact, LandingVerdict)>,
@@ -144,10 +148,12 @@ impl Vehicle {
             ignition_sample: None,
             output: None,
             solve_time_s: 0.0,
+            thrust: ThrustEstimate::default(),
             next_gimbal_rad: 0.0,
             gimbal_applied_rad: 0.0,
             fin_command_rad: [profile.fins.closed_rad(); 4],
-            deadline_missed: false,
+            in_time: None,
+            misses: 0,
             impacts: Vec::new(),
             burned_out: false,
             verdict: None,
@@ -230,7 +236,7 @@ impl Vehicle {
             controller_found: solver.map_or_else(|| "no rehearsal yet".to_owned(), |solver| solver.summary()),
             predicted_landing: rehearsed
                 .filter(|output| output.plan.len > 0)
-                .map(|output| LandingVerdict::judge(&self.limits, &output.predicted_touchdown.state)),
+                .map(|output| LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state)),
         };
         arming_checks(&self.profile.arming, &input)
     }

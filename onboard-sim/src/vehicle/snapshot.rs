@@ -62,6 +62,8 @@ pub struct Snapshot {
     pub solve_time_s: f64,
     /// How long it may take, s.
     pub deadline_s: f64,
+    /// Estimated thrust over nominal.
+    pub thrust_scale: f64,
     /// Limits that the end of the plan violates, one bit each in the verdict's order.
     pub predicted_violations: u16,
     /// The verdict, once touched down.
@@ -97,8 +99,9 @@ impl Vehicle {
             in_contact: self.plant.in_contact(),
             solve_time_s: self.solve_time_s,
             deadline_s: self.profile.nmpc.sample_time_s,
+            thrust_scale: self.thrust.scale(),
             predicted_violations: planned.map_or(0, |output| {
-                let verdict = LandingVerdict::judge(&self.limits, &output.predicted_touchdown.state);
+                let verdict = LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state);
                 violations(&verdict)
             }),
             output: self.output.clone(),

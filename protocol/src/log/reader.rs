@@ -193,7 +193,7 @@ impl<R: Read> LogReader<R> {
         match error {
             mcap::McapError::BadMagic => Damage::NotMcap,
             mcap::McapError::UnexpectedEof => self.cut(),
-            other => Damage::Corrupt { near_byte: self.bytes_read, reason: other.to_string() },
+            other => Damage::Corrupt { near_byte: self.bytes_read, reason: with_causes(other) },
         }
     }
 
@@ -234,6 +234,17 @@ impl<R: Read> LogReader<R> {
             _ => None,
         }
     }
+}
+
+/// An error and what caused it: the parser's own words often name only the place.
+fn with_causes(error: &mcap::McapError) -> String {
+    let mut words = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(error) = cause {
+        words = format!("{words}: {error}");
+        cause = error.source();
+    }
+    words
 }
 
 fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {

@@ -314,7 +314,7 @@ impl Default for StabiliserGains {
 pub struct TouchdownBox {
     /// Largest horizontal distance, m.
     pub x_m: f64,
-    /// Lowest altitude, m. Contact is noticed up to one plant step late, so it is a few millimetres below 0.
+    /// Lowest altitude, m.
     pub altitude_min_m: f64,
     /// Highest altitude, m.
     pub altitude_max_m: f64,

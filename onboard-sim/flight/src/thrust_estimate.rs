@@ -1,0 +1,117 @@
+//! How strong the motor is, from what the accelerometer feels along the nose.
+//!
+//! A solid motor cannot be throttled and differs from its data sheet by a few per cent; the landing plan is only
+//! as good as its thrust. Along the nose axis the specific force is `(T cos d) / m - (rho S C / 2m) V u`
+//! (Eq. 18 of the landing paper with its forces divided by mass), so the thrust follows from it, and a first-order lag
+//! takes out the noise.
+
+use crate::dynamics::{PlanarParams, PlanarState};
+
+/// Time constant of the lag, s: short beside the burn, long beside the motor's own roughness.
+const LAG_S: f64 = 0.2;
+/// An estimate outside this range says that something else is wrong; it is not believed.
+const PLAUSIBLE: core::ops::RangeInclusive<f64> = 0.5..=1.5;
+
+/// The estimate of thrust over nominal thrust.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThrustEstimate {
+    scale: f64,
+}
+
+impl Default for ThrustEstimate {
+    fn default() -> Self {
+        Self { scale: 1.0 }
+    }
+}
+
+/// What one update looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThrustSample {
+    /// Specific force along the nose axis, m/s^2: what an accelerometer there reads.
+    pub axial_specific_force_m_s2: f64,
+    /// State estimate.
+    pub state: PlanarState,
+    /// Measured gimbal angle, rad.
+    pub gimbal_rad: f64,
+    /// Nominal thrust at this time, N; nothing is learnt where it is nil.
+    pub nominal_thrust_n: f64,
+    /// Time since the last sample, s.
+    pub interval_s: f64,
+}
+
+impl ThrustEstimate {
+    /// The estimated thrust over nominal thrust; 1 before anything was learnt.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// Learns from one sample. A sample that is not finite or not plausible is left out.
+    pub fn update(&mut self, params: &PlanarParams, sample: &ThrustSample) {
+        let axial_n = sample.nominal_thrust_n * libm::cos(sample.gimbal_rad);
+        let drag_m_s2 = params.drag_per_m * sample.state.speed_m_s() * sample.state.u_m_s;
+        let measured = params.mass_kg * (sample.axial_specific_force_m_s2 + drag_m_s2) / axial_n;
+        if PLAUSIBLE.contains(&measured) && sample.interval_s > 0.0 {
+            let share = 1.0 - libm::exp(-sample.interval_s / LAG_S);
+            self.scale += share * (measured - self.scale);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::PlanarModel;
+    use crate::profile::Profile;
+
+    /// What the accelerometer reads: the body-axis acceleration less gravity and rotation.
+    fn felt(model: &PlanarModel, state: &PlanarState, gimbal_rad: f64, thrust_n: f64) -> f64 {
+        let udot = model.derivative(&state.to_array(), gimbal_rad, thrust_n)[3];
+        udot + model.params.gravity_m_s2 * libm::sin(state.theta_rad) + state.q_rad_s * state.w_m_s
+    }
+
+    #[test]
+    fn a_weak_motor_is_known_within_a_second_whatever_the_attitude() {
+        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let model = PlanarModel::from_profile(&profile);
+        for (theta_rad, gimbal_rad, q_rad_s) in [(1.57, 0.0, 0.0), (1.2, 0.3, -0.5), (2.0, -0.35, 1.0)] {
+            let state = PlanarState { x_m: 1.0, z_m: 9.0, theta_rad, u_m_s: -5.0, w_m_s: 0.7, q_rad_s };
+            let mut estimate = ThrustEstimate::default();
+            for _ in 0..50 {
+                let nominal_thrust_n = profile.motor.thrust_n;
+                let sample = ThrustSample {
+                    axial_specific_force_m_s2: felt(&model, &state, gimbal_rad, 0.94 * nominal_thrust_n),
+                    state,
+                    gimbal_rad,
+                    nominal_thrust_n,
+                    interval_s: 0.02,
+                };
+                estimate.update(&model.params, &sample);
+            }
+            // What is left of the lag after five time constants.
+            assert!((estimate.scale() - 0.94).abs() < 0.06 * 0.0068, "{}", estimate.scale());
+        }
+    }
+
+    #[test]
+    fn nonsense_teaches_nothing() {
+        let params = PlanarModel::from_profile(&Profile::builtin("paper-calibrated").unwrap()).params;
+        let good = ThrustSample {
+            axial_specific_force_m_s2: 11.1,
+            state: PlanarState::default(),
+            gimbal_rad: 0.0,
+            nominal_thrust_n: 33.3,
+            interval_s: 0.02,
+        };
+        let mut estimate = ThrustEstimate::default();
+        for bad in [
+            ThrustSample { nominal_thrust_n: 0.0, ..good },
+            ThrustSample { axial_specific_force_m_s2: f64::NAN, ..good },
+            ThrustSample { axial_specific_force_m_s2: -3.0, ..good },
+            ThrustSample { axial_specific_force_m_s2: 100.0, ..good },
+            ThrustSample { interval_s: 0.0, ..good },
+        ] {
+            estimate.update(&params, &bad);
+            assert_eq!(estimate, ThrustEstimate::default(), "{bad:?}");
+        }
+    }
+}

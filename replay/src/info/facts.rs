@@ -1,0 +1,241 @@
+//! The description of a log, as data.
+
+use std::collections::BTreeMap;
+
+use flight::profile::Profile;
+use protocol::log::reader::Damage;
+use protocol::log::v1;
+use serde::Serialize;
+
+use super::{ChannelFacts, PhaseTimeline, TickFacts};
+use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts};
+
+/// What is in a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Info {
+    /// The log.
+    pub file: String,
+    /// Size of the file.
+    pub size_bytes: Option<u64>,
+    /// What can be done with it.
+    pub grade: Grade,
+    /// The library that wrote the file.
+    pub library: String,
+    /// Which build wrote it.
+    pub build: BTreeMap<String, String>,
+    /// That build against this one.
+    pub build_comparison: BuildComparison,
+    /// Which run it is.
+    pub run: BTreeMap<String, String>,
+    /// The profile it was flown with.
+    pub profile: Option<ProfileFacts>,
+    /// From the first record to the last.
+    pub span: Option<Span>,
+    /// Its channels, by topic.
+    pub channels: Vec<ChannelFacts>,
+    /// The controller's ticks.
+    pub ticks: Option<TickFacts>,
+    /// The phases, from each source that tells them, the vehicle first.
+    pub phases: Vec<PhaseTimeline>,
+    /// The landing verdict.
+    pub verdict: Option<VerdictFacts>,
+    /// Why some record could not be read, for the first such.
+    pub unreadable: Option<String>,
+    /// Whether anything is missing.
+    pub completeness: Completeness,
+    /// Its attachments.
+    pub attachments: Vec<AttachmentFacts>,
+}
+
+/// What can be done with a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Grade {
+    /// How much.
+    pub level: GradeLevel,
+    /// Why.
+    pub reason: String,
+}
+
+/// How much can be done with a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GradeLevel {
+    /// The controller can be run again on its own inputs.
+    BitExact,
+    /// Ticks in full precision, but nothing to run them with.
+    Numeric,
+    /// Only what went over the air or the simulator knew.
+    TelemetryOnly,
+}
+
+impl GradeLevel {
+    /// The grade's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BitExact => "bit-exact",
+            Self::Numeric => "numeric",
+            Self::TelemetryOnly => "telemetry-only",
+        }
+    }
+}
+
+impl Grade {
+    pub(super) fn of(
+        ticks: Option<&TickFacts>,
+        profile: Option<&ProfileFacts>,
+        unreadable: Option<&str>,
+    ) -> Self {
+        let Some(ticks) = ticks else {
+            let reason = match unreadable {
+                None => "it has no controller ticks".to_owned(),
+                Some(why) => format!("it has no controller ticks that this build can read: {why}"),
+            };
+            return Self { level: GradeLevel::TelemetryOnly, reason };
+        };
+        let numeric = |why: String| Self { level: GradeLevel::Numeric, reason: format!("ticks, but {why}") };
+        let profile = match profile {
+            None => return numeric("no attachment profile.toml to build the controller from".to_owned()),
+            Some(ProfileFacts { problem: Some(problem), .. }) => {
+                return numeric(format!("the profile cannot be used by this build: {problem}"));
+            }
+            Some(profile) => profile.name.as_deref().unwrap_or_default(),
+        };
+        if ticks.first != 0 {
+            return numeric(format!("they begin with tick {}, not with tick 0", ticks.first));
+        }
+        let reason = match ticks.gaps.first() {
+            None => format!("{} ticks from the first on, and their profile {profile}", ticks.count),
+            Some(gap) => format!("up to tick {}, before the first gap; profile {profile}", gap.after),
+        };
+        Self { level: GradeLevel::BitExact, reason }
+    }
+}
+
+/// The profile in a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ProfileFacts {
+    /// Its name, if it can be used.
+    pub name: Option<String>,
+    /// Its one line for people, if it can be used.
+    pub summary: Option<String>,
+    /// What keeps this build from using it.
+    pub problem: Option<String>,
+}
+
+impl ProfileFacts {
+    pub(super) fn of(head: &Head) -> Option<Self> {
+        let parsed = match head.profile_toml.as_ref()? {
+            Ok(text) => Profile::from_toml(text, "profile.toml").map_err(|error| error.to_string()),
+            Err(error) => Err(error.to_string()),
+        };
+        Some(match parsed {
+            Ok(profile) => Self { name: Some(profile.name), summary: Some(profile.summary), problem: None },
+            Err(problem) => Self { name: None, summary: None, problem: Some(problem) },
+        })
+    }
+}
+
+/// From the first record to the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Span {
+    /// Earliest log time, ns since the Unix epoch.
+    pub first_ns: u64,
+    /// Latest log time, ns since the Unix epoch.
+    pub last_ns: u64,
+    /// Between them, s.
+    pub duration_s: f64,
+}
+
+impl Span {
+    pub(super) fn new(first_ns: u64, last_ns: u64) -> Self {
+        Self { first_ns, last_ns, duration_s: seconds(last_ns.saturating_sub(first_ns)) }
+    }
+}
+
+/// Whether anything is missing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Completeness {
+    /// The log was ended properly, nothing in it is broken and nothing is missing.
+    pub complete: bool,
+    /// What ended the reading early.
+    pub damage: Option<String>,
+    /// The last time that could be read, s after the first record.
+    pub readable_until_s: Option<f64>,
+    /// How much is missing behind that, s; known only if the end of the file can be read.
+    pub missing_s: Option<f64>,
+    /// Ticks missing between the first and the last that are there.
+    pub ticks_missing: u64,
+    /// Messages missing before the last of their channel.
+    pub messages_lost: u64,
+}
+
+impl Completeness {
+    pub(super) fn new(
+        damage: Option<&Damage>,
+        span: Option<&Span>,
+        ticks: Option<&TickFacts>,
+        channels: &[ChannelFacts],
+        summary: impl FnOnce() -> Option<SummaryFacts>,
+    ) -> Self {
+        let missing_s = damage.and_then(|_| {
+            let end_ns = summary()?.last_log_time_ns;
+            Some(seconds(end_ns.checked_sub(span?.last_ns)?))
+        });
+        let ticks_missing = ticks.map_or(0, |ticks| ticks.missing);
+        let messages_lost = channels.iter().map(|channel| channel.lost).sum();
+        Self {
+            complete: damage.is_none() && ticks_missing == 0 && messages_lost == 0,
+            damage: damage.map(ToString::to_string),
+            readable_until_s: span.map(|span| span.duration_s),
+            missing_s,
+            ticks_missing,
+            messages_lost,
+        }
+    }
+}
+
+/// The landing verdict, as recorded.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictFacts {
+    /// Whether it was a landing.
+    pub landed: bool,
+    /// Vehicle time of contact, s.
+    pub time_s: f64,
+    /// Every limit.
+    pub limits: Vec<VerdictLimit>,
+}
+
+/// A limit of the landing verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictLimit {
+    /// What was judged.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// The lowest allowed.
+    pub minimum: f64,
+    /// The highest allowed.
+    pub maximum: f64,
+    /// The unit of the three.
+    pub unit: String,
+    /// Whether the value lies inside.
+    pub passed: bool,
+}
+
+impl VerdictFacts {
+    pub(super) fn of(verdict: &v1::LandingVerdict) -> Self {
+        let limits = verdict.limits.iter().map(|limit| VerdictLimit {
+            name: limit.name.clone(),
+            value: limit.value,
+            minimum: limit.minimum,
+            maximum: limit.maximum,
+            unit: limit.unit.clone(),
+            passed: limit.passed,
+        });
+        Self { landed: verdict.landed, time_s: verdict.time_s, limits: limits.collect() }
+    }
+}
+
+fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}

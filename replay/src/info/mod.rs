@@ -1,0 +1,118 @@
+//! What is in a log, how complete it is, and what can be done with it.
+
+mod channels;
+mod facts;
+mod phases;
+mod ticks;
+
+pub use channels::ChannelFacts;
+pub use facts::{Completeness, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit};
+pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
+pub use ticks::{Named, SolveTimes, TickFacts};
+
+use std::io::Read;
+use std::path::Path;
+
+use protocol::log::v1;
+
+use crate::log::{Entry, FlightLog, LogError, SummaryFacts, summary_of};
+use channels::ChannelCounter;
+use phases::PhaseTracker;
+use ticks::TickCounter;
+
+/// Describes a log file.
+///
+/// # Errors
+/// The file is not a flight log or cannot be read. Damage is part of the description, not an error.
+pub fn info(path: &Path) -> Result<Info, LogError> {
+    let mut log = FlightLog::open(path)?;
+    let mut info = info_of(&mut log, || summary_of(path))?;
+    info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    Ok(info)
+}
+
+/// Describes a log that is being read. `summary` is asked for the file's summary if the log is damaged.
+///
+/// # Errors
+/// As [`info`].
+pub fn info_of<R: Read>(
+    log: &mut FlightLog<R>,
+    summary: impl FnOnce() -> Option<SummaryFacts>,
+) -> Result<Info, LogError> {
+    let mut seen = Seen::default();
+    while let Some(stamped) = log.next_entry()? {
+        seen.channels.count(&stamped);
+        seen.span = Some(match seen.span {
+            None => (stamped.log_time_ns, stamped.log_time_ns),
+            Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
+        });
+        seen.take(stamped.entry);
+    }
+    Ok(seen.into_info(log, summary))
+}
+
+/// What has been seen on the way through a log.
+#[derive(Default)]
+struct Seen {
+    channels: ChannelCounter,
+    span: Option<(u64, u64)>,
+    ticks: TickCounter,
+    vehicle_phases: PhaseTracker,
+    telemetry_phases: PhaseTracker,
+    verdict: Option<v1::LandingVerdict>,
+    unreadable: Option<String>,
+}
+
+impl Seen {
+    fn take(&mut self, entry: Entry) {
+        match entry {
+            Entry::Tick(tick) => {
+                self.vehicle_phases.note(tick.input.time_s, tick.input.phase);
+                self.ticks.count(&tick);
+            }
+            Entry::Truth(truth) => self.vehicle_phases.note(truth.time_s, truth.phase),
+            Entry::Telemetry(telemetry) => {
+                if let Some(phase) = telemetry.phase {
+                    self.telemetry_phases.note(telemetry.time_s, phase);
+                }
+            }
+            Entry::Verdict(verdict) => self.verdict = Some(*verdict),
+            Entry::Unreadable { reason } => {
+                self.unreadable.get_or_insert(reason);
+            }
+            Entry::RawFrame | Entry::Operator | Entry::Other => {}
+        }
+    }
+
+    fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<SummaryFacts>) -> Info {
+        let head = log.head();
+        let profile = ProfileFacts::of(head);
+        let ticks = self.ticks.into_facts();
+        let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
+        let channels = self.channels.into_facts(log.channels());
+        let completeness = Completeness::new(log.damage(), span.as_ref(), ticks.as_ref(), &channels, summary);
+        let timelines =
+            [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
+        Info {
+            file: log.name().to_owned(),
+            size_bytes: None,
+            grade: Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
+            library: head.library.clone(),
+            build: head.build.clone(),
+            build_comparison: head.compare_build(),
+            run: head.run.clone(),
+            profile,
+            span,
+            channels,
+            ticks,
+            phases: timelines
+                .into_iter()
+                .filter_map(|(source, tracker)| tracker.into_timeline(source))
+                .collect(),
+            verdict: self.verdict.as_ref().map(VerdictFacts::of),
+            unreadable: self.unreadable,
+            completeness,
+            attachments: head.attachments.clone(),
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! The controller's ticks, counted.
+
+use std::collections::BTreeMap;
+
+use flight::controller::ControlLevel;
+use flight::nmpc::SolveStatus;
+use protocol::log::v1;
+use serde::Serialize;
+
+use crate::log::{Gap, TickRanges};
+
+/// Gaps listed one by one.
+const GAPS_LISTED: usize = 20;
+
+/// Solve times kept for the percentiles: 8 MB, and more than a day of flight at 10 Hz.
+const SOLVE_TIMES_KEPT: usize = 1_000_000;
+
+/// The controller's ticks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TickFacts {
+    /// How many there are.
+    pub count: u64,
+    /// The lowest number.
+    pub first: u64,
+    /// The highest number.
+    pub last: u64,
+    /// Vehicle time of the first in the file, s.
+    pub first_time_s: f64,
+    /// Vehicle time of the last in the file, s.
+    pub last_time_s: f64,
+    /// How many numbers came more than once.
+    pub repeated: u64,
+    /// How many are missing between the first and the last.
+    pub missing: u64,
+    /// The first gaps.
+    pub gaps: Vec<Gap>,
+    /// How many ticks each control level decided.
+    pub levels: Vec<Named>,
+    /// How many ticks ended with each solver status.
+    pub solver_statuses: Vec<Named>,
+    /// How long the ticks took.
+    pub solve_time: SolveTimes,
+}
+
+/// A name and how often it occurs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Named {
+    /// The name, or `unknown (n)`.
+    pub name: String,
+    /// How many ticks.
+    pub ticks: u64,
+}
+
+/// How long the ticks took, as measured on board.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SolveTimes {
+    /// Half of the ticks took no longer, s.
+    pub median_s: f64,
+    /// 99 of 100 took no longer, s.
+    pub p99_s: f64,
+    /// The longest, s.
+    pub max_s: f64,
+    /// The shortest deadline any tick had, s.
+    pub deadline_s: f64,
+    /// Ticks that took longer than their deadline.
+    pub over_deadline: u64,
+    /// Ticks whose predecessor's output was dropped as too late: what was decided on board.
+    pub recorded_misses: u64,
+}
+
+/// Counts ticks.
+#[derive(Default)]
+pub(super) struct TickCounter {
+    count: u64,
+    ranges: TickRanges,
+    times_s: Option<(f64, f64)>,
+    levels: BTreeMap<u32, u64>,
+    statuses: BTreeMap<u32, u64>,
+    solve_times_s: Vec<f64>,
+    deadline_s: Option<f64>,
+    over_deadline: u64,
+    recorded_misses: u64,
+}
+
+impl TickCounter {
+    pub(super) fn count(&mut self, tick: &v1::ControllerTick) {
+        let time_s = tick.input.time_s;
+        self.count += 1;
+        self.ranges.insert(tick.input.tick);
+        self.times_s = Some((self.times_s.map_or(time_s, |(first_s, _)| first_s), time_s));
+        *self.levels.entry(tick.output.level).or_default() += 1;
+        *self.statuses.entry(tick.output.solver.status).or_default() += 1;
+        if self.solve_times_s.len() < SOLVE_TIMES_KEPT {
+            self.solve_times_s.push(tick.solve_time_s);
+        }
+        self.deadline_s =
+            Some(self.deadline_s.map_or(tick.deadline_s, |least_s| least_s.min(tick.deadline_s)));
+        self.over_deadline += u64::from(tick.solve_time_s > tick.deadline_s);
+        self.recorded_misses += u64::from(tick.input.deadline_missed);
+    }
+
+    pub(super) fn into_facts(mut self) -> Option<TickFacts> {
+        let (first, last) = self.ranges.bounds()?;
+        let (first_time_s, last_time_s) = self.times_s?;
+        self.solve_times_s.sort_by(f64::total_cmp);
+        let times_s = &self.solve_times_s;
+        Some(TickFacts {
+            count: self.count,
+            first,
+            last,
+            first_time_s,
+            last_time_s,
+            repeated: self.ranges.repeated(),
+            missing: self.ranges.gaps().map(|gap| gap.missing()).fold(0, u64::saturating_add),
+            gaps: self.ranges.gaps().take(GAPS_LISTED).collect(),
+            levels: named(&self.levels, level_name),
+            solver_statuses: named(&self.statuses, status_name),
+            solve_time: SolveTimes {
+                median_s: percentile(times_s, 50),
+                p99_s: percentile(times_s, 99),
+                max_s: percentile(times_s, 100),
+                deadline_s: self.deadline_s.unwrap_or(f64::NAN),
+                over_deadline: self.over_deadline,
+                recorded_misses: self.recorded_misses,
+            },
+        })
+    }
+}
+
+/// The smallest element that at least `percent` of 100 do not exceed (nearest rank).
+fn percentile(sorted: &[f64], percent: usize) -> f64 {
+    let rank = (sorted.len() * percent).div_ceil(100);
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+fn named(counts: &BTreeMap<u32, u64>, name: impl Fn(u32) -> Option<&'static str>) -> Vec<Named> {
+    let named = counts.iter().map(|(number, ticks)| Named {
+        name: name(*number).map_or_else(|| format!("unknown ({number})"), str::to_owned),
+        ticks: *ticks,
+    });
+    named.collect()
+}
+
+fn level_name(number: u32) -> Option<&'static str> {
+    ControlLevel::from_index(u8::try_from(number).ok()?).map(ControlLevel::name)
+}
+
+fn status_name(number: u32) -> Option<&'static str> {
+    let statuses = [
+        SolveStatus::NotRun,
+        SolveStatus::Converged,
+        SolveStatus::IterationLimit,
+        SolveStatus::Stalled,
+        SolveStatus::SubproblemFailed,
+        SolveStatus::NotLandable,
+        SolveStatus::BadInput,
+    ];
+    statuses.into_iter().find(|status| u32::from(status.index()) == number).map(SolveStatus::name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_of_the_nearest_rank() {
+        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
+        for (percent, expected) in [(50, 50.0), (99, 99.0), (100, 100.0)] {
+            assert_eq!(percentile(&hundred, percent).to_bits(), f64::to_bits(expected));
+            assert_eq!(percentile(&[7.0], percent).to_bits(), 7.0_f64.to_bits());
+        }
+        assert!(percentile(&[], 50).is_nan());
+    }
+}

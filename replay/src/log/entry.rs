@@ -1,0 +1,100 @@
+//! One record of a log, decoded if replay needs its content.
+
+use prost::Message;
+use protocol::log::reader::LogChannel;
+use protocol::log::record::{
+    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_VERDICT,
+};
+use protocol::log::v1;
+
+use super::schema::{PACKAGE, complaint};
+
+/// A record and where it stands in the log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StampedEntry {
+    /// Its channel; see [`FlightLog::channels`](super::FlightLog::channels).
+    pub channel_id: u16,
+    /// Nanoseconds since the Unix epoch.
+    pub log_time_ns: u64,
+    /// Its number within its channel.
+    pub sequence: u32,
+    /// Its content.
+    pub entry: Entry,
+}
+
+/// One record of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// A controller tick.
+    Tick(Box<v1::ControllerTick>),
+    /// The simulated plant.
+    Truth(Box<v1::PlantTruth>),
+    /// The landing verdict.
+    Verdict(Box<v1::LandingVerdict>),
+    /// What a ground station knew.
+    Telemetry(Box<v1::Telemetry>),
+    /// A raw frame; not kept.
+    RawFrame,
+    /// An operator's action; not kept.
+    Operator,
+    /// A record on one of our topics that this build cannot read.
+    Unreadable {
+        /// Why.
+        reason: String,
+    },
+    /// Anything else: events and transforms, which many programs write, and records of other programs.
+    Other,
+}
+
+impl Entry {
+    /// The content of a message on `channel`.
+    pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8]) -> Self {
+        let Some(channel) = channel else {
+            return Self::Other;
+        };
+        match channel.topic.as_str() {
+            TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
+            TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
+            TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
+            TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
+            TOPIC_OPERATOR => {
+                decoded::<v1::OperatorAction>(channel, "OperatorAction", data, |_| Self::Operator)
+            }
+            TOPIC_RAW_RX | TOPIC_RAW_TX if channel.message_encoding == ENCODING_MAVLINK => Self::RawFrame,
+            _ => Self::Other,
+        }
+    }
+}
+
+fn decoded<M: Message + Default>(
+    channel: &LogChannel,
+    message_name: &str,
+    data: &[u8],
+    kind: impl FnOnce(Box<M>) -> Entry,
+) -> Entry {
+    let accepted = format!("{PACKAGE}.{message_name}");
+    if channel.schema_name != accepted {
+        // Another program may use the same topic name.
+        return if channel.schema_name.starts_with("touchdown.") {
+            let found = &channel.schema_name;
+            let reason = format!("{} holds {found}; this build reads {accepted}", channel.topic);
+            Entry::Unreadable { reason }
+        } else {
+            Entry::Other
+        };
+    }
+    let message = match M::decode(data) {
+        Ok(message) => message,
+        Err(error) => {
+            return Entry::Unreadable { reason: format!("{}: {error}", channel.topic) };
+        }
+    };
+    // The decoder fills missing fields with zeros and skips unknown ones; the encoder then writes other bytes.
+    if message.encode_to_vec() != data
+        && let Some(complaint) = complaint(&accepted, data)
+    {
+        return Entry::Unreadable { reason: format!("{}: {complaint}", channel.topic) };
+    }
+    kind(Box::new(message))
+}

@@ -1,0 +1,88 @@
+//! What a log says about itself.
+
+use std::collections::BTreeMap;
+
+use protocol::log::build::build_info;
+use protocol::log::reader::LogItem;
+use protocol::log::record::{ATTACHMENT_PROFILE, METADATA_BUILD, METADATA_RUN};
+use serde::Serialize;
+
+/// Metadata and attachments.
+#[derive(Debug, Clone, Default)]
+pub struct Head {
+    /// The library that wrote the file.
+    pub library: String,
+    /// Which build wrote it.
+    pub build: BTreeMap<String, String>,
+    /// Which run it is: profile, seed and so on.
+    pub run: BTreeMap<String, String>,
+    /// The profile's whole text, or what kept it from being text.
+    pub profile_toml: Option<Result<String, std::string::FromUtf8Error>>,
+    /// Every attachment.
+    pub attachments: Vec<AttachmentFacts>,
+}
+
+/// An attachment, without its content.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AttachmentFacts {
+    /// Its name.
+    pub name: String,
+    /// Its size.
+    pub bytes: usize,
+}
+
+/// The build that wrote a log against this one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct BuildComparison {
+    /// The log says which build wrote it.
+    pub recorded: bool,
+    /// Every fact that differs; empty with `recorded` means the same build.
+    pub differences: Vec<BuildDifference>,
+}
+
+/// A fact in which two builds differ.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct BuildDifference {
+    /// Which fact.
+    pub fact: String,
+    /// As recorded; absent if the log does not say.
+    pub recorded: Option<String>,
+    /// Of this build; absent if this build does not note it.
+    pub this_build: Option<String>,
+}
+
+impl Head {
+    /// Written by one of our programs.
+    pub(super) fn is_ours(&self) -> bool {
+        self.library.starts_with("touchdown ")
+            || self.build.contains_key("git_commit")
+            || self.attachments.iter().any(|attachment| attachment.name == ATTACHMENT_PROFILE)
+    }
+
+    /// Notes an item that is not a message.
+    pub(super) fn take(&mut self, item: LogItem) {
+        match item {
+            LogItem::Library(library) => self.library = library,
+            LogItem::Metadata { name, entries } if name == METADATA_BUILD => self.build = entries,
+            LogItem::Metadata { name, entries } if name == METADATA_RUN => self.run.extend(entries),
+            LogItem::Attachment { name, data } => {
+                self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
+                if name == ATTACHMENT_PROFILE {
+                    self.profile_toml = Some(String::from_utf8(data));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The build that wrote the log against this one.
+    pub fn compare_build(&self) -> BuildComparison {
+        let this = build_info();
+        let facts: std::collections::BTreeSet<&String> = self.build.keys().chain(this.keys()).collect();
+        let differences = facts.into_iter().filter_map(|fact| {
+            let (recorded, this_build) = (self.build.get(fact).cloned(), this.get(fact).cloned());
+            (recorded != this_build).then(|| BuildDifference { fact: fact.clone(), recorded, this_build })
+        });
+        BuildComparison { recorded: !self.build.is_empty(), differences: differences.collect() }
+    }
+}

@@ -1,0 +1,142 @@
+//! A flight log, opened: what it says about itself, then its records in file order.
+//!
+//! Records are streamed, so memory does not grow with the log. Damage ends the stream and is then known
+//! ([`FlightLog::damage`]); everything before it has been handed out.
+
+mod entry;
+mod error;
+mod head;
+mod schema;
+mod summary;
+mod tick_order;
+mod tick_ranges;
+
+pub use entry::{Entry, StampedEntry};
+pub use error::LogError;
+pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
+pub(crate) use schema::tick_descriptor;
+pub use summary::{SummaryFacts, summary_of};
+pub use tick_order::{Ordered, TickOrder};
+pub use tick_ranges::{Gap, TickRanges};
+
+use std::fs::File;
+use std::io::{BufReader, Chain, Cursor, Read};
+use std::path::Path;
+
+use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
+
+/// First bytes of every MCAP file.
+const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
+
+const BUFFER_BYTES: usize = 1 << 20;
+
+/// A log being read.
+pub struct FlightLog<R: Read> {
+    name: String,
+    reader: LogReader<Chain<Cursor<Vec<u8>>, R>>,
+    head: Head,
+    /// Something was found that only a flight log has.
+    recognised: bool,
+    last_log_time_ns: Option<u64>,
+}
+
+impl FlightLog<BufReader<File>> {
+    /// Opens a log file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is not an MCAP file.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let name = path.display().to_string();
+        match File::open(path) {
+            Ok(file) => Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file)),
+            Err(source) => Err(LogError::Read { name, source }),
+        }
+    }
+}
+
+impl<R: Read> FlightLog<R> {
+    /// Reads a log from anywhere; `name` is used in messages only.
+    ///
+    /// # Errors
+    /// The input cannot be read, or is not an MCAP file.
+    pub fn read(name: String, mut input: R) -> Result<Self, LogError> {
+        let mut start = Vec::with_capacity(MCAP_MAGIC.len());
+        let read = input.by_ref().take(MCAP_MAGIC.len() as u64).read_to_end(&mut start);
+        if let Err(source) = read {
+            return Err(LogError::Read { name, source });
+        }
+        if start.is_empty() {
+            return Err(LogError::Empty { name });
+        }
+        if start != MCAP_MAGIC {
+            return Err(LogError::NotMcap { name, found: start });
+        }
+        Ok(Self {
+            name,
+            reader: LogReader::new(Cursor::new(start).chain(input)),
+            head: Head::default(),
+            recognised: false,
+            last_log_time_ns: None,
+        })
+    }
+
+    /// The file's name, for messages.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the log has said about itself so far: complete once the entries are exhausted, and in our own logs
+    /// already at the first entry.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Every channel seen so far.
+    pub fn channels(&self) -> impl Iterator<Item = (u16, &LogChannel)> {
+        self.reader.channels()
+    }
+
+    /// What ended the reading early; `None` for a whole log, once the entries are exhausted.
+    pub fn damage(&self) -> Option<&Damage> {
+        self.reader.damage()
+    }
+
+    /// The latest time of any entry so far, ns since the Unix epoch.
+    pub fn last_log_time_ns(&self) -> Option<u64> {
+        self.last_log_time_ns
+    }
+
+    /// The next entry.
+    ///
+    /// # Errors
+    /// The input cannot be read; or, at the end, nothing in the file belonged to a flight log.
+    pub fn next_entry(&mut self) -> Result<Option<StampedEntry>, LogError> {
+        loop {
+            let item = self.reader.next_item();
+            let item = item.map_err(|source| LogError::Read { name: self.name.clone(), source })?;
+            match item {
+                None => return self.end().map(|()| None),
+                Some(LogItem::Message { channel_id, log_time_ns, sequence, data }) => {
+                    let entry = Entry::decode(self.reader.channel(channel_id), &data);
+                    self.recognised |= !matches!(entry, Entry::Other);
+                    self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
+                    return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, entry }));
+                }
+                Some(item) => self.head.take(item),
+            }
+        }
+    }
+
+    fn end(&self) -> Result<(), LogError> {
+        if self.recognised || self.head.is_ours() {
+            return Ok(());
+        }
+        if let Some(damage) = self.damage()
+            && self.reader.channels().next().is_none()
+        {
+            return Err(LogError::NothingReadable { name: self.name.clone(), damage: damage.to_string() });
+        }
+        let topics = self.reader.channels().map(|(_, channel)| channel.topic.clone()).collect();
+        Err(LogError::Foreign { name: self.name.clone(), library: self.head.library.clone(), topics })
+    }
+}

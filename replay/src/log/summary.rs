@@ -1,0 +1,39 @@
+//! What the far end of a damaged file still says: a file broken in its middle may have kept its summary.
+
+use std::fs::File;
+use std::io::{Read as _, Seek as _};
+use std::path::Path;
+
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+
+/// A summary larger than this is taken for damage.
+const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
+
+/// What a file's summary says about the whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SummaryFacts {
+    /// Messages in the file.
+    pub message_count: u64,
+    /// Time of the last message, ns since the Unix epoch.
+    pub last_log_time_ns: u64,
+}
+
+/// The summary at the end of a file, if it has one that can be read.
+pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
+    let mut file = File::open(path).ok()?;
+    let size = file.metadata().ok()?.len();
+    let options =
+        SummaryReaderOptions::default().with_file_size(size).with_record_length_limit(RECORD_LIMIT_BYTES);
+    let mut reader = SummaryReader::new_with_options(options);
+    while let Some(event) = reader.next_event() {
+        match event.ok()? {
+            SummaryReadEvent::ReadRequest(need) => {
+                let count = file.read(reader.insert(need)).ok()?;
+                reader.notify_read(count);
+            }
+            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to).ok()?),
+        }
+    }
+    let stats = reader.finish()?.stats?;
+    Some(SummaryFacts { message_count: stats.message_count, last_log_time_ns: stats.message_end_time })
+}

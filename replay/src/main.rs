@@ -1,0 +1,30 @@
+//! The `replay` command.
+
+mod cli;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use cli::Cli;
+
+/// Every exit code is decided here, and listed in the help of [`Cli`].
+fn main() -> ExitCode {
+    let answered = match Cli::try_parse() {
+        Ok(cli) => cli.run(),
+        Err(usage) => {
+            // Help goes to stdout and is no failure; anything else goes to stderr. Nothing is left to do if even
+            // that cannot be written.
+            let _ = usage.print();
+            return ExitCode::from(if usage.use_stderr() { cli::EXIT_NO_ANSWER } else { 0 });
+        }
+    };
+    match answered {
+        Ok(answer) => ExitCode::from(answer.exit_code()),
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "replay: {error:#}");
+            ExitCode::from(cli::EXIT_NO_ANSWER)
+        }
+    }
+}

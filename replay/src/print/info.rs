@@ -1,0 +1,231 @@
+//! A description of a log, for people.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
+
+use super::{counted, shown};
+use crate::info::{ChannelFacts, Info, Named, PhaseTimeline, TickFacts, VerdictFacts};
+
+/// Writes a description of a log as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
+    writeln!(output, "{}{size}", shown(&info.file))?;
+    row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
+    row(output, "complete", &completeness(info))?;
+    print_origin(info, output)?;
+    if let Some(span) = &info.span {
+        let (first, last) = (utc(span.first_ns), utc(span.last_ns));
+        row(output, "time", &format!("{first} to {last}, {:.3} s", span.duration_s))?;
+    }
+    if let Some(timeline) = info.phases.first() {
+        print_phases(timeline, output)?;
+    }
+    if let Some(verdict) = &info.verdict {
+        print_verdict(verdict, output)?;
+    }
+    if let Some(ticks) = &info.ticks {
+        print_ticks(ticks, output)?;
+    }
+    print_channels(&info.channels, output)?;
+    let attached: Vec<String> = info
+        .attachments
+        .iter()
+        .map(|attachment| format!("{} ({})", shown(&attachment.name), size_text(attachment.bytes as u64)))
+        .collect();
+    row(output, "attached", &or_none(attached.join(", ")))?;
+    if let Some(reason) = &info.unreadable {
+        row(output, "unreadable", &shown(reason))?;
+    }
+    Ok(())
+}
+
+fn row(output: &mut impl Write, name: &str, text: &str) -> io::Result<()> {
+    writeln!(output, "{}", format!("{name:<11} {text}").trim_end())
+}
+
+fn completeness(info: &Info) -> String {
+    let found = &info.completeness;
+    if found.complete {
+        return "yes: ended properly, every checksum holds".to_owned();
+    }
+    let mut faults = Vec::new();
+    if let Some(damage) = &found.damage {
+        faults.push(shown(damage));
+        faults.push(match found.readable_until_s {
+            None => "no record could be read".to_owned(),
+            Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
+        });
+        faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s behind that are lost")));
+    }
+    if found.ticks_missing > 0 {
+        faults.push(format!("{} missing", counted(found.ticks_missing, "tick")));
+    }
+    if found.messages_lost > 0 {
+        faults.push(format!("{} lost", counted(found.messages_lost, "message")));
+    }
+    format!("NO: {}", faults.join("; "))
+}
+
+fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    row(output, "written by", &or_none(shown(&info.library)))?;
+    let listed = |entries: &BTreeMap<String, String>| {
+        let listed: Vec<String> =
+            entries.iter().map(|(key, value)| format!("{} {}", shown(key), short(value))).collect();
+        or_none(listed.join(", "))
+    };
+    row(output, "run", &listed(&info.run))?;
+    let comparison = &info.build_comparison;
+    if !comparison.recorded {
+        row(output, "build", "not recorded")?;
+    } else if comparison.differences.is_empty() {
+        row(output, "build", &format!("this one: {}", listed(&info.build)))?;
+    } else {
+        row(output, "build", "another than this one:")?;
+        for difference in &comparison.differences {
+            let value =
+                |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
+            let (recorded, this) = (value(&difference.recorded), value(&difference.this_build));
+            row(output, "", &format!("{}: {recorded} (this one: {this})", shown(&difference.fact)))?;
+        }
+    }
+    let profile = match &info.profile {
+        None => "not attached".to_owned(),
+        Some(profile) => match (&profile.name, &profile.summary) {
+            (Some(name), Some(summary)) => format!("{}: {}", shown(name), shown(summary)),
+            _ => format!("cannot be used: {}", shown(profile.problem.as_deref().unwrap_or_default())),
+        },
+    };
+    row(output, "profile", &profile)
+}
+
+fn print_phases(timeline: &PhaseTimeline, output: &mut impl Write) -> io::Result<()> {
+    for (index, span) in timeline.spans.iter().enumerate() {
+        let from =
+            if index == 0 { format!("   (from the {})", timeline.source.name()) } else { String::new() };
+        let name = if index == 0 { "phases" } else { "" };
+        row(output, name, &format!("{:>9.3} to {:>9.3} s  {}{from}", span.from_s, span.until_s, span.phase))?;
+    }
+    if timeline.further_changes > 0 {
+        row(output, "", &format!("and {} more", counted(timeline.further_changes, "change")))?;
+    }
+    Ok(())
+}
+
+fn print_verdict(verdict: &VerdictFacts, output: &mut impl Write) -> io::Result<()> {
+    let landed = if verdict.landed { "LANDED" } else { "NOT LANDED" };
+    row(output, "verdict", &format!("{landed} at {:.3} s", verdict.time_s))?;
+    for limit in &verdict.limits {
+        let passed = if limit.passed { "inside" } else { "OUTSIDE" };
+        let text = format!(
+            "{:<12} {:>9.4} {:<6} {passed} {} to {}",
+            shown(&limit.name),
+            limit.value,
+            shown(&limit.unit),
+            rounded(limit.minimum),
+            rounded(limit.maximum)
+        );
+        row(output, "", &text)?;
+    }
+    Ok(())
+}
+
+fn print_ticks(ticks: &TickFacts, output: &mut impl Write) -> io::Result<()> {
+    let TickFacts { count, first, last, first_time_s, last_time_s, .. } = ticks;
+    row(
+        output,
+        "ticks",
+        &format!(
+            "{count}, from {first} ({first_time_s:.3} s) to {last} ({last_time_s:.3} s), {}",
+            gaps_text(ticks)
+        ),
+    )?;
+    if ticks.repeated > 0 {
+        row(output, "", &format!("{} repeated", ticks.repeated))?;
+    }
+    row(output, "levels", &names_text(&ticks.levels))?;
+    row(output, "solver", &names_text(&ticks.solver_statuses))?;
+    let time = &ticks.solve_time;
+    let text = format!(
+        "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it, {} dropped as too late",
+        time.median_s * 1e3,
+        time.p99_s * 1e3,
+        time.max_s * 1e3,
+        time.deadline_s * 1e3,
+        time.over_deadline,
+        time.recorded_misses
+    );
+    row(output, "solve time", &text)
+}
+
+fn gaps_text(ticks: &TickFacts) -> String {
+    let Some(first) = ticks.gaps.first() else {
+        return "no gaps".to_owned();
+    };
+    let missing = counted(ticks.missing, "tick");
+    format!("{missing} MISSING, first between {} and {}", first.after, first.before)
+}
+
+fn names_text(names: &[Named]) -> String {
+    names.iter().map(|named| format!("{} {}", named.name, named.ticks)).collect::<Vec<_>>().join(", ")
+}
+
+fn print_channels(channels: &[ChannelFacts], output: &mut impl Write) -> io::Result<()> {
+    for (index, channel) in channels.iter().enumerate() {
+        let ChannelFacts { topic, schema, messages, lost, unreadable, metadata, .. } = channel;
+        let mut remarks: Vec<String> = ["endpoint", "link"]
+            .iter()
+            .filter_map(|key| metadata.get(*key))
+            .map(|value| shown(value))
+            .collect();
+        if *lost > 0 {
+            remarks.push(format!("{lost} LOST"));
+        }
+        if *unreadable > 0 {
+            remarks.push(format!("{unreadable} UNREADABLE"));
+        }
+        let text =
+            format!("{:<16} {messages:>8}  {:<31} {}", shown(topic), shown(schema), remarks.join(", "));
+        row(output, if index == 0 { "channels" } else { "" }, &text)?;
+    }
+    Ok(())
+}
+
+/// A hash is known by its beginning; JSON has the whole.
+fn short(value: &str) -> String {
+    const HASH_MIN: usize = 40;
+    const SHOWN: usize = 12;
+    let hash = value.len() >= HASH_MIN && value.bytes().all(|byte| byte.is_ascii_hexdigit());
+    shown(if hash { &value[..SHOWN] } else { value })
+}
+
+/// A limit is a decimal number that went through radians.
+fn rounded(limit: f64) -> f64 {
+    (limit * 1e6).round() / 1e6
+}
+
+fn or_none(text: String) -> String {
+    if text.is_empty() { "none".to_owned() } else { text }
+}
+
+fn size_text(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} bytes"),
+        10_000..10_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    }
+}
+
+/// To the millisecond.
+fn utc(unix_ns: u64) -> String {
+    const MILLISECOND_NS: u64 = 1_000_000;
+    OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ns - unix_ns % MILLISECOND_NS))
+        .ok()
+        .and_then(|time| time.format(&Rfc3339).ok())
+        .unwrap_or_else(|| format!("{unix_ns} ns"))
+}

@@ -1,0 +1,218 @@
+//! Which fields of two records differ, by bits.
+
+use std::fmt;
+
+use prost_reflect::{DynamicMessage, ReflectMessage as _, Value};
+use serde::{Serialize, Serializer};
+
+use crate::log::tick_descriptor;
+
+/// A field in which a recorded and a recomputed tick differ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FieldDifference {
+    /// Where, as in `output.plan.states[3].u_m_s`.
+    pub path: String,
+    /// What the log says.
+    pub recorded: FieldValue,
+    /// What was computed now.
+    pub recomputed: FieldValue,
+    /// How many representable numbers lie between the two, for numbers that have an order.
+    pub ulps: Option<u64>,
+}
+
+/// The content of a field.
+#[derive(Debug, Clone, Copy)]
+pub enum FieldValue {
+    /// A floating-point number.
+    Float(f64),
+    /// A whole number.
+    Integer(u64),
+    /// Yes or no.
+    Flag(bool),
+    /// The list ends before this element.
+    Absent,
+    /// Nothing this comparison has a name for.
+    Opaque,
+}
+
+impl FieldValue {
+    fn of(value: &Value) -> Self {
+        match value {
+            Value::F64(number) => Self::Float(*number),
+            Value::U32(number) => Self::Integer(u64::from(*number)),
+            Value::U64(number) => Self::Integer(*number),
+            Value::Bool(flag) => Self::Flag(*flag),
+            _ => Self::Opaque,
+        }
+    }
+
+    /// The bit pattern, for what is compared by bits.
+    pub fn bits(&self) -> Option<u64> {
+        match self {
+            Self::Float(number) => Some(number.to_bits()),
+            _ => None,
+        }
+    }
+}
+
+/// By bits: -0.0 is not 0.0, and a NaN equals itself.
+impl PartialEq for FieldValue {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Float(a), Self::Float(b)) => a.to_bits() == b.to_bits(),
+            (Self::Integer(a), Self::Integer(b)) => a == b,
+            (Self::Flag(a), Self::Flag(b)) => a == b,
+            (Self::Absent, Self::Absent) => true,
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for FieldValue {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // The shortest text that reads back as the same number, with the sign of zero.
+            Self::Float(number) => write!(formatter, "{number:?}"),
+            Self::Integer(number) => write!(formatter, "{number}"),
+            Self::Flag(flag) => write!(formatter, "{flag}"),
+            Self::Absent => write!(formatter, "(absent)"),
+            Self::Opaque => write!(formatter, "(bytes)"),
+        }
+    }
+}
+
+/// As text, since JSON has no NaN, no infinity and in many readers no -0.0; the bits beside it.
+impl Serialize for FieldValue {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Shown {
+            value: String,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            bits: Option<String>,
+        }
+        let bits = self.bits().map(|bits| format!("0x{bits:016x}"));
+        Shown { value: self.to_string(), bits }.serialize(serializer)
+    }
+}
+
+/// How many representable numbers lie between two, 0 for equal bits; -0.0 and 0.0 are 1 apart. `None` if either is
+/// not a number.
+pub fn ulp_distance(a: f64, b: f64) -> Option<u64> {
+    (!a.is_nan() && !b.is_nan()).then(|| rank(a).abs_diff(rank(b)))
+}
+
+/// Orders all numbers from -infinity to infinity.
+fn rank(number: f64) -> u64 {
+    const SIGN: u64 = 1 << 63;
+    let bits = number.to_bits();
+    if bits & SIGN == 0 { bits | SIGN } else { !bits }
+}
+
+/// Every field in which two encoded controller ticks differ, in the record's order.
+pub fn differences(recorded: &[u8], recomputed: &[u8]) -> Vec<FieldDifference> {
+    let decoded = |bytes: &[u8]| DynamicMessage::decode(tick_descriptor()?, bytes).ok();
+    let mut found = Vec::new();
+    if let (Some(a), Some(b)) = (decoded(recorded), decoded(recomputed)) {
+        compare_messages("", &a, &b, &mut found);
+    }
+    if found.is_empty() && recorded != recomputed {
+        // Other bytes and no field to blame must not pass for equal.
+        found.push(difference("(record)".to_owned(), FieldValue::Opaque, FieldValue::Opaque));
+    }
+    found
+}
+
+fn difference(path: String, recorded: FieldValue, recomputed: FieldValue) -> FieldDifference {
+    let ulps = match (recorded, recomputed) {
+        (FieldValue::Float(a), FieldValue::Float(b)) => ulp_distance(a, b),
+        _ => None,
+    };
+    FieldDifference { path, recorded, recomputed, ulps }
+}
+
+fn compare_messages(path: &str, a: &DynamicMessage, b: &DynamicMessage, found: &mut Vec<FieldDifference>) {
+    for field in a.descriptor().fields() {
+        let name = if path.is_empty() { field.name().to_owned() } else { format!("{path}.{}", field.name()) };
+        compare_values(&name, &a.get_field(&field), &b.get_field(&field), found);
+    }
+}
+
+fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDifference>) {
+    match (a, b) {
+        (Value::Message(a), Value::Message(b)) => compare_messages(path, a, b, found),
+        (Value::List(a), Value::List(b)) => {
+            if a.len() != b.len() {
+                let length = |list: &[Value]| FieldValue::Integer(list.len() as u64);
+                found.push(difference(format!("{path}.len"), length(a), length(b)));
+            }
+            for (index, (a, b)) in a.iter().zip(b).enumerate() {
+                compare_values(&format!("{path}[{index}]"), a, b, found);
+            }
+        }
+        _ => {
+            let (recorded, recomputed) = (FieldValue::of(a), FieldValue::of(b));
+            if recorded != recomputed {
+                found.push(difference(path.to_owned(), recorded, recomputed));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use prost::Message as _;
+    use protocol::log::v1;
+
+    use super::*;
+
+    #[test]
+    fn neighbours_are_one_apart_across_zero_and_up_to_infinity() {
+        assert_eq!(ulp_distance(1.0, 1.0 + f64::EPSILON), Some(1));
+        assert_eq!(ulp_distance(-0.0, 0.0), Some(1));
+        assert_eq!(ulp_distance(f64::MAX, f64::INFINITY), Some(1));
+        assert_eq!(ulp_distance(f64::NEG_INFINITY, f64::INFINITY), Some(2 * f64::INFINITY.to_bits() + 1));
+        assert_eq!(ulp_distance(f64::NAN, 1.0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn the_distance_is_symmetric_and_nil_only_for_equal_bits(a: u64, b: u64) {
+            let (a, b) = (f64::from_bits(a), f64::from_bits(b));
+            prop_assert_eq!(ulp_distance(a, b), ulp_distance(b, a));
+            if let Some(distance) = ulp_distance(a, b) {
+                prop_assert_eq!(distance == 0, a.to_bits() == b.to_bits());
+            }
+        }
+
+        #[test]
+        fn any_two_nans_with_other_payloads_differ(a: u64, b: u64) {
+            const NAN: u64 = 0x7ff8_0000_0000_0000;
+            let tick = |bits: u64| {
+                let mut tick = v1::ControllerTick::default();
+                tick.output.gimbal_command_rad = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
+                tick.encode_to_vec()
+            };
+            let found = differences(&tick(a), &tick(b));
+            if tick(a) == tick(b) {
+                prop_assert!(found.is_empty());
+            } else {
+                prop_assert_eq!(found.len(), 1);
+                prop_assert_eq!(&found[0].path, "output.gimbal_command_rad");
+                prop_assert_eq!(found[0].ulps, None);
+            }
+        }
+    }
+
+    #[test]
+    fn lists_of_other_lengths_differ_in_length() {
+        let mut longer = v1::ControllerTick::default();
+        longer.output.fin_command_rad = vec![1.0, 2.0];
+        let mut shorter = longer.clone();
+        shorter.output.fin_command_rad.pop();
+        let found = differences(&longer.encode_to_vec(), &shorter.encode_to_vec());
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].path, "output.fin_command_rad.len");
+        assert_eq!(found[0].recorded, FieldValue::Integer(2));
+    }
+}

@@ -1,0 +1,145 @@
+//! Does the controller decide again, bit for bit, what it decided then?
+//!
+//! [`verify`] builds the controller from the profile in the log, feeds it every recorded input in tick order and
+//! compares every field of what it decides (and the digest of what it remembers) with the record. Measured times
+//! are not compared.
+//!
+//! The controller remembers its plan, so a tick can be re-executed only if every tick before it can: at a gap the
+//! comparison ends, and the report says so.
+
+mod difference;
+mod report;
+mod verifier;
+
+pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
+pub use report::{Divergence, Obstacle, Outcome, VerifyReport};
+pub use verifier::Verifier;
+
+use std::io::Read;
+use std::path::Path;
+
+use flight::profile::Profile;
+
+use crate::log::{Entry, FlightLog, Head, LogError, Ordered, TickOrder};
+
+/// Verifies a log file.
+///
+/// # Errors
+/// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
+pub fn verify(path: &Path) -> Result<VerifyReport, LogError> {
+    let mut log = FlightLog::open(path)?;
+    verify_log(&mut log, || {
+        // Another tool may have moved the attachments behind the messages.
+        let mut whole = FlightLog::open(path)?;
+        while whole.next_entry()?.is_some() {}
+        Ok(whole.head().clone())
+    })
+}
+
+/// Verifies a log that is being read. `whole_head` is asked for the log's whole head if its first tick comes
+/// before its profile.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_log<R: Read>(
+    log: &mut FlightLog<R>,
+    whole_head: impl Fn() -> Result<Head, LogError>,
+) -> Result<VerifyReport, LogError> {
+    let mut order = TickOrder::new();
+    let mut verifier = None;
+    let mut found = Found::default();
+    while let Some(stamped) = log.next_entry()? {
+        match stamped.entry {
+            Entry::Tick(tick) => {
+                found.ticks += 1;
+                if found.obstacle.is_some() {
+                    continue;
+                }
+                if verifier.is_none() {
+                    match profile_of(log, &whole_head)? {
+                        Ok(profile) => verifier = Some(Verifier::new(&profile)),
+                        Err(obstacle) => found.obstacle = Some(obstacle),
+                    }
+                }
+                if let Some(Ordered::Repeated { tick }) = order.push(tick) {
+                    found.obstacle.get_or_insert(Obstacle::Repeated { tick });
+                }
+                found.advance(&mut order, verifier.as_mut(), false);
+            }
+            Entry::Unreadable { reason } => {
+                found.unreadable.get_or_insert(reason);
+            }
+            _ => {}
+        }
+    }
+    found.advance(&mut order, verifier.as_mut(), true);
+    Ok(found.into_report(log, verifier))
+}
+
+/// What came up on the way through a log.
+#[derive(Default)]
+struct Found {
+    ticks: u64,
+    obstacle: Option<Obstacle>,
+    unreadable: Option<String>,
+}
+
+impl Found {
+    /// Compares every tick whose turn it is.
+    fn advance(&mut self, order: &mut TickOrder, verifier: Option<&mut Verifier>, at_end: bool) {
+        let Some(verifier) = verifier else {
+            return;
+        };
+        while self.obstacle.is_none()
+            && let Some(next) = order.pop(at_end)
+        {
+            match next {
+                Ordered::Tick(tick) => {
+                    self.obstacle = verifier.check(&tick).err().map(Obstacle::Input);
+                }
+                Ordered::Missing { from: 0, next } => {
+                    self.obstacle = Some(Obstacle::BeginningMissing { first: next });
+                }
+                Ordered::Missing { from, next } => {
+                    self.obstacle = Some(Obstacle::Gap { after: from - 1, before: next });
+                }
+                Ordered::Repeated { tick } => self.obstacle = Some(Obstacle::Repeated { tick }),
+            }
+        }
+    }
+
+    fn into_report<R: Read>(self, log: &FlightLog<R>, verifier: Option<Verifier>) -> VerifyReport {
+        let obstacle = match (self.obstacle, self.unreadable) {
+            // An unreadable tick leaves a gap; what made it unreadable says more than the gap.
+            (None | Some(Obstacle::Gap { .. } | Obstacle::BeginningMissing { .. }), Some(reason)) => {
+                Some(Obstacle::Unreadable { reason })
+            }
+            (None, None) if self.ticks == 0 => Some(Obstacle::NoTicks),
+            (obstacle, _) => obstacle,
+        };
+        VerifyReport::new(
+            log.name().to_owned(),
+            self.ticks,
+            verifier,
+            obstacle,
+            log.damage().map(ToString::to_string),
+            log.head().compare_build(),
+        )
+    }
+}
+
+fn profile_of<R: Read>(
+    log: &FlightLog<R>,
+    whole_head: &impl Fn() -> Result<Head, LogError>,
+) -> Result<Result<Profile, Obstacle>, LogError> {
+    let found = match &log.head().profile_toml {
+        Some(found) => Some(found.clone()),
+        None => whole_head()?.profile_toml,
+    };
+    Ok(match found {
+        None => Err(Obstacle::NoProfile),
+        Some(Err(error)) => Err(Obstacle::ProfileUnreadable { reason: error.to_string() }),
+        Some(Ok(text)) => Profile::from_toml(&text, "profile.toml")
+            .map_err(|error| Obstacle::ProfileUnreadable { reason: error.to_string() }),
+    })
+}

@@ -1,0 +1,165 @@
+//! What a verification found.
+
+use serde::Serialize;
+use tick_log::TickLogError;
+
+use super::difference::FieldDifference;
+use super::verifier::Verifier;
+use crate::log::BuildComparison;
+
+/// The answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Every tick of a whole log is identical.
+    Identical,
+    /// Every tick is identical that could be read of a damaged log.
+    IdenticalReadablePart,
+    /// Some tick differs.
+    Diverged,
+    /// Some tick could not be re-executed, and none that could differs.
+    NotReplayable,
+}
+
+/// Why ticks were not compared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Obstacle {
+    /// No tick in the log.
+    #[error(
+        "it has no controller ticks: replay needs the log of the vehicle or of the demonstration, not of a ground station"
+    )]
+    NoTicks,
+    /// No profile in the log.
+    #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
+    NoProfile,
+    /// The profile in the log is not one of this build.
+    #[error("its profile cannot be used by this build: {reason}")]
+    ProfileUnreadable {
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The log does not begin with the first tick.
+    #[error("it begins with tick {first}, not with tick 0: what the controller remembered then is unknown")]
+    BeginningMissing {
+        /// The first tick there is.
+        first: u64,
+    },
+    /// Ticks are missing.
+    #[error(
+        "after tick {after} comes tick {before}: what the controller remembered there is unknown, and nothing behind the gap was compared"
+    )]
+    Gap {
+        /// The last tick before the gap.
+        after: u64,
+        /// The first behind it.
+        before: u64,
+    },
+    /// A tick is there twice.
+    #[error(
+        "tick {tick} is recorded twice, as if two controllers had written: nothing behind it was compared"
+    )]
+    Repeated {
+        /// Its number.
+        tick: u64,
+    },
+    /// A record cannot be read.
+    #[error("a record cannot be read: {reason}")]
+    Unreadable {
+        /// Why.
+        reason: String,
+    },
+    /// An input has no meaning in this build.
+    #[error("{0}")]
+    Input(#[from] TickLogError),
+}
+
+/// As its words.
+impl Serialize for Obstacle {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A tick that differs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Divergence {
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    /// The phase.
+    pub phase: &'static str,
+    /// How many of its fields differ.
+    pub fields_different: usize,
+    /// Those fields, in the record's order; the first few if there are many.
+    pub fields: Vec<FieldDifference>,
+}
+
+/// What a verification found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerifyReport {
+    /// The log.
+    pub file: String,
+    /// The answer.
+    pub outcome: Outcome,
+    /// Ticks that could be read.
+    pub ticks_recorded: u64,
+    /// Ticks that were re-executed and compared.
+    pub ticks_compared: u64,
+    /// Ticks identical in every bit.
+    pub ticks_identical: u64,
+    /// Ticks that differ.
+    pub ticks_different: u64,
+    /// Fields that differ, over all ticks.
+    pub fields_different: u64,
+    /// The first and the last tick compared.
+    pub span: Option<(u64, u64)>,
+    /// Vehicle time from the first tick compared to the last, s.
+    pub flight_s: Option<f64>,
+    /// The first tick that differs.
+    pub first_divergence: Option<Divergence>,
+    /// Why not every tick was compared.
+    pub obstacle: Option<Obstacle>,
+    /// What ended the reading of the log early.
+    pub damage: Option<String>,
+    /// The build that wrote the log against this one.
+    pub build: BuildComparison,
+}
+
+impl VerifyReport {
+    pub(super) fn new(
+        file: String,
+        ticks_recorded: u64,
+        verifier: Option<Verifier>,
+        obstacle: Option<Obstacle>,
+        damage: Option<String>,
+        build: BuildComparison,
+    ) -> Self {
+        let (counts, first_divergence) =
+            verifier.map(|verifier| (verifier.counts, verifier.first)).unwrap_or_default();
+        let outcome = if first_divergence.is_some() {
+            Outcome::Diverged
+        } else if obstacle.is_some() {
+            Outcome::NotReplayable
+        } else if damage.is_some() {
+            Outcome::IdenticalReadablePart
+        } else {
+            Outcome::Identical
+        };
+        Self {
+            file,
+            outcome,
+            ticks_recorded,
+            ticks_compared: counts.ticks,
+            ticks_identical: counts.ticks - counts.ticks_different,
+            ticks_different: counts.ticks_different,
+            fields_different: counts.fields_different,
+            span: counts.first.zip(counts.last).map(|(first, last)| (first.tick, last.tick)),
+            flight_s: counts.first.zip(counts.last).map(|(first, last)| last.time_s - first.time_s),
+            first_divergence,
+            obstacle,
+            damage,
+            build,
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Logs that are cut or broken: no panic, everything before the damage is used, and no damage goes unnoticed.
+
+use proptest::prelude::*;
+use protocol::log::v1::ControllerTick;
+use replay::info::{GradeLevel, info_of};
+use replay::log::{Entry, FlightLog, LogError};
+use replay::verify::Outcome;
+
+use crate::flown::{FLIGHT, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
+
+/// Every tick that can be read, and whether the log is damaged.
+fn read_ticks(bytes: &[u8]) -> Result<(Vec<ControllerTick>, bool), LogError> {
+    let mut log = FlightLog::read("test.mcap".to_owned(), bytes)?;
+    let mut ticks = Vec::new();
+    while let Some(stamped) = log.next_entry()? {
+        if let Entry::Tick(tick) = stamped.entry {
+            ticks.push(*tick);
+        }
+    }
+    Ok((ticks, log.damage().is_some()))
+}
+
+/// Where the data end and the summary begins.
+fn data_end() -> usize {
+    usize::try_from(WHOLE.synced.last().unwrap().0).unwrap()
+}
+
+#[test]
+fn a_log_cut_anywhere_yields_what_was_synced_before_the_cut() {
+    let bytes = &WHOLE.bytes;
+    // A prime number of bytes meets every place inside a record; and exactly at and around each sync.
+    let around_syncs =
+        WHOLE.synced.iter().flat_map(|(at, _)| (at - 1)..=(at + 1)).map(|at| usize::try_from(at).unwrap());
+    for cut in (1..data_end()).step_by(37).chain(around_syncs) {
+        let later = WHOLE.synced.partition_point(|(at, _)| *at <= cut as u64);
+        let safe = later.checked_sub(1).map_or(0, |last| WHOLE.synced[last].1);
+        // The messages of a sync are whole some bytes before the sync itself is.
+        let most = WHOLE.synced.get(later).map_or(safe, |(_, ticks)| *ticks);
+        match read_ticks(&bytes[..cut]) {
+            Ok((ticks, damaged)) => {
+                assert!(ticks.len() == safe || ticks.len() == most, "cut after {cut} bytes: {}", ticks.len());
+                assert!(FLIGHT.ticks.starts_with(&ticks), "cut after {cut} bytes");
+                assert!(damaged, "cut after {cut} bytes");
+            }
+            Err(error) => assert_eq!(safe, 0, "cut after {cut} bytes: {error}"),
+        }
+    }
+}
+
+#[test]
+fn the_readable_part_of_a_cut_log_is_verified() {
+    for place in [0, 3, 7] {
+        let (at, ticks) = WHOLE.synced[place];
+        let report = verify_bytes(&WHOLE.bytes[..usize::try_from(at).unwrap() + 11]).unwrap();
+        assert_eq!(report.outcome, Outcome::IdenticalReadablePart);
+        assert_eq!(report.ticks_identical, ticks as u64);
+        assert!(report.damage.unwrap().contains("without an end mark"));
+    }
+}
+
+#[test]
+fn a_cut_log_is_described_up_to_the_cut() {
+    let (at, ticks) = WHOLE.synced[5];
+    let cut = &WHOLE.bytes[..usize::try_from(at).unwrap() + 3];
+    let mut log = FlightLog::read("test.mcap".to_owned(), cut).unwrap();
+    let info = info_of(&mut log, || None).unwrap();
+    assert_eq!(info.grade.level, GradeLevel::BitExact);
+    assert_eq!(info.ticks.unwrap().count, ticks as u64);
+    assert!(!info.completeness.complete);
+    let until_s = info.completeness.readable_until_s.unwrap();
+    assert!((until_s - (ticks - 1) as f64 * 0.1).abs() < 1e-6, "{until_s}");
+}
+
+/// Records shorter than their own fields, of every type there is and is not, behind a good beginning.
+#[test]
+fn a_record_too_short_for_its_type_ends_the_reading() {
+    let beginning = &WHOLE.bytes[..usize::try_from(WHOLE.synced[0].0).unwrap()];
+    for opcode in 0..=u8::MAX {
+        for length in 0..48_u8 {
+            let mut bytes = beginning.to_vec();
+            bytes.push(opcode);
+            bytes.extend(u64::from(length).to_le_bytes());
+            bytes.extend(std::iter::repeat_n(0, usize::from(length)));
+            let (ticks, damaged) = read_ticks(&bytes).unwrap();
+            assert_eq!(ticks.len(), WHOLE.synced[0].1, "type {opcode}, {length} bytes");
+            // An end of data of four bytes, with no checksum, is one.
+            assert!(damaged || opcode == mcap::records::op::DATA_END, "type {opcode}, {length} bytes");
+        }
+    }
+}
+
+/// A NaN's payload and the sign of zero go into a log and come out again.
+#[test]
+fn every_bit_pattern_survives_the_log() {
+    let patterns = [0x7ff8_0000_0000_0001, 0xfff0_dead_beef_cafe, 0x8000_0000_0000_0000, 1, u64::MAX];
+    let ticks: Vec<ControllerTick> = (0..)
+        .zip(patterns)
+        .map(|(number, bits)| {
+            let mut tick = idle_tick(number);
+            tick.input.state.w_m_s = f64::from_bits(bits);
+            tick.output.gimbal_command_rad = f64::from_bits(bits);
+            tick
+        })
+        .collect();
+    let (read, damaged) = read_ticks(&write_log(&ticks, &Recipe::default()).bytes).unwrap();
+    assert!(!damaged);
+    for (tick, bits) in read.iter().zip(patterns) {
+        assert_eq!(tick.input.state.w_m_s.to_bits(), bits);
+        assert_eq!(tick.output.gimbal_command_rad.to_bits(), bits);
+    }
+    assert_eq!(read.len(), patterns.len());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
+
+    /// Whichever bit of the data is flipped: either the file is refused, or the log is known to be damaged and every
+    /// tick handed out is a true one.
+    #[test]
+    fn no_flipped_bit_goes_unnoticed(place in 0..data_end(), bit in 0_u32..8) {
+        let mut bytes = WHOLE.bytes.clone();
+        bytes[place] ^= 1_u8 << bit;
+        if let Ok((ticks, damaged)) = read_ticks(&bytes) {
+            prop_assert!(damaged);
+            prop_assert!(ticks.iter().all(|tick| FLIGHT.ticks.contains(tick)));
+        }
+    }
+
+    /// Behind the data there is only what this reader does not need.
+    #[test]
+    fn a_broken_summary_costs_nothing(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
+        let mut bytes = WHOLE.bytes.clone();
+        bytes[place] ^= 1_u8 << bit;
+        let (ticks, damaged) = read_ticks(&bytes).unwrap();
+        prop_assert_eq!((ticks.len(), damaged), (FLIGHT.ticks.len(), false));
+    }
+
+    /// Whole stretches of another file.
+    #[test]
+    fn an_overwritten_stretch_is_survived(
+        place in 8..data_end(), stretch in prop::collection::vec(any::<u8>(), 1..400),
+    ) {
+        let mut bytes = WHOLE.bytes.clone();
+        let end = (place + stretch.len()).min(bytes.len());
+        bytes[place..end].copy_from_slice(&stretch[..end - place]);
+        if let Ok((ticks, _)) = read_ticks(&bytes) {
+            prop_assert!(ticks.iter().all(|tick| FLIGHT.ticks.contains(tick)));
+        }
+    }
+
+    #[test]
+    fn random_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..600), with_magic: bool) {
+        let magic: &[u8] = if with_magic { b"\x89MCAP0\r\n" } else { b"" };
+        let file = [magic, &bytes].concat();
+        prop_assert!(read_ticks(&file).is_err());
+        prop_assert!(verify_bytes(&file).is_err());
+    }
+}

@@ -1,0 +1,9 @@
+//! Logs of a flown landing, whole, changed, cut and broken, through the library and through the command.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+mod command_line;
+mod damage;
+mod divergence;
+mod flown;
+mod foreign;
+mod obstacles;

@@ -1,0 +1,110 @@
+//! Abort in each phase that this flight passes, asked of the real vehicle process over a real socket.
+
+use e2e::{BareGround, Ended, Program, Running, Signal, program};
+use protocol::dialect::{MavCmd, MavModeFlag, MavState, TdAbortEffect, TdInterlock, TdPhase};
+
+const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+const ACCEPTED: u8 = 0;
+const FAILED: u8 = 4;
+
+struct Flight {
+    vehicle: Running,
+    ground: BareGround,
+    _folder: tempfile::TempDir,
+}
+
+fn fly_to(phase: TdPhase) -> Flight {
+    let folder = tempfile::tempdir().unwrap();
+    let mut ground = BareGround::new();
+    let mut command = program(Program::OnboardSim);
+    command.args(["fly", "--mavlink", &ground.link(), "--log", "flight.mcap"]).current_dir(folder.path());
+    let vehicle = Running::start(&mut command);
+    ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
+    if phase != TdPhase::TD_PHASE_PAD_IDLE {
+        arm(&mut ground);
+    }
+    if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 {
+        assert_eq!(ground.command(START, 0.0), ACCEPTED);
+        ground.wait_for_phase(phase);
+    }
+    Flight { vehicle, ground, _folder: folder }
+}
+
+/// Arms as soon as the checks pass: the landing's first rehearsal takes a moment.
+fn arm(ground: &mut BareGround) {
+    ground.wait_for("every check passed", |_, message| match message {
+        Some(protocol::dialect::MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed == 0 => {
+            Some(())
+        }
+        _ => None,
+    });
+    assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
+}
+
+fn ended(flight: Flight) -> Ended {
+    flight.vehicle.wait()
+}
+
+#[test]
+fn on_the_pad_it_disarms_latches_and_refuses_to_arm() {
+    for phase in [TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED] {
+        let mut flight = fly_to(phase);
+        let before = flight.ground.wait_for_phase(phase);
+        assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD);
+        assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
+        assert_ne!(flight.ground.command(ARM, 1.0), ACCEPTED);
+        let after = flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
+        assert!(after.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED));
+        assert!(!after.interlocks.contains(TdInterlock::TD_INTERLOCK_ARMED));
+        assert!(after.pad_wait_s > 50, "{}", after.pad_wait_s);
+        let beat = flight.ground.wait_for_heartbeat();
+        assert_eq!(beat.system_status, MavState::MAV_STATE_FLIGHT_TERMINATION);
+        assert!(!beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED));
+        let ended = ended(flight);
+        assert_eq!(ended.code, Some(4), "{}", ended.output);
+    }
+}
+
+#[test]
+fn in_the_countdown_nothing_is_released() {
+    let mut flight = fly_to(TdPhase::TD_PHASE_PAD_ARMED);
+    assert_eq!(flight.ground.command(START, 0.0), ACCEPTED);
+    assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
+    let ended = ended(flight);
+    assert_eq!(ended.code, Some(4), "{}", ended.output);
+    assert!(!ended.output.contains("LAND_ARMED"), "{}", ended.output);
+}
+
+#[test]
+fn under_thrust_it_holds_upright_and_says_that_no_cut_off_exists() {
+    let mut flight = fly_to(TdPhase::TD_PHASE_POWERED);
+    let before = flight.ground.wait_for_phase(TdPhase::TD_PHASE_POWERED);
+    assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY);
+    assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
+    let ended = ended(flight);
+    assert_eq!(ended.code, Some(3), "{}", ended.output);
+    assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);
+    assert!(ended.output.contains("STABILISER") && !ended.output.contains("CHUTE"), "{}", ended.output);
+}
+
+#[test]
+fn on_the_ground_there_is_nothing_left_to_abort() {
+    let mut flight = fly_to(TdPhase::TD_PHASE_TOUCHDOWN);
+    assert_eq!(flight.ground.command(ABORT, 1.0), FAILED);
+    let ended = ended(flight);
+    assert_eq!(ended.code, Some(0), "a landing stays a landing: {}", ended.output);
+}
+
+#[test]
+fn a_termination_of_nought_does_nothing() {
+    let mut flight = fly_to(TdPhase::TD_PHASE_PAD_ARMED);
+    assert_eq!(flight.ground.command(ABORT, 0.0), FAILED);
+    let beat = flight.ground.wait_for_heartbeat();
+    assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED));
+    // A vehicle that is told to stop says how far it came.
+    flight.vehicle.signal(Signal::SIGTERM);
+    let ended = ended(flight);
+    assert_eq!(ended.code, Some(5), "{}", ended.output);
+}

@@ -1,0 +1,21 @@
+//! What the end-to-end tests share: the built programs, running processes, serial lines, a bare ground station.
+//!
+//! Waiting is always for something that happens, with a limit; nothing here sleeps and hopes.
+
+mod bare_ground;
+mod log_file;
+mod process;
+mod programs;
+mod serial_line;
+
+pub use bare_ground::BareGround;
+pub use log_file::{rewrite_log, ticks_of};
+pub use nix::sys::signal::Signal;
+pub use process::{Ended, Running};
+pub use programs::{Program, program};
+pub use serial_line::SerialLine;
+
+use std::time::Duration;
+
+/// Longer than anything here takes on a busy machine; reaching it fails the test.
+pub const PATIENCE: Duration = Duration::from_secs(90);

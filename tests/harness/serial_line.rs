@@ -1,0 +1,101 @@
+//! Two serial ports joined by a line of limited speed: pseudo-terminals with a paced copy between them.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::pty::openpty;
+use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use nix::unistd::ttyname;
+
+use crate::process::now;
+
+/// A line between two serial ports.
+pub struct SerialLine {
+    /// Device of one end.
+    pub near: PathBuf,
+    /// Device of the other end.
+    pub far: PathBuf,
+    carried: [Arc<AtomicU64>; 2],
+    cut: Arc<AtomicBool>,
+    copies: Vec<JoinHandle<()>>,
+    /// Held open, so that the line survives a program that closes its end.
+    _ends: [OwnedFd; 2],
+}
+
+impl SerialLine {
+    /// Joins two ports by a line of this baud rate (ten bits a byte).
+    ///
+    /// # Panics
+    /// The system has no pseudo-terminals.
+    pub fn new(baud: u32) -> Self {
+        let [(near_line, near_end), (far_line, far_end)] = [raw_terminal(), raw_terminal()];
+        let near = ttyname(&near_end).expect("a device name");
+        let far = ttyname(&far_end).expect("a device name");
+        let cut = Arc::new(AtomicBool::new(false));
+        let carried = [Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0))];
+        let clone = |file: &File| file.try_clone().expect("a descriptor");
+        let ways = [
+            (clone(&near_line), clone(&far_line), Arc::clone(&carried[0])),
+            (far_line, near_line, Arc::clone(&carried[1])),
+        ];
+        let copies = ways.map(|(from, to, carried)| {
+            let cut = Arc::clone(&cut);
+            std::thread::Builder::new()
+                .name("serial line".to_owned())
+                .spawn(move || copy_paced(from, to, baud, &carried, &cut))
+                .expect("a thread")
+        });
+        Self { near, far, carried, cut, copies: copies.into(), _ends: [near_end, far_end] }
+    }
+
+    /// Bytes carried from near to far, and from far to near.
+    pub fn carried(&self) -> [u64; 2] {
+        [self.carried[0].load(Ordering::Relaxed), self.carried[1].load(Ordering::Relaxed)]
+    }
+}
+
+impl Drop for SerialLine {
+    fn drop(&mut self) {
+        self.cut.store(true, Ordering::Relaxed);
+        for copy in self.copies.drain(..) {
+            // A copy that panicked has already failed its test by carrying nothing.
+            let _ = copy.join();
+        }
+    }
+}
+
+fn raw_terminal() -> (File, OwnedFd) {
+    let pair = openpty(None, None).expect("a pseudo-terminal");
+    let mut settings = tcgetattr(&pair.slave).expect("terminal settings");
+    cfmakeraw(&mut settings);
+    tcsetattr(&pair.slave, SetArg::TCSANOW, &settings).expect("raw mode");
+    (File::from(pair.master), pair.slave)
+}
+
+fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut: &AtomicBool) {
+    let byte_time = Duration::from_secs(10) / baud;
+    let mut buffer = [0; 32];
+    let mut free_at = now();
+    while !cut.load(Ordering::Relaxed) {
+        let mut ready = [PollFd::new(from.as_fd(), PollFlags::POLLIN)];
+        // Looks up now and then, to notice that the line was cut.
+        if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) == 0 {
+            continue;
+        }
+        let Ok(count @ 1..) = from.read(&mut buffer) else { continue };
+        // The line is busy for as long as the bytes take; that is its speed, not a wait for luck.
+        free_at = free_at.max(now()) + byte_time * count as u32;
+        std::thread::sleep(free_at.saturating_duration_since(now()));
+        if to.write_all(&buffer[..count]).is_err() {
+            return;
+        }
+        carried.fetch_add(count as u64, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,128 @@
+//! Vehicle and ground as processes of their own, over UDP and over a serial line.
+
+use std::path::Path;
+use std::process::Command;
+
+use e2e::{Ended, Program, Running, SerialLine, program};
+
+fn vehicle(folder: &Path, link: &str) -> Command {
+    let mut command = program(Program::OnboardSim);
+    command.args(["fly", "--mavlink", link, "--log", "vehicle.mcap"]).current_dir(folder);
+    command
+}
+
+fn ground(folder: &Path, link: &str) -> Command {
+    let mut command = program(Program::Ground);
+    command.args(["--connect", link, "--headless", "--auto", "--log", "ground.mcap"]).current_dir(folder);
+    command
+}
+
+fn free_port() -> u16 {
+    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.local_addr().unwrap().port()
+}
+
+fn verified(folder: &Path) -> Ended {
+    Running::to_end(program(Program::Replay).args(["verify", "vehicle.mcap"]).current_dir(folder))
+}
+
+#[test]
+fn over_udp_they_land_and_the_vehicle_s_log_replays() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = free_port();
+    let station = Running::start(&mut ground(folder.path(), &format!("udpin:127.0.0.1:{port}")));
+    let flight = Running::start(&mut vehicle(folder.path(), &format!("udpout:127.0.0.1:{port}")));
+    let (station, flight) = (station.wait(), flight.wait());
+    assert_eq!(station.code, Some(0), "{}", station.output);
+    assert_eq!(flight.code, Some(0), "{}", flight.output);
+    let verified = verified(folder.path());
+    assert_eq!(verified.code, Some(0), "{}", verified.output);
+    // The ground's log has no controller ticks and says so.
+    let telemetry_only =
+        Running::to_end(program(Program::Replay).arg("verify").arg(folder.path().join("ground.mcap")));
+    assert_eq!(telemetry_only.code, Some(2), "{}", telemetry_only.output);
+}
+
+#[test]
+fn over_a_radio_s_serial_line_they_land_within_its_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = SerialLine::new(57_600);
+    let link = |device: &Path| format!("serial:{}:57600", device.display());
+    let flight = Running::start(&mut vehicle(folder.path(), &link(&line.near)));
+    let station = Running::start(&mut ground(folder.path(), &link(&line.far)));
+    let (station, flight) = (station.wait(), flight.wait());
+    assert_eq!(station.code, Some(0), "{}", station.output);
+    assert_eq!(flight.code, Some(0), "{}", flight.output);
+    let verified = verified(folder.path());
+    assert_eq!(verified.code, Some(0), "{}", verified.output);
+
+    let [down, up] = line.carried();
+    // Vehicle time is real time here; the last line before the summary carries it.
+    let seconds = flight
+        .output
+        .lines()
+        .filter_map(|line| {
+            line.trim_start().split_once(" s  ").and_then(|(time, _)| time.trim().parse::<f64>().ok())
+        })
+        .fold(0.0, f64::max);
+    assert!(seconds > 10.0, "{}", flight.output);
+    let (down_s, up_s) = (down as f64 / seconds, up as f64 / seconds);
+    println!("serial line at 57600 baud: {down_s:.0} B/s down, {up_s:.0} B/s up over {seconds:.1} s");
+    assert!((500.0..=2_000.0).contains(&down_s), "{down_s} B/s down");
+    assert!(up_s < 500.0, "{up_s} B/s up");
+}
+
+/// The same over socat's pseudo-terminals, where socat is installed: it is what a crew tests its radio with.
+#[test]
+fn over_a_socat_pair_they_land() {
+    let folder = tempfile::tempdir().unwrap();
+    let ends = ["near", "far"].map(|end| folder.path().join(end));
+    let address = |end: &Path| format!("pty,raw,echo=0,link={}", end.display());
+    let socat =
+        Command::new("socat").args(["-d", "-d", &address(&ends[0]), &address(&ends[1])]).spawn_probe();
+    let Some(mut socat) = socat else {
+        println!("NOT RUN: socat is not installed (Debian package socat)");
+        return;
+    };
+    socat.wait_for_line("starting data transfer loop");
+    let link = |end: &Path| format!("serial:{}:57600", end.display());
+    let flight = Running::start(&mut vehicle(folder.path(), &link(&ends[0])));
+    let station = Running::start(&mut ground(folder.path(), &link(&ends[1])));
+    let (station, flight) = (station.wait(), flight.wait());
+    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
+}
+
+/// Starting a program that may not be installed.
+trait SpawnProbe {
+    fn spawn_probe(&mut self) -> Option<Running>;
+}
+
+impl SpawnProbe for Command {
+    fn spawn_probe(&mut self) -> Option<Running> {
+        let probe = Command::new(self.get_program()).arg("-V").output();
+        probe.is_ok().then(|| Running::start(self))
+    }
+}
+
+#[test]
+fn a_flight_that_misses_its_limits_is_called_so_by_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let listed =
+        Running::to_end(program(Program::OnboardSim).args(["profiles", "--show", "paper-calibrated"]));
+    assert_eq!(listed.code, Some(0));
+    // A motor 8 % weaker than the controller believes.
+    let weak = format!("{}\n[plant]\nthrust_scale = 0.92\n", listed.output);
+    std::fs::write(folder.path().join("weak.toml"), weak).unwrap();
+    let port = free_port();
+    let station = Running::start(&mut ground(folder.path(), &format!("udpin:127.0.0.1:{port}")));
+    let link = format!("udpout:127.0.0.1:{port}");
+    let flight = Running::start(vehicle(folder.path(), &link).args(["--profile", "weak.toml"]));
+    let (station, flight) = (station.wait(), flight.wait());
+    assert_eq!(station.code, Some(3), "{}", station.output);
+    assert_eq!(flight.code, Some(3), "{}", flight.output);
+    assert!(
+        flight.output.contains("NOT LANDED") && station.output.contains("NOT LANDED"),
+        "{}",
+        station.output
+    );
+}
