@@ -1,4 +1,5 @@
 //! Abort in each phase that this flight passes, asked of the real vehicle process over a real socket.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use e2e::{BareGround, Ended, Program, Running, Signal, program};
 use protocol::dialect::{MavCmd, MavModeFlag, MavState, TdAbortEffect, TdInterlock, TdPhase};

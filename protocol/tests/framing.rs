@@ -1,4 +1,5 @@
 //! Framing against chunking, garbage, cuts and random bytes.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use proptest::prelude::*;
 use protocol::dialect::{

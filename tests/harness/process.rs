@@ -71,7 +71,7 @@ impl Running {
                         return line;
                     }
                 }
-                Err(_) => panic!("no line with `{words}` in:\n{}", self.seen.join("\n")),
+                Err(error) => panic!("no line with `{words}` ({error}) in:\n{}", self.seen.join("\n")),
             }
         }
     }

@@ -39,7 +39,7 @@ impl Links {
                         note(self.recorder.as_ref(), time_s, &format!("link {name} up: {peer}"));
                     }
                     Received::Down(why) => {
-                        note(self.recorder.as_ref(), time_s, &format!("link {name} down: {why}"))
+                        note(self.recorder.as_ref(), time_s, &format!("link {name} down: {why}"));
                     }
                 }
                 while let Some(frame) = framer.next_frame() {

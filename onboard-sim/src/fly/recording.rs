@@ -68,9 +68,10 @@ pub(super) fn record(recorder: &Recorder, snapshot: &Snapshot, events: &[Vehicle
             recorder.sync_soon();
         }
     }
-    // The waiting vehicle does not move: once a second is enough to see that.
+    // The waiting vehicle does not move: once a second and at every change of phase is enough to see that.
     let moving = !snapshot.phase.on_pad() && snapshot.phase != Phase::Safed;
-    if moving || (snapshot.time_s.fract() < 0.015) {
+    let changed = events.iter().any(|event| matches!(event, VehicleEvent::PhaseChanged { .. }));
+    if moving || changed || (snapshot.time_s.fract() < 0.015) {
         recorder.record(Record::PlantTruth(Box::new(truth(snapshot))), time_ns);
     }
 }
