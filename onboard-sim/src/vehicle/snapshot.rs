@@ -36,7 +36,7 @@ pub struct Snapshot {
     pub interlocks: Interlocks,
     /// Time to release, s, while a countdown runs.
     pub countdown_s: Option<f64>,
-    /// Time since ignition, s.
+    /// Time since ignition, s; stands still after touchdown.
     pub since_ignition_s: Option<f64>,
     /// Time before the pad may be approached, s.
     pub pad_wait_s: Option<f64>,
@@ -81,9 +81,11 @@ impl Vehicle {
             phase: self.mode.phase,
             interlocks: self.mode.interlocks,
             countdown_s: self.mode.countdown_remaining_s(time_s),
-            since_ignition_s: self
-                .ignition_sample
-                .map(|sample| time_s - sample as f64 * self.profile.nmpc.sample_time_s),
+            // The flight's clock stops when the flight does.
+            since_ignition_s: self.ignition_sample.map(|sample| {
+                let until_s = self.verdict.map_or(time_s, |(impact, _)| impact.time_s);
+                until_s - sample as f64 * self.profile.nmpc.sample_time_s
+            }),
             pad_wait_s: self.mode.pad_wait_remaining_s(time_s),
             checks_failed: if on_pad {
                 bits(self.arming_checks().iter().map(|check| !check.passed))
