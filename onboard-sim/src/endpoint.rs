@@ -159,8 +159,7 @@ impl VehicleEndpoint {
     pub fn on_event(&mut self, event: &VehicleEvent) {
         match event {
             VehicleEvent::Text { severity, text } => self.say(*severity, text),
-            VehicleEvent::PhaseChanged { to, .. } => {
-                self.say(Severity::Info, &format!("phase {}", to.name()));
+            VehicleEvent::PhaseChanged { .. } => {
                 // The crew learns of a new phase at once, by the two messages that carry it.
                 self.hurry(HEARTBEAT_DATA::ID);
                 self.hurry(TD_FLIGHT_STATUS_DATA::ID);

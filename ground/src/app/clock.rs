@@ -1,0 +1,43 @@
+//! The only clock of the ground.
+
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Time since the start of the run.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    start: Instant,
+    start_unix_ns: u64,
+}
+
+impl Clock {
+    /// A clock that starts now.
+    #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
+    pub fn start() -> Self {
+        let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { start: Instant::now(), start_unix_ns: nanoseconds(since_epoch) }
+    }
+
+    /// Since the start.
+    #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
+    pub fn now(&self) -> Duration {
+        Instant::now().saturating_duration_since(self.start)
+    }
+
+    /// When it started, nanoseconds since the Unix epoch.
+    pub fn start_unix_ns(&self) -> u64 {
+        self.start_unix_ns
+    }
+
+    /// Waits until a time; forever without one.
+    pub async fn sleep_until(&self, at: Option<Duration>) {
+        match at {
+            Some(at) => tokio::time::sleep_until((self.start + at).into()).await,
+            None => std::future::pending().await,
+        }
+    }
+}
+
+/// A duration as the log counts it.
+pub fn nanoseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}

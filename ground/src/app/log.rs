@@ -1,0 +1,121 @@
+//! Where the log goes, and that it is ended whatever happens.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use protocol::log::recorder::{Recorder, RecorderError};
+use protocol::log::writer::LogHeader;
+use time::OffsetDateTime;
+use time::macros::format_description;
+
+use crate::cli::LogChoice;
+
+/// Logs of the same second, at most.
+const SAME_SECOND_MAX: u32 = 100;
+
+/// Opens the log that was asked for; `Ok(None)` if none was wanted.
+///
+/// # Errors
+/// The file exists or cannot be made.
+pub fn open(choice: Option<&LogChoice>, header: &LogHeader) -> anyhow::Result<Option<Recorder>> {
+    match choice {
+        Some(LogChoice::None) => Ok(None),
+        Some(LogChoice::File(path)) => Ok(Some(Recorder::create(path, header)?)),
+        None => open_named_by_time(Path::new(""), header).map(Some),
+    }
+}
+
+fn open_named_by_time(directory: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
+    let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
+        .context("the system's clock shows no date")?;
+    let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
+    for number in 1..=SAME_SECOND_MAX {
+        let suffix = if number == 1 { String::new() } else { format!("-{number}") };
+        let path = directory.join(format!("touchdown-{stamp}{suffix}.mcap"));
+        match Recorder::create(&path, header) {
+            Err(RecorderError::Create { source, .. })
+                if source.kind() == std::io::ErrorKind::AlreadyExists => {}
+            other => return Ok(other?),
+        }
+    }
+    anyhow::bail!(
+        "touchdown-{stamp}.mcap and {SAME_SECOND_MAX} others exist already; name the log with --log"
+    )
+}
+
+/// Ends the log when it goes out of scope, also while a panic unwinds.
+pub struct LogGuard {
+    recorder: Option<Recorder>,
+}
+
+impl LogGuard {
+    /// Guards a log, if there is one.
+    pub fn new(recorder: Option<Recorder>) -> Self {
+        Self { recorder }
+    }
+
+    /// Ends the log; returns its path.
+    ///
+    /// # Errors
+    /// Some record could not be written.
+    pub fn finish(mut self) -> Result<Option<PathBuf>, RecorderError> {
+        self.recorder.take().map(|recorder| recorder.finish()).transpose()
+    }
+}
+
+impl Drop for LogGuard {
+    fn drop(&mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            // Another failure is on its way out already.
+            let _ = recorder.finish();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::log::reader::{LogItem, LogReader};
+    use protocol::log::record::{Event, EventLevel, Record};
+
+    #[test]
+    fn a_log_is_never_overwritten() {
+        let directory = tempfile::tempdir().unwrap();
+        let header = LogHeader { start_unix_ns: 1_800_000_000_000_000_000, ..LogHeader::default() };
+        let names: Vec<String> = (0..3)
+            .map(|_| {
+                let recorder = open_named_by_time(directory.path(), &header).unwrap();
+                recorder.finish().unwrap().file_name().unwrap().to_string_lossy().into_owned()
+            })
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "touchdown-20270115-080000.mcap",
+                "touchdown-20270115-080000-2.mcap",
+                "touchdown-20270115-080000-3.mcap"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_panic_ends_the_log_properly() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("panic.mcap");
+        let recorder = Recorder::create(&path, &LogHeader::default()).unwrap();
+        let event =
+            Event { level: EventLevel::Info, name: "ground".to_owned(), message: "before".to_owned() };
+        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let _guard = LogGuard::new(Some(recorder.clone()));
+            recorder.try_record(Record::Event(event), 0);
+            panic!("drawing went wrong");
+        }));
+        assert!(panicked.is_err());
+        let mut reader = LogReader::new(std::fs::File::open(&path).unwrap());
+        let mut messages = 0;
+        while let Some(item) = reader.next_item().unwrap() {
+            messages += usize::from(matches!(item, LogItem::Message { .. }));
+        }
+        assert_eq!((messages, reader.damage()), (1, None));
+    }
+}

@@ -1,0 +1,239 @@
+//! The run loop: everything that touches the world, around a pure model.
+
+pub mod clock;
+pub mod lines;
+pub mod log;
+pub mod screen;
+pub mod signals;
+pub mod wire;
+
+use std::io::IsTerminal as _;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use protocol::log::record::Record;
+use protocol::log::recorder::Recorder;
+use protocol::log::writer::LogHeader;
+use protocol::transport::Endpoint;
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::cli::{Cli, Seconds};
+use crate::demo::{Demo, DemoOptions};
+use crate::exit::{self, Exit};
+use crate::model::{LogHealth, Model, Settings};
+use crate::update::{Action, Msg, update};
+use clock::Clock;
+use lines::Lines;
+use log::LogGuard;
+use screen::Screen;
+use signals::Signals;
+use wire::Wire;
+
+const TICK: Duration = Duration::from_millis(100);
+const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
+
+/// Runs the ground station until its end.
+///
+/// # Errors
+/// A socket, a file or the terminal failed, or the profile is wrong.
+pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
+    let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
+    let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
+    runtime.block_on(session(cli, interactive))
+}
+
+async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
+    let clock = Clock::start();
+    let demo_options = cli.connect.is_none().then(|| DemoOptions {
+        profile: cli.profile.clone(),
+        seed: cli.seed,
+        speed: cli.speed,
+    });
+    let header = match &demo_options {
+        Some(options) => options.log_header(clock.start_unix_ns())?,
+        None => LogHeader {
+            writer: "ground".to_owned(),
+            start_unix_ns: clock.start_unix_ns(),
+            ..LogHeader::default()
+        },
+    };
+    // The demonstration takes any free port, so that it runs beside a real ground station.
+    let endpoint = cli.connect.clone().unwrap_or_else(|| Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+    let recorder = log::open(cli.log.as_ref(), &header)?;
+    let log_guard = LogGuard::new(recorder.clone());
+    let mut wire = Wire::open(endpoint, recorder.clone()).await?;
+    let demo = match &demo_options {
+        Some(options) => Some(start_demo(options, wire.endpoint(), recorder.clone())?),
+        None => None,
+    };
+    let auto = cli.starts_by_itself(interactive);
+    let mut model = Model::new(Settings {
+        link_name: wire.endpoint().to_string(),
+        log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
+        auto,
+        interactive,
+        time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
+    });
+    let output = if interactive { Output::Screen(Screen::open()?) } else { Output::Lines(Lines::new()) };
+    let mut station = Station { clock, recorder, demo, output };
+    let ran = station.run(&mut model, &mut wire).await;
+    station.close(&model).await;
+    let log_path = log_guard.finish();
+    ran?;
+    lines::closing(&model, interactive, log_path.as_ref());
+    log_path.context("the log")?;
+    Ok(exit::decide(&model.outcome, interactive))
+}
+
+fn start_demo(
+    options: &DemoOptions,
+    listening: &Endpoint,
+    recorder: Option<Recorder>,
+) -> anyhow::Result<Demo> {
+    let Endpoint::UdpIn(address) = listening else {
+        anyhow::bail!("the demonstration listens on UDP, not on {listening}");
+    };
+    Demo::start(options, Endpoint::UdpOut(address.clone()), recorder).context("starting the simulator")
+}
+
+enum Output {
+    Screen(Screen),
+    Lines(Lines),
+}
+
+struct Station {
+    clock: Clock,
+    recorder: Option<Recorder>,
+    demo: Option<Demo>,
+    output: Output,
+}
+
+impl Station {
+    async fn run(&mut self, model: &mut Model, wire: &mut Wire) -> anyhow::Result<()> {
+        let mut signals = Signals::listen()?;
+        let mut ticks = interval(TICK);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        loop {
+            let redraw_at = self.output.redraw_at();
+            let demo = &mut self.demo;
+            let msgs = tokio::select! {
+                received = wire.receive() => wire.take(received, self.clock.now()),
+                msg = self.output.input() => vec![msg],
+                _ = ticks.tick() => self.tick_msgs(model),
+                failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
+                signal = signals.next() => vec![Msg::Terminate(signal)],
+                () = self.clock.sleep_until(redraw_at) => Vec::new(),
+            };
+            let mut quit = false;
+            for msg in msgs {
+                // A tick alone changes nothing that must be seen before the next second.
+                if msg != Msg::Tick {
+                    self.output.mark_changed();
+                }
+                quit |= self.step(model, wire, msg);
+            }
+            self.output.show(model, self.clock.now())?;
+            if quit {
+                return Ok(());
+            }
+        }
+    }
+
+    fn tick_msgs(&self, model: &Model) -> Vec<Msg> {
+        let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
+            dropped: recorder.dropped(),
+            failed: !recorder.is_running(),
+        });
+        if health == model.log { vec![Msg::Tick] } else { vec![Msg::Log(health), Msg::Tick] }
+    }
+
+    /// One message through the model, and what it wants done. Returns whether to quit.
+    fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> bool {
+        let now = self.clock.now();
+        let mut quit = false;
+        for action in update(model, msg, now) {
+            match action {
+                Action::Send(message) => {
+                    let sent = wire.send(&message, now);
+                    // Only counts: it wants nothing done.
+                    update(model, sent, now);
+                }
+                Action::Record(record) => {
+                    if matches!(record, Record::Event(_)) {
+                        self.output.mark_changed();
+                    }
+                    if let Some(recorder) = &self.recorder {
+                        recorder.try_record(record, clock::nanoseconds(now));
+                    }
+                }
+                Action::SyncLog => {
+                    if let Some(recorder) = &self.recorder {
+                        recorder.sync_soon();
+                    }
+                }
+                Action::Redraw => self.output.clear(),
+                Action::Quit => quit = true,
+            }
+        }
+        quit
+    }
+
+    /// The terminal first: whatever comes after may take a while.
+    async fn close(self, model: &Model) {
+        match self.output {
+            Output::Screen(screen) => drop(screen),
+            Output::Lines(mut lines) => lines.show(model),
+        }
+        if let Some(demo) = self.demo {
+            demo.stop().await;
+        }
+    }
+}
+
+async fn demo_ended(demo: &mut Option<Demo>) -> Option<String> {
+    match demo {
+        Some(demo) => demo.ended().await,
+        None => std::future::pending().await,
+    }
+}
+
+impl Output {
+    fn redraw_at(&self) -> Option<Duration> {
+        match self {
+            Self::Screen(screen) => Some(screen.redraw_at()),
+            Self::Lines(_) => None,
+        }
+    }
+
+    /// What the person at the terminal does; never, without one.
+    async fn input(&mut self) -> Msg {
+        match self {
+            Self::Screen(screen) => screen.input().await,
+            Self::Lines(_) => std::future::pending().await,
+        }
+    }
+
+    fn mark_changed(&mut self) {
+        if let Self::Screen(screen) = self {
+            screen.mark_changed();
+        }
+    }
+
+    fn clear(&mut self) {
+        if let Self::Screen(screen) = self {
+            screen.clear();
+        }
+    }
+
+    fn show(&mut self, model: &Model, now: Duration) -> anyhow::Result<()> {
+        match self {
+            Self::Screen(screen) => screen.show(model, now).context("drawing on the terminal"),
+            Self::Lines(lines) => {
+                lines.show(model);
+                Ok(())
+            }
+        }
+    }
+}

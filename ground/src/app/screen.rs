@@ -1,0 +1,143 @@
+//! The full screen: the terminal's state, its keys, and when it is drawn.
+
+use std::io;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use crossterm::cursor::Show;
+use crossterm::event::{Event, EventStream};
+use crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use crossterm::{execute, queue};
+use futures_util::StreamExt as _;
+use ratatui::DefaultTerminal;
+use ratatui::Terminal;
+use ratatui::backend::CrosstermBackend;
+
+use crate::key::Key;
+use crate::model::Model;
+use crate::update::Msg;
+use crate::view::theme::Theme;
+use crate::view::view;
+
+/// At most ten frames a second.
+const FRAME: Duration = Duration::from_millis(100);
+/// Ages grow even if nothing arrives.
+const IDLE_FRAME: Duration = Duration::from_secs(1);
+
+/// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
+pub struct Screen {
+    terminal: DefaultTerminal,
+    events: EventStream,
+    theme: Theme,
+    changed: bool,
+    drawn_at: Option<Duration>,
+    input_ended: bool,
+}
+
+impl Screen {
+    /// Takes the terminal.
+    ///
+    /// # Errors
+    /// It is none, or refuses.
+    pub fn open() -> anyhow::Result<Self> {
+        let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        restore_before_panic_message();
+        let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
+        Ok(Self {
+            terminal,
+            events: EventStream::new(),
+            theme: Theme { colour: !no_colour },
+            changed: true,
+            drawn_at: None,
+            input_ended: false,
+        })
+    }
+
+    /// Something to see has changed.
+    pub fn mark_changed(&mut self) {
+        self.changed = true;
+    }
+
+    /// When the next frame is due.
+    pub fn redraw_at(&self) -> Duration {
+        let wait = if self.changed { FRAME } else { IDLE_FRAME };
+        self.drawn_at.map_or(Duration::ZERO, |at| at + wait)
+    }
+
+    /// Draws if a frame is due.
+    ///
+    /// # Errors
+    /// The terminal cannot be written.
+    pub fn show(&mut self, model: &Model, now: Duration) -> io::Result<()> {
+        if now < self.redraw_at() {
+            return Ok(());
+        }
+        self.terminal.draw(|frame| view(model, self.theme, now, frame))?;
+        self.changed = false;
+        self.drawn_at = Some(now);
+        Ok(())
+    }
+
+    /// Forgets what the terminal shows, so that the next frame is written whole.
+    pub fn clear(&mut self) {
+        // If the terminal cannot be cleared, drawing fails next and says why.
+        let _ = self.terminal.clear();
+        self.changed = true;
+    }
+
+    /// The next thing done at the terminal.
+    pub async fn input(&mut self) -> Msg {
+        loop {
+            if self.input_ended {
+                return std::future::pending().await;
+            }
+            match self.events.next().await {
+                Some(Ok(Event::Key(event))) => {
+                    if let Some(key) = Key::from_event(&event) {
+                        return Msg::Key(key);
+                    }
+                }
+                Some(Ok(Event::Resize(..))) => self.changed = true,
+                Some(Ok(_)) => {}
+                Some(Err(_)) | None => {
+                    self.input_ended = true;
+                    return Msg::Terminate("the terminal is gone");
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        restore();
+    }
+}
+
+fn take_terminal() -> io::Result<DefaultTerminal> {
+    enable_raw_mode()?;
+    execute!(io::stdout(), EnterAlternateScreen)?;
+    Terminal::new(CrosstermBackend::new(io::stdout()))
+}
+
+/// Gives the terminal back. It may be gone (a dropped session): then there is nothing to restore, and
+/// nobody to tell; printing about it would panic and cost the log its end.
+fn restore() {
+    let _ = disable_raw_mode();
+    let mut out = io::stdout();
+    let _ = queue!(out, LeaveAlternateScreen, Show);
+    let _ = io::Write::flush(&mut out);
+}
+
+/// A panic's message belongs on the restored terminal, not on a screen that vanishes with it.
+fn restore_before_panic_message() {
+    let print_message = std::panic::take_hook();
+    let drawing = std::thread::current().id();
+    std::panic::set_hook(Box::new(move |panic| {
+        // A panic of the simulator or the recorder does not end the screen.
+        if std::thread::current().id() == drawing {
+            restore();
+        }
+        print_message(panic);
+    }));
+}

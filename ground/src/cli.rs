@@ -1,0 +1,140 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::Parser;
+use protocol::transport::Endpoint;
+
+use crate::demo::Speed;
+use crate::exit;
+
+/// Terminal ground station for a rocket that lands on its own thrust.
+///
+/// Without --connect it flies a demonstration: a simulated vehicle in this process, on real MAVLink over a
+/// loopback UDP socket. On a terminal it shows the full screen (? lists the keys); without one, a line an
+/// event, the landing verdict at the end, and the exit code says how it went.
+#[derive(Debug, Parser)]
+#[command(name = "ground", version, after_help = exit::HELP)]
+pub struct Cli {
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT or serial:DEVICE:BAUD.
+    #[arg(long, value_name = "LINK")]
+    pub connect: Option<Endpoint>,
+
+    /// Log to write (MCAP), or `none`. An existing file is not overwritten.
+    ///
+    /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
+    #[arg(long, value_name = "FILE|none")]
+    pub log: Option<LogChoice>,
+
+    /// Demonstration: built-in profile or TOML file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper-calibrated", conflicts_with = "connect")]
+    pub profile: String,
+
+    /// Demonstration: seed of the profile's dispersions.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect")]
+    pub seed: u64,
+
+    /// Demonstration: speed of simulated time, a factor or `max`.
+    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect")]
+    pub speed: Speed,
+
+    /// Arm and start without a hand. The demonstration without a screen always does.
+    #[arg(long)]
+    pub auto: bool,
+
+    /// Lines instead of the full screen, also on a terminal.
+    #[arg(long)]
+    pub headless: bool,
+
+    /// Without a screen: give up after this long without the end of a flight.
+    ///
+    /// Default: 120 s where the flight is started automatically, otherwise never.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub timeout_s: Option<Seconds>,
+}
+
+/// Where the log goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LogChoice {
+    /// No log.
+    None,
+    /// This file.
+    File(PathBuf),
+}
+
+impl FromStr for LogChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given {
+            "" => Err("the log's name is empty; give a file or `none`".to_owned()),
+            "none" => Ok(Self::None),
+            path => Ok(Self::File(PathBuf::from(path))),
+        }
+    }
+}
+
+/// A time limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seconds(pub Duration);
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(Self(Duration::from_secs_f64(seconds))),
+            _ => Err(format!("`{given}` is not a number of seconds from 0.1 to 86400")),
+        }
+    }
+}
+
+impl Cli {
+    /// Whether the flight is started without a hand.
+    pub fn starts_by_itself(&self, interactive: bool) -> bool {
+        self.auto || (self.connect.is_none() && !interactive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_every_option_and_exit_code() {
+        let help = Cli::command().render_long_help().to_string();
+        for word in
+            ["--connect", "--log", "--profile", "--seed", "--speed", "--auto", "--headless", "--timeout-s"]
+        {
+            assert!(help.contains(word), "{word}");
+        }
+        assert!(help.contains(exit::HELP));
+    }
+
+    #[test]
+    fn wrong_values_are_refused_with_what_would_do() {
+        let refuse = |arguments: &[&str]| {
+            Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().to_string()
+        };
+        assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
+        assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
+        assert!(refuse(&["--speed", "0"]).contains("0.01"));
+        assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
+    }
+
+    #[test]
+    fn a_demonstration_without_a_screen_starts_by_itself_and_an_attached_ground_only_watches() {
+        let demo = Cli::try_parse_from(["ground"]).unwrap();
+        assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
+        let attached = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
+        assert!(!attached.starts_by_itself(false));
+    }
+}

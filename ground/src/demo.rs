@@ -1,0 +1,104 @@
+//! The embedded simulator: a vehicle in this process that speaks over a real socket.
+//!
+//! It runs in its own thread with its own runtime, so that the screen can never stall the vehicle. Only
+//! the log is shared through memory; telemetry and commands go over the link.
+
+use std::io;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use onboard_sim::fly::{self, FlyOptions};
+use onboard_sim::vehicle::DeadlinePolicy;
+use protocol::log::recorder::Recorder;
+use protocol::log::writer::LogHeader;
+use protocol::transport::Endpoint;
+use tokio::sync::{oneshot, watch};
+
+pub use onboard_sim::fly::Speed;
+
+/// How long the simulator's end is waited for.
+const STOP_WITHIN: Duration = Duration::from_secs(3);
+
+/// What is simulated.
+#[derive(Debug, Clone)]
+pub struct DemoOptions {
+    /// Built-in profile or file.
+    pub profile: String,
+    /// Seed of its dispersions.
+    pub seed: u64,
+    /// Speed of simulated time.
+    pub speed: Speed,
+}
+
+impl DemoOptions {
+    /// The header of the log that holds both sides.
+    ///
+    /// # Errors
+    /// There is no such profile, or it is wrong.
+    pub fn log_header(&self, start_unix_ns: u64) -> anyhow::Result<LogHeader> {
+        let (profile, text) = fly::load_profile(&self.profile)?;
+        Ok(fly::log_header("ground", &profile, &text, self.seed, start_unix_ns))
+    }
+}
+
+/// A running simulator.
+pub struct Demo {
+    stop: watch::Sender<bool>,
+    ended: Option<oneshot::Receiver<Option<String>>>,
+    thread: JoinHandle<()>,
+}
+
+impl Demo {
+    /// Starts a vehicle that speaks to `link`.
+    ///
+    /// # Errors
+    /// The thread or its runtime cannot be made.
+    pub fn start(options: &DemoOptions, link: Endpoint, recorder: Option<Recorder>) -> io::Result<Self> {
+        let fly_options = FlyOptions {
+            profile_name_or_path: options.profile.clone(),
+            links: vec![link],
+            recorder,
+            seed: options.seed,
+            speed: options.speed,
+            auto_start: false,
+            exit_when_safed: false,
+            deadline_policy: DeadlinePolicy::Observe,
+        };
+        let (stop, stopped) = watch::channel(false);
+        let (tell, ended) = oneshot::channel();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let thread = std::thread::Builder::new().name("simulator".to_owned()).spawn(move || {
+            let failure = runtime.block_on(fly::fly(fly_options, stopped)).err();
+            // Nobody listens any more only when the ground itself has ended.
+            let _ = tell.send(failure.map(|error| error.to_string()));
+        })?;
+        Ok(Self { stop, ended: Some(ended), thread })
+    }
+
+    /// Waits until the simulator ends by itself; says why, if it failed. Waits forever once that was said.
+    pub async fn ended(&mut self) -> Option<String> {
+        match &mut self.ended {
+            None => std::future::pending().await,
+            Some(ended) => {
+                let answer = ended.await;
+                self.ended = None;
+                // Gone without a word: its thread has panicked.
+                answer.unwrap_or_else(|_gone| Some("it stopped unexpectedly".to_owned()))
+            }
+        }
+    }
+
+    /// Stops it and waits for its last records.
+    pub async fn stop(mut self) {
+        // Fails only if it has ended already.
+        let _ = self.stop.send(true);
+        let ended = match self.ended.take() {
+            None => true,
+            Some(ended) => tokio::time::timeout(STOP_WITHIN, ended).await.is_ok(),
+        };
+        if ended {
+            // Whether it panicked was said by `ended`.
+            let _ = self.thread.join();
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The exit codes, decided here and nowhere else.
+
+use crate::model::outcome::Outcome;
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Landed inside every limit, or closed by the crew with no flight begun.
+    Landed = 0,
+    /// Something failed: a file, a socket, the simulator.
+    Error = 1,
+    /// The command line was not understood.
+    Usage = 2,
+    /// The flight ended outside a limit.
+    OutsideLimits = 3,
+    /// Arming or start was refused, or the flight was aborted.
+    RefusedOrAborted = 4,
+    /// The end of the flight was not seen: link lost, nothing heard, time-out, or closed in flight.
+    NotSeen = 5,
+}
+
+/// The codes as `--help` shows them.
+pub const HELP: &str = "\
+Exit codes:
+  0  landed inside every limit (full screen: also when closed before any flight began)
+  1  an error: a file, a socket, the simulator
+  2  the command line was not understood
+  3  the flight ended outside a limit
+  4  arming or start was refused, or the flight was aborted
+  5  the end of the flight was not seen: link lost, nothing heard, time-out, or closed in flight";
+
+/// The exit of a run with this outcome; `interactive` if a person closed it.
+pub fn decide(outcome: &Outcome, interactive: bool) -> Exit {
+    if outcome.error.is_some() {
+        Exit::Error
+    } else if outcome.aborted_at.is_some() {
+        Exit::RefusedOrAborted
+    } else if let Some((landed, _)) = outcome.verdict {
+        if landed { Exit::Landed } else { Exit::OutsideLimits }
+    } else if outcome.started {
+        // At rest without a verdict: under a parachute, or without a landing burn.
+        if outcome.safed_at.is_some() { Exit::OutsideLimits } else { Exit::NotSeen }
+    } else if outcome.refusal.is_some() {
+        Exit::RefusedOrAborted
+    } else if interactive {
+        Exit::Landed
+    } else {
+        Exit::NotSeen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn each_ending_has_its_code() {
+        let at = Some(Duration::ZERO);
+        let none = Outcome::default();
+        let landed = Outcome { started: true, verdict: Some((true, Duration::ZERO)), ..none.clone() };
+        let cases = [
+            (landed.clone(), false, Exit::Landed),
+            (
+                Outcome { verdict: Some((false, Duration::ZERO)), ..landed.clone() },
+                false,
+                Exit::OutsideLimits,
+            ),
+            (Outcome { aborted_at: at, ..landed.clone() }, false, Exit::RefusedOrAborted),
+            (Outcome { error: Some("socket".to_owned()), ..landed }, false, Exit::Error),
+            (Outcome { started: true, ..none.clone() }, true, Exit::NotSeen),
+            (Outcome { started: true, safed_at: at, ..none.clone() }, false, Exit::OutsideLimits),
+            (
+                Outcome { refusal: Some(("ARM denied".to_owned(), Duration::ZERO)), ..none.clone() },
+                false,
+                Exit::RefusedOrAborted,
+            ),
+            (none.clone(), true, Exit::Landed),
+            (none, false, Exit::NotSeen),
+        ];
+        for (outcome, interactive, expected) in cases {
+            assert_eq!(decide(&outcome, interactive), expected, "{outcome:?}");
+        }
+    }
+
+    #[test]
+    fn the_help_names_every_code() {
+        for exit in [
+            Exit::Landed,
+            Exit::Error,
+            Exit::Usage,
+            Exit::OutsideLimits,
+            Exit::RefusedOrAborted,
+            Exit::NotSeen,
+        ] {
+            assert!(HELP.contains(&format!("\n  {}  ", exit as u8)));
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Keys, as the ground understands them: the terminal's many ways reduced to the few that mean something.
+
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+/// A key press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// A character without Ctrl or Alt.
+    Char(char),
+    /// Enter.
+    Enter,
+    /// Escape.
+    Escape,
+    /// Backspace.
+    Backspace,
+    /// F1.
+    F1,
+    /// Ctrl-C.
+    CtrlC,
+    /// Ctrl-L.
+    CtrlL,
+    /// Ctrl-X.
+    CtrlX,
+}
+
+impl Key {
+    /// The key of a terminal's event; `None` for keys without a meaning here and for releases.
+    pub fn from_event(event: &KeyEvent) -> Option<Self> {
+        if event.kind == KeyEventKind::Release {
+            return None;
+        }
+        // A held chord must not abort: where the terminal tells repeats apart, they do not count.
+        if event.kind == KeyEventKind::Repeat && event.modifiers.contains(KeyModifiers::CONTROL) {
+            return None;
+        }
+        if event.modifiers.contains(KeyModifiers::ALT) {
+            return None;
+        }
+        let ctrl = event.modifiers.contains(KeyModifiers::CONTROL);
+        match event.code {
+            KeyCode::Char('c' | 'C') if ctrl => Some(Self::CtrlC),
+            KeyCode::Char('l' | 'L') if ctrl => Some(Self::CtrlL),
+            KeyCode::Char('x' | 'X') if ctrl => Some(Self::CtrlX),
+            KeyCode::Char(c) if !ctrl && !c.is_control() => Some(Self::Char(c)),
+            KeyCode::Enter => Some(Self::Enter),
+            KeyCode::Esc => Some(Self::Escape),
+            KeyCode::Backspace => Some(Self::Backspace),
+            KeyCode::F(1) => Some(Self::F1),
+            _ => None,
+        }
+    }
+
+    /// The key's name, for the log.
+    pub fn name(self) -> String {
+        match self {
+            Self::Char(' ') => "Space".to_owned(),
+            Self::Char(c) => c.to_string(),
+            Self::Enter => "Enter".to_owned(),
+            Self::Escape => "Esc".to_owned(),
+            Self::Backspace => "Backspace".to_owned(),
+            Self::F1 => "F1".to_owned(),
+            Self::CtrlC => "Ctrl-C".to_owned(),
+            Self::CtrlL => "Ctrl-L".to_owned(),
+            Self::CtrlX => "Ctrl-X".to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn releases_and_repeated_chords_do_not_count() {
+        let chord = |kind| KeyEvent::new_with_kind(KeyCode::Char('x'), KeyModifiers::CONTROL, kind);
+        assert_eq!(Key::from_event(&chord(KeyEventKind::Press)), Some(Key::CtrlX));
+        assert_eq!(Key::from_event(&chord(KeyEventKind::Repeat)), None);
+        assert_eq!(Key::from_event(&chord(KeyEventKind::Release)), None);
+    }
+
+    #[test]
+    fn a_shifted_letter_is_the_capital_letter() {
+        let key = KeyEvent::new(KeyCode::Char('A'), KeyModifiers::SHIFT);
+        assert_eq!(Key::from_event(&key), Some(Key::Char('A')));
+    }
+}

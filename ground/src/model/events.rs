@@ -1,0 +1,91 @@
+//! What happened, for a person to read; bounded.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use protocol::log::record::EventLevel;
+
+/// Events kept; older ones are in the log.
+const KEPT: usize = 500;
+/// Characters of a text kept; the raw frames hold all of it.
+const TEXT_LEN_MAX: usize = 400;
+
+/// Who says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speaker {
+    /// This program.
+    Ground,
+    /// The vehicle, in its own words.
+    Vehicle,
+}
+
+impl Speaker {
+    /// The name in lists and in the log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ground => "ground",
+            Self::Vehicle => "vehicle",
+        }
+    }
+}
+
+/// One event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Event {
+    /// Since the start of the run.
+    pub at: Duration,
+    /// Who says so.
+    pub speaker: Speaker,
+    /// How grave.
+    pub level: EventLevel,
+    /// What happened; fit for a terminal.
+    pub text: String,
+}
+
+impl Event {
+    /// A mark that carries the gravity without colour.
+    pub fn mark(&self) -> &'static str {
+        match self.level {
+            EventLevel::Info => "  ",
+            EventLevel::Warning => "! ",
+            EventLevel::Error | EventLevel::Fatal => "!!",
+        }
+    }
+}
+
+/// The latest events.
+#[derive(Debug, Default)]
+pub struct Events {
+    kept: VecDeque<Event>,
+    total: u64,
+}
+
+impl Events {
+    /// Adds an event; the oldest goes when there are too many.
+    pub fn push(&mut self, at: Duration, speaker: Speaker, level: EventLevel, mut text: String) {
+        if let Some((cut, _)) = text.char_indices().nth(TEXT_LEN_MAX) {
+            text.truncate(cut);
+        }
+        if self.kept.len() == KEPT {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(Event { at, speaker, level, text });
+        self.total += 1;
+    }
+
+    /// Events since the start, kept or not.
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// The newest `count` events, oldest first.
+    pub fn newest(&self, count: usize) -> impl Iterator<Item = &Event> {
+        self.kept.iter().skip(self.kept.len().saturating_sub(count))
+    }
+
+    /// The events after the first `seen`, as far as they are kept.
+    pub fn since(&self, seen: u64) -> impl Iterator<Item = &Event> {
+        let new = usize::try_from(self.total.saturating_sub(seen)).unwrap_or(usize::MAX);
+        self.newest(new)
+    }
+}

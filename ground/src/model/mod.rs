@@ -1,0 +1,133 @@
+//! Everything the ground knows, as plain data.
+
+pub mod command;
+pub mod dialog;
+pub mod events;
+pub mod link;
+pub mod outcome;
+pub mod telemetry;
+pub mod vehicle;
+pub mod words;
+
+use std::time::Duration;
+
+use protocol::log::record::EventLevel;
+use protocol::text::Reassembler;
+
+use crate::update::Action;
+use command::Commands;
+use dialog::Dialog;
+use events::{Events, Speaker};
+use link::Link;
+use outcome::Outcome;
+use vehicle::Vehicle;
+
+/// What the run was asked to be; never changes during it.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The link's name, as in `udpin:0.0.0.0:14550`.
+    pub link_name: String,
+    /// The log's path; `None` without a log.
+    pub log_path: Option<String>,
+    /// Arm and start without a hand.
+    pub auto: bool,
+    /// Someone watches a screen: the end of a flight does not end the program.
+    pub interactive: bool,
+    /// Give up after this long without the end of a flight; without a screen only.
+    pub time_limit: Option<Duration>,
+}
+
+/// How the log does.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LogHealth {
+    /// Records that found no room.
+    pub dropped: u64,
+    /// The writer has failed.
+    pub failed: bool,
+}
+
+/// When what is repeated is due next.
+#[derive(Debug, Default)]
+pub(crate) struct Due {
+    pub(crate) heartbeat: Duration,
+    pub(crate) timesync: Duration,
+    pub(crate) telemetry_record: Duration,
+}
+
+/// How far the automatic mode is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum AutoStep {
+    #[default]
+    WaitForReady,
+    WaitForArmed,
+    Done,
+}
+
+/// Everything known.
+#[derive(Debug)]
+pub struct Model {
+    /// What the run was asked to be.
+    pub settings: Settings,
+    /// The vehicle, by its telemetry.
+    pub vehicle: Vehicle,
+    /// The link.
+    pub link: Link,
+    /// Commands under way and done.
+    pub commands: Commands,
+    /// The open dialog.
+    pub dialog: Dialog,
+    /// When the abort chord was pressed once.
+    pub abort_pressed_at: Option<Duration>,
+    /// What happened.
+    pub events: Events,
+    /// What became of the flight.
+    pub outcome: Outcome,
+    /// How the log does.
+    pub log: LogHealth,
+    pub(crate) texts: Reassembler,
+    pub(crate) due: Due,
+    pub(crate) auto_step: AutoStep,
+    pub(crate) outbox: Vec<Action>,
+}
+
+impl Model {
+    /// Nothing known yet.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            vehicle: Vehicle::default(),
+            link: Link::default(),
+            commands: Commands::default(),
+            dialog: Dialog::Closed,
+            abort_pressed_at: None,
+            events: Events::default(),
+            outcome: Outcome::default(),
+            log: LogHealth::default(),
+            texts: Reassembler::new(),
+            due: Due::default(),
+            auto_step: AutoStep::default(),
+            outbox: Vec::new(),
+        }
+    }
+
+    /// Notes an event for the list, the lines and the log.
+    pub(crate) fn say(
+        &mut self,
+        now: Duration,
+        speaker: Speaker,
+        level: EventLevel,
+        text: impl Into<String>,
+    ) {
+        let text = text.into();
+        self.outbox.push(Action::event(speaker, level, &text));
+        self.events.push(now, speaker, level, text);
+    }
+
+    pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {
+        self.say(now, Speaker::Ground, EventLevel::Info, text);
+    }
+
+    pub(crate) fn warn(&mut self, now: Duration, text: impl Into<String>) {
+        self.say(now, Speaker::Ground, EventLevel::Warning, text);
+    }
+}

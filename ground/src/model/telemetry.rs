@@ -1,0 +1,302 @@
+//! Messages into the model: units, axes and ranges of the wire into those of the house.
+
+use std::time::Duration;
+
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage,
+    MavModeFlag, MavState, MavSysStatusSensor, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
+};
+
+use super::vehicle::{Attitude, Deflection, Gimbal, Heartbeat, Motion, Prediction, Sample, Vehicle, Verdict};
+use crate::limits::Touchdown;
+
+/// The vehicle's clock may jump back this far by reordered datagrams; more is a reboot.
+const REORDERED_MS: u32 = 1_000;
+
+/// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted, in which
+/// case everything it said before is forgotten first.
+pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
+    let rebooted = note_clock(vehicle, message);
+    match message {
+        MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),
+        MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
+        MavMessage::ATTITUDE_QUATERNION(data) => {
+            if let Some(attitude) = attitude(data) {
+                vehicle.attitude = Some(Sample::new(attitude, now));
+            }
+        }
+        MavMessage::LOCAL_POSITION_NED(data) => {
+            let motion = motion(data);
+            vehicle.motion = Some(Sample::new(motion, now));
+            if vehicle.in_flight() {
+                vehicle.extend_flown(&motion);
+            }
+        }
+        MavMessage::VFR_HUD(data) => {
+            let motion = Motion {
+                x_m: f64::NAN,
+                altitude_m: f64::from(data.alt),
+                vx_m_s: f64::NAN,
+                climb_m_s: f64::from(data.climb),
+            };
+            vehicle.hud = Some(Sample::new(motion, now));
+        }
+        MavMessage::TD_FINS(data) => {
+            let fin = |k: usize| deflection(data.commanded[k], data.measured[k]);
+            vehicle.fins = Some(Sample::new([fin(0), fin(1), fin(2), fin(3)], now));
+        }
+        MavMessage::TD_GIMBAL(data) => {
+            let gimbal = Gimbal {
+                pitch: deflection(data.pitch_commanded, data.pitch_measured),
+                yaw: deflection(data.yaw_commanded, data.yaw_measured),
+            };
+            vehicle.gimbal = Some(Sample::new(gimbal, now));
+        }
+        MavMessage::TD_CONTROLLER(data) => vehicle.controller = Some(Sample::new(data.clone(), now)),
+        MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
+            vehicle.prediction = Some(Sample::new(prediction(data), now));
+        }
+        MavMessage::TD_PREDICTED_PATH(data) => vehicle.path = Some(Sample::new(path(data), now)),
+        MavMessage::TD_LANDING_VERDICT(data) => vehicle.verdict = Some(Sample::new(verdict(data), now)),
+        MavMessage::EXTENDED_SYS_STATE(data) => {
+            let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;
+            vehicle.on_ground = Some(Sample::new(on_ground, now));
+        }
+        MavMessage::SYS_STATUS(data) => {
+            let ready =
+                data.onboard_control_sensors_health.contains(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK);
+            vehicle.ready_to_arm = Some(Sample::new(ready, now));
+        }
+        _ => {}
+    }
+    rebooted
+}
+
+fn note_clock(vehicle: &mut Vehicle, message: &MavMessage) -> bool {
+    let Some(boot_ms) = time_boot_ms(message) else { return false };
+    let rebooted = vehicle.last_boot_ms.is_some_and(|last| boot_ms.saturating_add(REORDERED_MS) < last);
+    if rebooted {
+        *vehicle = Vehicle::default();
+    }
+    vehicle.last_boot_ms = Some(vehicle.last_boot_ms.map_or(boot_ms, |last| last.max(boot_ms)));
+    rebooted
+}
+
+fn time_boot_ms(message: &MavMessage) -> Option<u32> {
+    match message {
+        MavMessage::TD_FLIGHT_STATUS(data) => Some(data.time_boot_ms),
+        MavMessage::ATTITUDE_QUATERNION(data) => Some(data.time_boot_ms),
+        MavMessage::LOCAL_POSITION_NED(data) => Some(data.time_boot_ms),
+        MavMessage::TD_FINS(data) => Some(data.time_boot_ms),
+        MavMessage::TD_GIMBAL(data) => Some(data.time_boot_ms),
+        MavMessage::TD_CONTROLLER(data) => Some(data.time_boot_ms),
+        MavMessage::TD_TOUCHDOWN_PREDICTION(data) => Some(data.time_boot_ms),
+        _ => None,
+    }
+}
+
+fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
+    Heartbeat {
+        armed: data.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
+        phase: phase_from_number(data.custom_mode),
+        terminated: data.system_status == MavState::MAV_STATE_FLIGHT_TERMINATION,
+    }
+}
+
+/// The phase of a HEARTBEAT's `custom_mode`; `None` for a number the dialect does not have.
+pub fn phase_from_number(number: u32) -> Option<TdPhase> {
+    use TdPhase as P;
+    let phases = [
+        P::TD_PHASE_SAFE,
+        P::TD_PHASE_PAD_IDLE,
+        P::TD_PHASE_PAD_ARMED,
+        P::TD_PHASE_BOOST,
+        P::TD_PHASE_COAST,
+        P::TD_PHASE_DEPLOY,
+        P::TD_PHASE_AERO_DESCENT,
+        P::TD_PHASE_LAND_ARMED,
+        P::TD_PHASE_IGNITION,
+        P::TD_PHASE_POWERED,
+        P::TD_PHASE_TOUCHDOWN,
+        P::TD_PHASE_SAFED,
+        P::TD_PHASE_CHUTE,
+    ];
+    phases.into_iter().find(|phase| *phase as u32 == number)
+}
+
+/// The nose's direction, which has no singularity upright where a rocket stands. `None` if the
+/// quaternion is no rotation.
+fn attitude(data: &ATTITUDE_QUATERNION_DATA) -> Option<Attitude> {
+    let [w, x, y, z] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
+    let norm_squared = w * w + x * x + y * y + z * z;
+    // Sent as f32 and perhaps never normalised; an all-zero or NaN quaternion means "unknown".
+    if !(0.5..2.0).contains(&norm_squared) {
+        return None;
+    }
+    let nose_north = 1.0 - 2.0 * (y * y + z * z) / norm_squared;
+    let nose_up = -2.0 * (x * z - w * y) / norm_squared;
+    Some(Attitude {
+        pitch_rad: libm::atan2(nose_up, nose_north),
+        tilt_rad: libm::acos(nose_up.clamp(-1.0, 1.0)),
+        pitch_rate_rad_s: f64::from(data.pitchspeed),
+    })
+}
+
+fn motion(data: &LOCAL_POSITION_NED_DATA) -> Motion {
+    Motion {
+        x_m: f64::from(data.x),
+        altitude_m: -f64::from(data.z),
+        vx_m_s: f64::from(data.vx),
+        climb_m_s: -f64::from(data.vz),
+    }
+}
+
+fn deflection(commanded_cdeg: i16, measured_cdeg: i16) -> Deflection {
+    let radians = |cdeg: i16| (f64::from(cdeg) / 100.0).to_radians();
+    Deflection { commanded_rad: radians(commanded_cdeg), measured_rad: radians(measured_cdeg) }
+}
+
+fn prediction(data: &TD_TOUCHDOWN_PREDICTION_DATA) -> Prediction {
+    Prediction {
+        time_to_go_s: f64::from(data.time_to_go_ms) / 1_000.0,
+        touchdown: Touchdown {
+            x_m: f64::from(data.x_m),
+            altitude_m: f64::from(data.altitude_m),
+            pitch_rad: f64::from(data.pitch_rad),
+            u_m_s: f64::from(data.u_m_s),
+            w_m_s: f64::from(data.w_m_s),
+            q_rad_s: f64::from(data.q_rad_s),
+            violated: data.limits_violated,
+        },
+    }
+}
+
+fn path(data: &TD_PREDICTED_PATH_DATA) -> Vec<(f64, f64)> {
+    let metres = |cm: i16| f64::from(cm) / 100.0;
+    let points = data.x.iter().zip(&data.altitude).map(|(x, altitude)| (metres(*x), metres(*altitude)));
+    points.take(usize::from(data.count)).collect()
+}
+
+fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
+    Verdict {
+        landed: data.landed == 1,
+        touchdown: Touchdown {
+            x_m: f64::from(data.x_m),
+            altitude_m: f64::from(data.altitude_m),
+            pitch_rad: f64::from(data.pitch_rad),
+            u_m_s: f64::from(data.u_m_s),
+            w_m_s: f64::from(data.w_m_s),
+            q_rad_s: f64::from(data.q_rad_s),
+            violated: data.limits_violated,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Duration = Duration::from_secs(1);
+
+    fn at_pitch(pitch_deg: f64) -> MavMessage {
+        let (sin, cos) = libm::sincos(pitch_deg.to_radians() / 2.0);
+        MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+            q1: cos as f32,
+            q3: sin as f32,
+            pitchspeed: 0.1,
+            ..Default::default()
+        })
+    }
+
+    fn moving(vx: f32, vz_down: f32) -> MavMessage {
+        MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+            vx,
+            vz: vz_down,
+            z: -15.0,
+            ..Default::default()
+        })
+    }
+
+    fn speeds(pitch_deg: f64, vx: f32, vz_down: f32) -> (f64, f64) {
+        let mut vehicle = Vehicle::default();
+        apply(&mut vehicle, &at_pitch(pitch_deg), NOW);
+        apply(&mut vehicle, &moving(vx, vz_down), NOW);
+        let speed = vehicle.body_speed().unwrap().value;
+        (speed.u_m_s, speed.w_m_s)
+    }
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-5, "{found} is not {expected}");
+    }
+
+    #[test]
+    fn upright_descent_is_negative_axial_speed() {
+        let (u, w) = speeds(90.0, 0.2, 5.0);
+        close(u, -5.0);
+        close(w, 0.2);
+    }
+
+    #[test]
+    fn tilted_speeds_follow_the_body_axes() {
+        // Falling at 1 m/s with the nose 60 deg above the horizon: u = -sin 60, w = +cos 60.
+        let (u, w) = speeds(60.0, 0.0, 1.0);
+        close(u, -0.866_025);
+        close(w, 0.5);
+        // Leaning over the other way, past the vertical.
+        let (u, w) = speeds(120.0, 0.0, 1.0);
+        close(u, -0.866_025);
+        close(w, -0.5);
+    }
+
+    #[test]
+    fn pitch_passes_the_vertical_without_a_jump_and_tilt_counts_from_it() {
+        for pitch_deg in [10.0, 60.0, 89.0, 90.0, 91.0, 120.0] {
+            let mut vehicle = Vehicle::default();
+            apply(&mut vehicle, &at_pitch(pitch_deg), NOW);
+            let attitude = vehicle.attitude.unwrap().value;
+            close(attitude.pitch_rad.to_degrees(), pitch_deg);
+            assert!((attitude.tilt_rad.to_degrees() - (pitch_deg - 90.0).abs()).abs() < 0.03);
+        }
+    }
+
+    #[test]
+    fn a_quaternion_that_is_no_rotation_is_not_taken() {
+        let mut vehicle = Vehicle::default();
+        let zero = MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA::default());
+        apply(&mut vehicle, &zero, NOW);
+        assert!(vehicle.attitude.is_none());
+    }
+
+    #[test]
+    fn a_falling_clock_is_a_reboot_and_a_late_datagram_is_not() {
+        let at = |ms| {
+            MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA { time_boot_ms: ms, ..Default::default() })
+        };
+        let mut vehicle = Vehicle::default();
+        assert!(!apply(&mut vehicle, &at(60_000), NOW));
+        assert!(!apply(&mut vehicle, &at(59_900), NOW));
+        apply(&mut vehicle, &at_pitch_at(90.0, 60_100), NOW);
+        assert!(apply(&mut vehicle, &at(200), NOW));
+        assert!(vehicle.attitude.is_none(), "what was known before the reboot is forgotten");
+        assert!(!apply(&mut vehicle, &at(300), NOW));
+    }
+
+    fn at_pitch_at(pitch_deg: f64, boot_ms: u32) -> MavMessage {
+        match at_pitch(pitch_deg) {
+            MavMessage::ATTITUDE_QUATERNION(mut data) => {
+                data.time_boot_ms = boot_ms;
+                MavMessage::ATTITUDE_QUATERNION(data)
+            }
+            other => other,
+        }
+    }
+
+    #[test]
+    fn every_phase_number_has_its_name_and_others_have_none() {
+        for number in 0..=12 {
+            assert_eq!(phase_from_number(number).map(|phase| phase as u32), Some(number));
+        }
+        assert_eq!(phase_from_number(13), None);
+    }
+}

@@ -1,0 +1,241 @@
+//! The vehicle as its telemetry shows it. Every value knows when it was received.
+
+use std::time::Duration;
+
+use protocol::dialect::{TD_CONTROLLER_DATA, TD_FLIGHT_STATUS_DATA, TdInterlock, TdPhase};
+
+use crate::limits::Touchdown;
+
+/// A value older than this is marked as stale.
+pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
+/// Points of the flown path kept.
+const FLOWN_MAX: usize = 512;
+/// Positions beyond this are no positions.
+const POSITION_MAX_M: f64 = 1e5;
+
+/// A value and when it was received.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample<T> {
+    /// The value.
+    pub value: T,
+    /// Since the start of the run.
+    pub received_at: Duration,
+}
+
+impl<T> Sample<T> {
+    /// A value received now.
+    pub fn new(value: T, now: Duration) -> Self {
+        Self { value, received_at: now }
+    }
+
+    /// Time since it was received.
+    pub fn age(&self, now: Duration) -> Duration {
+        now.saturating_sub(self.received_at)
+    }
+
+    /// Whether it is too old to be taken for the present.
+    pub fn is_stale(&self, now: Duration) -> bool {
+        self.age(now) > STALE_AFTER
+    }
+}
+
+/// HEARTBEAT.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heartbeat {
+    /// What the vehicle itself says about being armed: the only truth about it.
+    pub armed: bool,
+    /// Phase, unless its number is unknown.
+    pub phase: Option<TdPhase>,
+    /// `MAV_STATE_FLIGHT_TERMINATION`.
+    pub terminated: bool,
+}
+
+/// Attitude in the pitch plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attitude {
+    /// Pitch from the horizontal; pi/2 is upright.
+    pub pitch_rad: f64,
+    /// Angle between nose and vertical, 0 to pi.
+    pub tilt_rad: f64,
+    /// Pitch rate.
+    pub pitch_rate_rad_s: f64,
+}
+
+/// Position and velocity in the pitch plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Horizontal, north.
+    pub x_m: f64,
+    /// Altitude, up.
+    pub altitude_m: f64,
+    /// Horizontal speed, north.
+    pub vx_m_s: f64,
+    /// Vertical speed, up.
+    pub climb_m_s: f64,
+}
+
+/// Speeds along the body's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySpeed {
+    /// Axial, towards the nose.
+    pub u_m_s: f64,
+    /// Lateral, body z axis.
+    pub w_m_s: f64,
+}
+
+/// Commanded and measured angle.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Deflection {
+    /// What the controller asked for.
+    pub commanded_rad: f64,
+    /// Where it is.
+    pub measured_rad: f64,
+}
+
+/// Gimbal in both planes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Gimbal {
+    /// Pitch plane.
+    pub pitch: Deflection,
+    /// Yaw plane.
+    pub yaw: Deflection,
+}
+
+/// The end of the controller's plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Time from then to the end.
+    pub time_to_go_s: f64,
+    /// The state there.
+    pub touchdown: Touchdown,
+}
+
+/// The vehicle's own verdict on its landing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Verdict {
+    /// Inside every limit.
+    pub landed: bool,
+    /// The state at contact.
+    pub touchdown: Touchdown,
+}
+
+/// Everything the vehicle said last.
+#[derive(Debug, Clone, Default)]
+pub struct Vehicle {
+    /// HEARTBEAT.
+    pub heartbeat: Option<Sample<Heartbeat>>,
+    /// `TD_FLIGHT_STATUS`.
+    pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
+    /// `ATTITUDE_QUATERNION`.
+    pub attitude: Option<Sample<Attitude>>,
+    /// `LOCAL_POSITION_NED`.
+    pub motion: Option<Sample<Motion>>,
+    /// `VFR_HUD`: altitude and climb, for a vehicle that sends no local position.
+    pub hud: Option<Sample<Motion>>,
+    /// `TD_FINS`.
+    pub fins: Option<Sample<[Deflection; 4]>>,
+    /// `TD_GIMBAL`.
+    pub gimbal: Option<Sample<Gimbal>>,
+    /// `TD_CONTROLLER`.
+    pub controller: Option<Sample<TD_CONTROLLER_DATA>>,
+    /// `TD_TOUCHDOWN_PREDICTION`.
+    pub prediction: Option<Sample<Prediction>>,
+    /// `TD_PREDICTED_PATH`: x and altitude, m.
+    pub path: Option<Sample<Vec<(f64, f64)>>>,
+    /// `TD_LANDING_VERDICT`.
+    pub verdict: Option<Sample<Verdict>>,
+    /// `EXTENDED_SYS_STATE`: on the ground or not.
+    pub on_ground: Option<Sample<bool>>,
+    /// `SYS_STATUS`: the vehicle's own arming checks pass.
+    pub ready_to_arm: Option<Sample<bool>>,
+    /// Where it flew: x and altitude, m.
+    pub flown: Vec<(f64, f64)>,
+    /// The vehicle's clock, ms since its boot.
+    pub last_boot_ms: Option<u32>,
+}
+
+impl Vehicle {
+    /// The phase, from whichever message said so last.
+    pub fn phase(&self) -> Option<Sample<TdPhase>> {
+        let status = self.status.as_ref().map(|status| Sample::new(status.value.phase, status.received_at));
+        let heartbeat = self.heartbeat.and_then(|heartbeat| {
+            heartbeat.value.phase.map(|phase| Sample::new(phase, heartbeat.received_at))
+        });
+        match (status, heartbeat) {
+            (Some(status), Some(heartbeat)) if heartbeat.received_at > status.received_at => Some(heartbeat),
+            (Some(status), _) => Some(status),
+            (None, heartbeat) => heartbeat,
+        }
+    }
+
+    /// Armed by the vehicle's own heartbeat; `None` before the first.
+    pub fn armed(&self) -> Option<Sample<bool>> {
+        self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
+    }
+
+    /// The interlocks, if known.
+    pub fn interlocks(&self) -> Option<TdInterlock> {
+        self.status.as_ref().map(|status| status.value.interlocks)
+    }
+
+    /// Left the pad and not yet at rest.
+    pub fn in_flight(&self) -> bool {
+        self.phase().is_some_and(|phase| is_flight(phase.value))
+    }
+
+    /// Time to release, s (negative: since ignition), if a countdown is known.
+    pub fn countdown_s(&self) -> Option<Sample<f64>> {
+        let status = self.status.as_ref()?;
+        let known = status.value.countdown_ms != i32::MAX;
+        known.then(|| Sample::new(f64::from(status.value.countdown_ms) / 1_000.0, status.received_at))
+    }
+
+    /// Position and velocity, from the better of its two sources.
+    pub fn best_motion(&self) -> Option<Sample<Motion>> {
+        match (self.motion, self.hud) {
+            (Some(motion), Some(hud)) if hud.received_at.saturating_sub(motion.received_at) > STALE_AFTER => {
+                Some(hud)
+            }
+            (Some(motion), _) => Some(motion),
+            (None, hud) => hud,
+        }
+    }
+
+    /// Speeds along the body's axes, as old as the older of attitude and velocity.
+    pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
+        let (attitude, motion) = (self.attitude?, self.motion?);
+        let (sin, cos) = libm::sincos(attitude.value.pitch_rad);
+        let (vx, climb) = (motion.value.vx_m_s, motion.value.climb_m_s);
+        // Axes in (x, up): e_x = (cos, sin) towards the nose, e_z = (sin, -cos).
+        let speed = BodySpeed { u_m_s: vx * cos + climb * sin, w_m_s: vx * sin - climb * cos };
+        Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
+    }
+
+    /// Notes where it is; thins the path out when it grows too long.
+    pub(crate) fn extend_flown(&mut self, motion: &Motion) {
+        let point = (motion.x_m, motion.altitude_m);
+        let is_position = |value: f64| value.abs() < POSITION_MAX_M;
+        if !is_position(point.0) || !is_position(point.1) || self.flown.last() == Some(&point) {
+            return;
+        }
+        if self.flown.len() >= FLOWN_MAX {
+            let mut keep = false;
+            self.flown.retain(|_| {
+                keep = !keep;
+                keep
+            });
+        }
+        self.flown.push(point);
+    }
+}
+
+/// Between leaving the pad and coming to rest.
+pub fn is_flight(phase: TdPhase) -> bool {
+    (TdPhase::TD_PHASE_BOOST as u32..=TdPhase::TD_PHASE_POWERED as u32).contains(&(phase as u32))
+        || phase == TdPhase::TD_PHASE_CHUTE
+}
+
+/// On the pad.
+pub fn is_on_pad(phase: TdPhase) -> bool {
+    (phase as u32) <= TdPhase::TD_PHASE_PAD_ARMED as u32
+}

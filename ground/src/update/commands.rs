@@ -1,0 +1,178 @@
+//! Commands on their way: sent, answered, given up, observed.
+
+use std::time::Duration;
+
+use protocol::command::{ANSWER_TIMEOUT, CommandAnswer, CommandEvent, CommandSender};
+use protocol::dialect::MavResult;
+use protocol::identity::VEHICLE;
+use protocol::log::record::EventLevel;
+
+use super::{Action, keys};
+use crate::model::command::{Acknowledged, CommandKind, Track};
+use crate::model::events::Speaker;
+use crate::model::{AutoStep, Model};
+
+/// Asks the vehicle, and begins to follow what becomes of it.
+pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
+    let commands = &mut model.commands;
+    let aborting = commands.of(CommandKind::Abort).is_some_and(|track| is_open(track.acknowledged));
+    if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
+        // An abort or a disarming ends whatever else is still being resent: a start that arrives
+        // after it would undo it.
+        commands.sender = CommandSender::new();
+        for track in commands.tracks.iter_mut().filter(|track| is_open(track.acknowledged)) {
+            track.acknowledged = Acknowledged::Nothing;
+        }
+        // The automatic mode yields to the hand.
+        model.auto_step = AutoStep::Done;
+    }
+    // Pressed again while it is under way, an abort is sent at once and its attempts go on counting.
+    let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).copied();
+    commands.tracks.retain(|track| track.kind != kind);
+    commands.tracks.push(Track {
+        kind,
+        commanded_at: earlier.map_or(now, |track| track.commanded_at),
+        attempts: earlier.map_or(0, |track| track.attempts),
+        acknowledged: Acknowledged::Waiting,
+        acknowledged_at: None,
+        observed_at: None,
+        not_observed_said: false,
+    });
+    commands.abort_again_at = None;
+    model.outcome.refusal = None;
+    send(model, kind, now);
+    poll(model, now);
+}
+
+fn send(model: &mut Model, kind: CommandKind, now: Duration) {
+    let (command, param1) = kind.wire();
+    let params = [param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    model.commands.sender.submit(VEHICLE, command, params, kind.resend(), now);
+}
+
+fn is_open(acknowledged: Acknowledged) -> bool {
+    matches!(acknowledged, Acknowledged::Waiting | Acknowledged::InProgress)
+}
+
+/// Sends what is due and takes note of what happened.
+pub(super) fn poll(model: &mut Model, now: Duration) {
+    if model.commands.abort_again_at.is_some_and(|at| now >= at) {
+        model.commands.abort_again_at = None;
+        send(model, CommandKind::Abort, now);
+    }
+    let messages = model.commands.sender.poll(now);
+    model.outbox.extend(messages.into_iter().map(Action::send));
+    for event in model.commands.sender.take_events() {
+        on_event(model, event, now);
+    }
+}
+
+pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
+    let given_up =
+        track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledged::Nothing);
+    if given_up {
+        // Slow radio: the answer to a command that is waited for no longer is still a fact.
+        let (command, result) = (answer.command, answer.result);
+        on_event(model, CommandEvent::Answered { command, result }, now);
+        return;
+    }
+    model.commands.sender.on_answer(&answer, now);
+    poll(model, now);
+}
+
+/// The latest command of this number: arming and disarming share one.
+fn track_of(model: &mut Model, command: u16) -> Option<&mut Track> {
+    model.commands.tracks.iter_mut().rfind(|track| track.kind.wire().0 as u16 == command)
+}
+
+fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
+    let (CommandEvent::Sent { command, .. }
+    | CommandEvent::InProgress { command, .. }
+    | CommandEvent::Answered { command, .. }
+    | CommandEvent::TimedOut { command, .. }) = event;
+    let Some(track) = track_of(model, command) else { return };
+    let kind = track.kind;
+    let name = kind.name();
+    let (operator_kind, level, text) = match event {
+        CommandEvent::Sent { .. } => {
+            track.attempts += 1;
+            track.acknowledged = Acknowledged::Waiting;
+            ("commanded", EventLevel::Info, format!("{name} commanded, attempt {}", track.attempts))
+        }
+        CommandEvent::InProgress { .. } => {
+            track.acknowledged = Acknowledged::InProgress;
+            ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
+        }
+        CommandEvent::Answered { result, .. } => {
+            track.acknowledged = Acknowledged::Answered(result);
+            track.acknowledged_at = Some(now);
+            let words = result_words(result);
+            if track.accepted() {
+                ("acknowledged", EventLevel::Info, format!("{name} acknowledged: {words}"))
+            } else {
+                ("refused", EventLevel::Error, format!("{name} REFUSED: {words}"))
+            }
+        }
+        CommandEvent::TimedOut { attempts, .. } => {
+            track.acknowledged = Acknowledged::Nothing;
+            ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
+        }
+    };
+    let answered = match event {
+        CommandEvent::Answered { result, .. } => Some(result),
+        _ => None,
+    };
+    keys::record_operator(model, operator_kind, &text, now);
+    model.say(now, Speaker::Ground, level, text);
+    if let Some(result) = answered {
+        on_final_answer(model, kind, result, now);
+    } else if kind == CommandKind::Abort && matches!(event, CommandEvent::TimedOut { .. }) {
+        model.commands.abort_again_at = Some(now);
+    }
+}
+
+fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Duration) {
+    let refused = result != MavResult::MAV_RESULT_ACCEPTED as u8;
+    match kind {
+        CommandKind::Arm | CommandKind::Start if refused => {
+            model.outcome.refusal = Some((format!("{} {}", kind.name(), result_words(result)), now));
+        }
+        // "Not now" is no answer to an abort.
+        CommandKind::Abort if result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8 => {
+            model.commands.abort_again_at = Some(now + ANSWER_TIMEOUT);
+            if let Some(track) = model.commands.tracks.iter_mut().find(|track| track.kind == kind) {
+                track.acknowledged = Acknowledged::Waiting;
+            }
+        }
+        _ => {}
+    }
+}
+
+fn result_words(result: u8) -> &'static str {
+    CommandAnswer { command: 0, result, progress: 0, target: VEHICLE }.result_words()
+}
+
+/// Compares the vehicle's own state with what was asked.
+pub(super) fn observe(model: &mut Model, now: Duration) {
+    let mut seen = Vec::new();
+    for track in &mut model.commands.tracks {
+        if track.observed_at.is_none() && track.kind.is_observed(&model.vehicle, track.commanded_at) {
+            track.observed_at = Some(now);
+            seen.push((
+                EventLevel::Info,
+                format!("{} observed: {}", track.kind.name(), track.kind.observed_words()),
+            ));
+        } else if track.disagrees(now) && !track.not_observed_said {
+            track.not_observed_said = true;
+            let name = track.kind.name();
+            seen.push((
+                EventLevel::Error,
+                format!("{name} acknowledged, not observed: the vehicle does not show it"),
+            ));
+        }
+    }
+    for (level, text) in seen {
+        keys::record_operator(model, "observed", &text, now);
+        model.say(now, Speaker::Ground, level, text);
+    }
+}

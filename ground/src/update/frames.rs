@@ -1,0 +1,133 @@
+//! Frames from the link.
+
+use std::time::Duration;
+
+use protocol::command::CommandAnswer;
+use protocol::dialect::{MavMessage, TIMESYNC_DATA};
+use protocol::frame::Frame;
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::log::record::EventLevel;
+use protocol::text::Text;
+
+use super::{Action, commands, observe};
+use crate::model::events::Speaker;
+use crate::model::{Model, telemetry};
+
+const HEARTBEAT_ID: u32 = 0;
+/// A second ground with our own ids is named at most this often.
+const TWIN_SAID_EVERY: Duration = Duration::from_secs(10);
+/// Strangers remembered, so that each is named once.
+const STRANGERS_MAX: usize = 8;
+
+pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
+    model.link.stats.on_frame(frame, now);
+    if frame.source() == GROUND {
+        note_twin(model, now);
+    } else if frame.source() == VEHICLE {
+        on_vehicle_frame(model, frame, now);
+    } else if frame.message_id() == HEARTBEAT_ID {
+        note_stranger(model, frame.source(), now);
+    }
+}
+
+fn note_twin(model: &mut Model, now: Duration) {
+    if model.link.twin_said_at.is_none_or(|at| now.saturating_sub(at) >= TWIN_SAID_EVERY) {
+        model.link.twin_said_at = Some(now);
+        model.warn(now, "another ground station uses our ids 255/190: acknowledgements may be its own");
+    }
+}
+
+fn note_stranger(model: &mut Model, source: Address, now: Duration) {
+    let strangers = &mut model.link.strangers;
+    if strangers.len() < STRANGERS_MAX && !strangers.contains(&source) {
+        strangers.push(source);
+        let Address { system_id, component_id } = source;
+        model
+            .info(now, format!("system {system_id} component {component_id} is also on the link; not shown"));
+    }
+}
+
+fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
+    if let Some(answer) = CommandAnswer::from_frame(frame) {
+        if GROUND.accepts(answer.target) {
+            commands::on_answer(model, answer, now);
+        }
+        return;
+    }
+    let Ok(message) = frame.decode() else {
+        model.link.undecodable += 1;
+        return;
+    };
+    if let Some(answer) = answer_to_ping(&message, frame.source()) {
+        model.outbox.push(Action::send(answer));
+        return;
+    }
+    match &message {
+        MavMessage::STATUSTEXT(chunk) => {
+            for text in model.texts.push(frame.source(), chunk, now) {
+                say_text(model, &text, now);
+            }
+            return;
+        }
+        MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
+        MavMessage::HEARTBEAT(_) => {
+            model.link.heartbeat_at = Some(now);
+            if std::mem::take(&mut model.link.lost_said) {
+                model.info(now, "link restored: the vehicle is heard again");
+            }
+        }
+        _ => {}
+    }
+    let before = observe::Facts::of(&model.vehicle);
+    let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
+    if rebooted {
+        observe::on_reboot(model, now);
+    }
+    observe::on_change(model, if rebooted { observe::Facts::default() } else { before }, now);
+    commands::observe(model, now);
+}
+
+/// PING with target 0 asks for itself back, addressed to the sender.
+#[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
+fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
+    let MavMessage::PING(data) = message else { return None };
+    if data.target_system != 0 || data.target_component != 0 {
+        return None;
+    }
+    let mut answer = data.clone();
+    answer.target_system = source.system_id;
+    answer.target_component = source.component_id;
+    Some(MavMessage::PING(answer))
+}
+
+pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
+    // RFC 5424: 0 emergency to 7 debug.
+    let level = match text.severity {
+        0..=2 => EventLevel::Fatal,
+        3 => EventLevel::Error,
+        4 => EventLevel::Warning,
+        _ => EventLevel::Info,
+    };
+    model.say(now, Speaker::Vehicle, level, text.text.clone());
+}
+
+fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
+    let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+    if !GROUND.accepts(Address { system_id: data.target_system, component_id: data.target_component }) {
+        return;
+    }
+    if data.tc1 == 0 {
+        model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
+            tc1: ours,
+            ts1: data.ts1,
+            target_system: source.system_id,
+            target_component: source.component_id,
+        })));
+    } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
+        let round_trip = Duration::from_nanos(nanoseconds);
+        // Anything older answers a question that was given up.
+        if round_trip < Duration::from_secs(10) {
+            model.link.round_trip = Some(round_trip);
+        }
+    }
+}

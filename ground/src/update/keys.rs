@@ -1,0 +1,174 @@
+//! The hand of the crew.
+//!
+//! Nothing dangerous on a single letter: arming takes the dialog and then the typed word, start and
+//! disarming a letter and Enter, an abort the same chord twice; each within its time.
+
+use std::time::Duration;
+
+use protocol::dialect::TdPhase;
+use protocol::log::record::Record;
+use protocol::log::v1::OperatorAction;
+
+use super::{Action, commands};
+use crate::key::Key;
+use crate::model::Model;
+use crate::model::command::CommandKind;
+use crate::model::dialog::{
+    ABORT_TIME_LIMIT, ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT,
+};
+use crate::model::vehicle::is_on_pad;
+use crate::model::words;
+
+pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
+    record_operator(model, "key", &key.name(), now);
+    expire(model, now);
+    if key == Key::CtrlX {
+        abort_chord(model, now);
+        return;
+    }
+    // The chord is twice the same key with nothing between.
+    model.abort_pressed_at = None;
+    match key {
+        Key::CtrlC => return quit(model, now),
+        Key::CtrlL => return model.outbox.push(Action::Redraw),
+        _ => {}
+    }
+    match std::mem::replace(&mut model.dialog, Dialog::Closed) {
+        Dialog::Closed => on_free_key(model, key, now),
+        Dialog::Help => {}
+        Dialog::Arm { typed, until } => on_arm_key(model, key, typed, until, now),
+        Dialog::Start { until } => match key {
+            Key::Enter => start(model, now),
+            Key::Escape => model.info(now, "start: cancelled"),
+            _ => model.dialog = Dialog::Start { until },
+        },
+        Dialog::Disarm { until } => match key {
+            Key::Enter => commands::submit(model, CommandKind::Disarm, now),
+            Key::Escape => model.info(now, "disarm: cancelled"),
+            _ => model.dialog = Dialog::Disarm { until },
+        },
+        Dialog::Quit { .. } if matches!(key, Key::Char('q' | 'Q')) => model.outbox.push(Action::Quit),
+        Dialog::Quit { .. } => model.info(now, "quit: cancelled"),
+    }
+}
+
+/// Closes what has waited too long: an offer to arm does not stay open behind the crew's back.
+pub(super) fn expire(model: &mut Model, now: Duration) {
+    if model.abort_pressed_at.is_some_and(|at| now.saturating_sub(at) > ABORT_TIME_LIMIT) {
+        model.abort_pressed_at = None;
+    }
+    if model.dialog.until().is_some_and(|until| now > until) {
+        let words = match std::mem::replace(&mut model.dialog, Dialog::Closed) {
+            Dialog::Arm { .. } => "arming: time is up, nothing was sent",
+            Dialog::Start { .. } => "start: time is up, nothing was sent",
+            Dialog::Disarm { .. } => "disarm: time is up, nothing was sent",
+            Dialog::Quit { .. } | Dialog::Closed | Dialog::Help => return,
+        };
+        model.info(now, words);
+    }
+}
+
+pub(super) fn record_operator(model: &mut Model, kind: &str, detail: &str, now: Duration) {
+    model.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
+        time_s: now.as_secs_f64(),
+        kind: kind.to_owned(),
+        detail: detail.to_owned(),
+    })));
+}
+
+fn on_free_key(model: &mut Model, key: Key, now: Duration) {
+    match key {
+        Key::Char('A') => match why_not_arm(model, now) {
+            None => model.dialog = Dialog::Arm { typed: String::new(), until: now + ARM_TIME_LIMIT },
+            Some(why) => model.warn(now, format!("cannot arm: {why}")),
+        },
+        Key::Char('S') => match why_not_start(model, now) {
+            None => model.dialog = Dialog::Start { until: now + CONFIRM_TIME_LIMIT },
+            Some(why) => model.warn(now, format!("cannot start: {why}")),
+        },
+        Key::Char('D') => model.dialog = Dialog::Disarm { until: now + CONFIRM_TIME_LIMIT },
+        Key::Char('a' | 's' | 'd') => model.info(now, "capital letters: A arms, S starts, D disarms"),
+        Key::Char('q' | 'Q') => quit(model, now),
+        Key::Char('?') | Key::F1 => model.dialog = Dialog::Help,
+        _ => {}
+    }
+}
+
+fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, now: Duration) {
+    match key {
+        Key::Escape => return model.info(now, "arming: cancelled"),
+        Key::Enter if typed.eq_ignore_ascii_case(ARM_WORD) => {
+            // The vehicle may have changed while the word was typed.
+            match why_not_arm(model, now) {
+                None => commands::submit(model, CommandKind::Arm, now),
+                Some(why) => model.warn(now, format!("cannot arm: {why}")),
+            }
+            return;
+        }
+        Key::Backspace => {
+            typed.pop();
+        }
+        Key::Char(c) if typed.chars().count() < ARM_WORD.len() => typed.push(c),
+        // A wrong word; or a letter too many, which could not be shown and must not be taken back unseen.
+        Key::Enter | Key::Char(_) => {
+            return model.info(now, format!("arming: the word is {ARM_WORD}; nothing was sent"));
+        }
+        _ => {}
+    }
+    model.dialog = Dialog::Arm { typed, until };
+}
+
+fn start(model: &mut Model, now: Duration) {
+    match why_not_start(model, now) {
+        None => commands::submit(model, CommandKind::Start, now),
+        Some(why) => model.warn(now, format!("cannot start: {why}")),
+    }
+}
+
+/// Why arming is not even asked for. The vehicle's own checks are the vehicle's to refuse, in its words.
+fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
+    if !model.link.state(now).carries() {
+        return Some("the vehicle is not heard".to_owned());
+    }
+    if model.vehicle.armed().is_some_and(|armed| armed.value) {
+        return Some("armed already".to_owned());
+    }
+    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
+        return Some("the phase is unknown".to_owned());
+    };
+    (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase)))
+}
+
+fn why_not_start(model: &Model, now: Duration) -> Option<String> {
+    if !model.link.state(now).carries() {
+        return Some("the vehicle is not heard".to_owned());
+    }
+    if !model.vehicle.armed().is_some_and(|armed| armed.value) {
+        return Some("not armed".to_owned());
+    }
+    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
+        return Some("the phase is unknown".to_owned());
+    };
+    (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
+}
+
+fn abort_chord(model: &mut Model, now: Duration) {
+    if model.abort_pressed_at.take().is_none() {
+        model.abort_pressed_at = Some(now);
+        return;
+    }
+    model.dialog = Dialog::Closed;
+    commands::submit(model, CommandKind::Abort, now);
+}
+
+fn quit(model: &mut Model, now: Duration) {
+    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
+    let risky = armed || model.vehicle.in_flight();
+    let confirmed = matches!(model.dialog, Dialog::Quit { .. });
+    if confirmed || !risky {
+        model.dialog = Dialog::Closed;
+        model.outbox.push(Action::Quit);
+    } else {
+        model.dialog = Dialog::Quit { until: now + QUIT_TIME_LIMIT };
+    }
+}

@@ -1,0 +1,129 @@
+//! Every decision of the ground: a message and the time in, a changed model and the wanted actions out.
+//!
+//! Nothing here reads a clock, a socket or a file; whatever arrives in whatever order is data.
+
+pub mod auto;
+pub mod commands;
+pub mod frames;
+pub mod keys;
+pub mod observe;
+pub mod tick;
+
+use std::time::Duration;
+
+use protocol::dialect::MavMessage;
+use protocol::frame::{Frame, FramerCounters};
+use protocol::log::record::{Event, EventLevel, Record};
+
+use crate::key::Key;
+use crate::model::events::Speaker;
+use crate::model::{LogHealth, Model};
+
+/// Something that reached the ground.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Msg {
+    /// A key was pressed.
+    Key(Key),
+    /// A frame arrived.
+    Frame(Frame),
+    /// Bytes arrived, whole frames or not.
+    Received {
+        /// How many.
+        bytes: usize,
+        /// The framer's counters after them.
+        framing: FramerCounters,
+    },
+    /// Bytes were sent.
+    Sent {
+        /// How many.
+        bytes: usize,
+        /// Writes dropped since the start.
+        drops: u64,
+    },
+    /// The transport works; with whom.
+    LinkUp(String),
+    /// The transport does not work; why.
+    LinkDown(String),
+    /// How the log does.
+    Log(LogHealth),
+    /// The embedded simulator ended by itself; why, if it failed.
+    SimulatorEnded(Option<String>),
+    /// The system asks to end; by which signal.
+    Terminate(&'static str),
+    /// Time passes; several times a second.
+    Tick,
+}
+
+/// Something that the run loop is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Send a message to the vehicle.
+    Send(Box<MavMessage>),
+    /// Write a record into the log.
+    Record(Record),
+    /// Put the log on the disk now.
+    SyncLog,
+    /// Draw the whole screen again.
+    Redraw,
+    /// End the program.
+    Quit,
+}
+
+impl Action {
+    pub(crate) fn send(message: MavMessage) -> Self {
+        Self::Send(Box::new(message))
+    }
+
+    pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
+        let event = Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
+        Self::Record(Record::Event(event))
+    }
+}
+
+/// Takes a message into the model.
+pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
+    match msg {
+        Msg::Key(key) => keys::on_key(model, key, now),
+        Msg::Frame(frame) => frames::on_frame(model, &frame, now),
+        Msg::Received { bytes, framing } => {
+            model.link.stats.on_rx_bytes(bytes, now);
+            model.link.framing = framing;
+        }
+        Msg::Sent { bytes, drops } => {
+            model.link.stats.on_tx_bytes(bytes, now);
+            model.link.send_drops = drops;
+        }
+        Msg::LinkUp(peer) => {
+            model.link.trouble = None;
+            model.info(now, format!("link up: {}", protocol::text::printable(peer.as_bytes())));
+        }
+        Msg::LinkDown(why) => {
+            let why = protocol::text::printable(why.as_bytes());
+            model.warn(now, format!("link down: {why}"));
+            model.link.trouble = Some(why);
+        }
+        Msg::Log(health) => on_log_health(model, health, now),
+        Msg::SimulatorEnded(failure) => {
+            if let Some(why) = failure {
+                model.say(now, Speaker::Ground, EventLevel::Error, format!("the simulator failed: {why}"));
+                model.outcome.error = Some(why);
+            }
+        }
+        Msg::Terminate(signal) => {
+            model.warn(now, format!("{signal}: ending; the vehicle is left as it is"));
+            model.outbox.push(Action::Quit);
+        }
+        Msg::Tick => tick::on_tick(model, now),
+    }
+    std::mem::take(&mut model.outbox)
+}
+
+fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
+    if health.failed && !model.log.failed {
+        model.say(now, Speaker::Ground, EventLevel::Error, "the log has failed: nothing more is recorded");
+    }
+    if health.dropped > 0 && model.log.dropped == 0 {
+        model.warn(now, "the log cannot keep up: records are dropped");
+    }
+    model.log = health;
+}

@@ -1,0 +1,156 @@
+//! What time alone brings: heartbeats, resends, expiries, the loss of the link, the end of the run.
+
+use std::time::Duration;
+
+use protocol::dialect::{
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TIMESYNC_DATA,
+};
+use protocol::identity::VEHICLE;
+use protocol::log::record::{EventLevel, Record};
+use protocol::log::v1::Telemetry;
+
+use super::{Action, auto, commands, frames, keys};
+use crate::model::Model;
+use crate::model::events::Speaker;
+use crate::model::link::LinkState;
+use crate::model::vehicle::Deflection;
+
+const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
+const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
+const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
+/// Without a screen: how long after a flight its last words are waited for.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+/// Without a screen: how long a lost link is waited for.
+const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
+
+pub(super) fn on_tick(model: &mut Model, now: Duration) {
+    keys::expire(model, now);
+    heartbeat(model, now);
+    if model.link.heartbeat_at.is_some() && is_due(&mut model.due.timesync, TIMESYNC_EVERY, now) {
+        let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+        model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
+            tc1: 0,
+            ts1,
+            target_system: VEHICLE.system_id,
+            target_component: VEHICLE.component_id,
+        })));
+    }
+    for text in model.texts.expire(now) {
+        frames::say_text(model, &text, now);
+    }
+    note_loss(model, now);
+    auto::step(model, now);
+    commands::poll(model, now);
+    commands::observe(model, now);
+    if model.link.heartbeat_at.is_some()
+        && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now)
+    {
+        let telemetry = telemetry_record(model, now);
+        model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));
+    }
+    if !model.settings.interactive
+        && let Some(why) = why_end(model, now)
+    {
+        model.info(now, why);
+        model.outbox.push(Action::Quit);
+    }
+}
+
+fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
+    if now < *due {
+        return false;
+    }
+    *due = now + every;
+    true
+}
+
+/// Sent from the loop that it vouches for: a ground that hangs sends none.
+fn heartbeat(model: &mut Model, now: Duration) {
+    if is_due(&mut model.due.heartbeat, HEARTBEAT_EVERY, now) {
+        model.outbox.push(Action::send(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: 0,
+            mavtype: MavType::MAV_TYPE_GCS,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::empty(),
+            system_status: MavState::MAV_STATE_ACTIVE,
+            mavlink_version: 3,
+        })));
+    }
+}
+
+fn note_loss(model: &mut Model, now: Duration) {
+    if let LinkState::Lost(age) = model.link.state(now)
+        && !model.link.lost_said
+    {
+        model.link.lost_said = true;
+        let text = format!("LINK LOST: no heartbeat for {:.1} s", age.as_secs_f64());
+        model.say(now, Speaker::Ground, EventLevel::Error, text);
+    }
+}
+
+/// Why a run without a screen ends now; `None` while it goes on.
+fn why_end(model: &Model, now: Duration) -> Option<String> {
+    let outcome = &model.outcome;
+    let past = |at: Duration| now.saturating_sub(at) >= LAST_WORDS;
+    let on_ground = model.vehicle.phase().is_some_and(|phase| !crate::model::vehicle::is_flight(phase.value));
+    if outcome.error.is_some() {
+        return Some("the run cannot go on".to_owned());
+    }
+    if outcome.verdict.is_some_and(|(_, at)| past(at)) || outcome.safed_at.is_some_and(past) {
+        return Some("the flight has ended".to_owned());
+    }
+    if outcome.aborted_at.is_some_and(past) && on_ground {
+        return Some("the flight was aborted".to_owned());
+    }
+    if model.settings.auto
+        && let Some((what, at)) = &outcome.refusal
+        && past(*at)
+    {
+        return Some(format!("refused: {what}"));
+    }
+    match model.link.state(now) {
+        LinkState::Lost(age) if age >= LOST_FOR_GOOD => return Some("the link is lost".to_owned()),
+        LinkState::NeverHeard if model.settings.auto && now >= LOST_FOR_GOOD => {
+            return Some("nothing was heard of a vehicle".to_owned());
+        }
+        _ => {}
+    }
+    let limit = model.settings.time_limit?;
+    (now >= limit).then(|| format!("time is up: no end of a flight within {:.0} s", limit.as_secs_f64()))
+}
+
+fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
+    let vehicle = &model.vehicle;
+    let motion = vehicle.best_motion().map(|motion| motion.value);
+    let attitude = vehicle.attitude.map(|attitude| attitude.value);
+    let body = vehicle.body_speed().map(|speed| speed.value);
+    let status = vehicle.status.as_ref().map(|status| &status.value);
+    let controller = vehicle.controller.as_ref().map(|controller| &controller.value);
+    let gimbal = vehicle.gimbal.map(|gimbal| gimbal.value.pitch);
+    let fins = vehicle.fins.map_or_else(Vec::new, |fins| fins.value.to_vec());
+    let angles = |pick: fn(&Deflection) -> f64| fins.iter().map(pick).collect();
+    let link = model.link.stats.figures(now);
+    Telemetry {
+        time_s: now.as_secs_f64(),
+        phase: vehicle.phase().map(|phase| phase.value as u32),
+        interlocks: status.map(|status| u32::from(status.interlocks.bits())),
+        countdown_ms: status.map(|status| status.countdown_ms),
+        altitude_m: motion.map(|motion| motion.altitude_m),
+        x_m: motion.map(|motion| motion.x_m),
+        pitch_rad: attitude.map(|attitude| attitude.pitch_rad),
+        u_m_s: body.map(|speed| speed.u_m_s),
+        w_m_s: body.map(|speed| speed.w_m_s),
+        q_rad_s: attitude.map(|attitude| attitude.pitch_rate_rad_s),
+        fin_commanded_rad: angles(|fin| fin.commanded_rad),
+        fin_measured_rad: angles(|fin| fin.measured_rad),
+        gimbal_commanded_rad: gimbal.map(|gimbal| gimbal.commanded_rad),
+        gimbal_measured_rad: gimbal.map(|gimbal| gimbal.measured_rad),
+        control_level: controller.map(|controller| controller.level as u32),
+        solver_status: controller.map(|controller| controller.solver_status as u32),
+        iterations: controller.map(|controller| u32::from(controller.iterations)),
+        solve_time_s: controller.map(|controller| f64::from(controller.solve_time_us) * 1e-6),
+        link_age_s: model.link.heartbeat_at.map(|at| now.saturating_sub(at).as_secs_f64()),
+        link_loss: Some(link.loss),
+        link_rx_bytes_s: Some(link.rx_bytes_s),
+    }
+}

@@ -1,0 +1,109 @@
+//! What the open dialog says.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+use ratatui::widgets::{Block, Clear};
+
+use super::draw_lines;
+use super::theme::{Role, Theme};
+use crate::model::Model;
+use crate::model::dialog::{ARM_WORD, Dialog};
+use crate::model::words;
+
+const BOX_COLUMNS: u16 = 68;
+
+/// The dialog's title and lines; `None` if none is open.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
+    let left = model.dialog.until().map_or(0.0, |until| until.saturating_sub(now).as_secs_f64());
+    let plain = |text: String| Line::styled(text, theme.style(Role::Plain));
+    let strong = |text: String| Line::styled(text, theme.style(Role::Caution));
+    let dialog = match &model.dialog {
+        Dialog::Closed => return None,
+        Dialog::Help => ("Keys", help()),
+        Dialog::Arm { typed, .. } => {
+            let mut lines = vec![
+                strong(format!("Type {ARM_WORD} and Enter within {left:.0} s:  [{typed:<3}]")),
+                plain("Esc cancels. Nothing is sent before Enter.".to_owned()),
+            ];
+            lines.extend(checks(model, theme));
+            ("ARM, step 2 of 2", lines)
+        }
+        Dialog::Start { .. } => (
+            "START the countdown",
+            vec![
+                strong(format!("Enter within {left:.0} s starts the countdown.")),
+                plain("Esc cancels.".to_owned()),
+            ],
+        ),
+        Dialog::Disarm { .. } => (
+            "DISARM",
+            vec![strong(format!("Enter within {left:.0} s disarms.")), plain("Esc cancels.".to_owned())],
+        ),
+        Dialog::Quit { .. } => (
+            "QUIT although armed or in flight",
+            vec![
+                strong(format!("q (or Ctrl-C) again within {left:.0} s quits; any other key stays.")),
+                plain("Recording goes on till then; quitting ends the log.".to_owned()),
+                plain("Quitting neither disarms nor aborts.".to_owned()),
+            ],
+        ),
+    };
+    Some(dialog)
+}
+
+fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+    let Some(status) = model.vehicle.status.as_ref() else {
+        return vec![Line::styled(
+            "The vehicle has not said how its checks stand.",
+            theme.style(Role::Caution),
+        )];
+    };
+    let failing = words::failed_checks(status.value.checks_failed);
+    if failing.is_empty() {
+        return vec![Line::styled("Every arming check passes.", theme.style(Role::Good))];
+    }
+    let mut lines = vec![Line::styled("Failing checks; the vehicle will refuse:", theme.style(Role::Alarm))];
+    lines.extend(
+        failing.into_iter().map(|name| Line::styled(format!("  NO {name}"), theme.style(Role::Caution))),
+    );
+    lines
+}
+
+fn help() -> Vec<Line<'static>> {
+    [
+        "A               open the arming dialog (step 1);",
+        "                then type ARM and Enter within 10 s (step 2)",
+        "S, Enter        start the countdown; Enter within 5 s",
+        "D, Enter        disarm",
+        "Ctrl-X Ctrl-X   ABORT, from anywhere, second press within 2 s;",
+        "                repeated until acknowledged",
+        "Ctrl-L          draw the screen again",
+        "q, Ctrl-C       quit; asks when armed or in flight",
+        "? or F1         this help; any key closes it",
+        "",
+        "~ before a value: older than 1.5 s. Commanded, acknowledged and",
+        "observed are three facts; armed is what HEARTBEAT says.",
+    ]
+    .into_iter()
+    .map(Line::raw)
+    .collect()
+}
+
+/// Draws the open dialog into the middle of an area.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let Some((title, lines)) = lines(model, theme, now) else { return };
+    let width = BOX_COLUMNS.min(area.width);
+    let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(2).min(area.height);
+    let at =
+        Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
+            .intersection(frame.area());
+    let block = Block::bordered().title(Line::styled(format!(" {title} "), theme.style(Role::Title)));
+    let inside = block.inner(at);
+    frame.render_widget(Clear, at);
+    frame.render_widget(block, at);
+    let padded = Rect { x: inside.x + 1, width: inside.width.saturating_sub(2), ..inside };
+    draw_lines(frame, padded, &lines);
+}

@@ -1,0 +1,143 @@
+//! The event list, the link's figures and the keys.
+
+use std::time::Duration;
+
+use protocol::log::record::EventLevel;
+use ratatui::text::{Line, Span};
+
+use super::theme::{Role, Theme};
+use crate::model::Model;
+
+/// Columns before an event's text: time, speaker, mark.
+const BEFORE_TEXT: usize = 18;
+/// Narrower than this, a text is cut rather than wrapped.
+const WRAP_COLUMNS_MIN: usize = 20;
+
+/// The newest events in this many lines of this width, oldest first; long texts wrap, because the end
+/// of a refusal is its reason.
+pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let text_columns = columns.saturating_sub(BEFORE_TEXT);
+    let mut lines: Vec<Line> = model
+        .events
+        .newest(rows)
+        .flat_map(|event| {
+            let role = match event.level {
+                EventLevel::Info => Role::Plain,
+                EventLevel::Warning => Role::Caution,
+                EventLevel::Error | EventLevel::Fatal => Role::Alarm,
+            };
+            let head = format!("{:>7.1} {:<7} ", event.at.as_secs_f64(), event.speaker.name());
+            let mark = event.mark();
+            let mut pieces = wrap(&event.text, text_columns).into_iter();
+            let first = pieces.next().unwrap_or_default();
+            let first = Line::from(vec![
+                Span::styled(head, theme.style(Role::Label)),
+                Span::styled(format!("{mark}{first}"), theme.style(role)),
+            ]);
+            let rest = pieces.map(move |piece| {
+                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), Span::styled(piece, theme.style(role))])
+            });
+            std::iter::once(first).chain(rest).collect::<Vec<_>>()
+        })
+        .collect();
+    lines.drain(..lines.len().saturating_sub(rows));
+    lines
+}
+
+/// Breaks a text at spaces; a word longer than a line is broken where the line ends.
+fn wrap(text: &str, columns: usize) -> Vec<String> {
+    if columns < WRAP_COLUMNS_MIN {
+        return vec![text.to_owned()];
+    }
+    let mut lines = Vec::new();
+    let (mut line, mut used) = (String::new(), 0);
+    for word in text.split(' ') {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > columns {
+            lines.push(std::mem::take(&mut line));
+            used = 0;
+        } else if used > 0 {
+            line.push(' ');
+            used += 1;
+        }
+        for c in word.chars() {
+            if used == columns {
+                lines.push(std::mem::take(&mut line));
+                used = 0;
+            }
+            line.push(c);
+            used += 1;
+        }
+    }
+    lines.push(line);
+    lines
+}
+
+/// What the link carries, and how the log does; the least important last.
+pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(why) = &model.link.trouble {
+        return Line::styled(format!(" LINK DOWN {why}"), theme.style(Role::Alarm));
+    }
+    let figures = model.link.stats.figures(now);
+    let round_trip = match model.link.round_trip {
+        Some(round_trip) => format!("{:.0} ms", round_trip.as_secs_f64() * 1_000.0),
+        None => "--".to_owned(),
+    };
+    let loss_role = if figures.loss > 0.05 { Role::Caution } else { Role::Plain };
+    let rejected = model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable;
+    let plain = |text: String| Span::styled(text, theme.style(Role::Plain));
+    let mut spans = vec![
+        plain(format!(" rx {:.0} B/s {:.0}/s", figures.rx_bytes_s, figures.rx_frames_s)),
+        Span::styled(format!("  loss {:.1} %", figures.loss * 100.0), theme.style(loss_role)),
+        plain(format!("  rtt {round_trip}  ")),
+        log(model, theme),
+    ];
+    if rejected > 0 || model.link.send_drops > 0 {
+        let text = format!("  rejected {rejected}  unsent {}", model.link.send_drops);
+        spans.push(Span::styled(text, theme.style(Role::Caution)));
+    }
+    spans.push(plain(format!("  tx {:.0} B/s", figures.tx_bytes_s)));
+    Line::from(spans)
+}
+
+fn log(model: &Model, theme: Theme) -> Span<'static> {
+    if model.settings.log_path.is_none() {
+        Span::styled("no log", theme.style(Role::Caution))
+    } else if model.log.failed {
+        Span::styled("LOG FAILED", theme.style(Role::Alarm))
+    } else if model.log.dropped > 0 {
+        Span::styled(format!("log runs, {} DROPPED", model.log.dropped), theme.style(Role::Caution))
+    } else {
+        Span::styled("log ok", theme.style(Role::Good))
+    }
+}
+
+/// The keys, on one line.
+pub fn keys(theme: Theme) -> Line<'static> {
+    let mut spans = Vec::new();
+    for (key, what) in [
+        ("A", "arm"),
+        ("S", "start"),
+        ("D", "disarm"),
+        (super::top::ABORT_KEY, "ABORT"),
+        ("?", "help"),
+        ("q", "quit"),
+    ] {
+        spans.push(Span::styled(format!(" {key} "), theme.style(Role::Key)));
+        spans.push(Span::styled(format!("{what} "), theme.style(Role::Label)));
+    }
+    Line::from(spans)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_wrap_at_spaces_and_keep_every_character() {
+        assert_eq!(wrap("one two", 20), ["one two"]);
+        assert_eq!(wrap("arming refused: pin: found in", 20), ["arming refused: pin:", "found in"]);
+        assert_eq!(wrap(&"x".repeat(45), 20).concat().len(), 45);
+        assert_eq!(wrap("", 20), [""]);
+    }
+}

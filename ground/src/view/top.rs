@@ -1,0 +1,182 @@
+//! The lines that are always there: phase, armed, countdown, link, abort.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use super::number::{age_mark, seconds};
+use super::theme::{Role, Theme};
+use crate::model::Model;
+use crate::model::command::{Acknowledged, CommandKind, Track};
+use crate::model::dialog::ABORT_TIME_LIMIT;
+use crate::model::link::LinkState;
+use crate::model::words;
+
+/// The abort key, in words.
+pub const ABORT_KEY: &str = "Ctrl-X Ctrl-X";
+
+/// The phase, with its age.
+pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.phase() {
+        None => Span::styled(" no vehicle", theme.style(Role::Label)),
+        Some(phase) => {
+            let (mark, stale) = age_mark(&phase, now);
+            let role = if stale == Role::Stale { stale } else { Role::Title };
+            Span::styled(format!("{mark}{}", words::phase(phase.value)), theme.style(role))
+        }
+    }
+}
+
+/// Armed, as HEARTBEAT says.
+pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.armed() {
+        None => Span::styled(" armed ?", theme.style(Role::Label)),
+        Some(armed) => {
+            let (mark, stale) = age_mark(&armed, now);
+            match (armed.value, stale) {
+                (true, _) => Span::styled(format!("{mark}ARMED"), theme.style(Role::Alarm)),
+                (false, Role::Stale) => Span::styled(format!("{mark}disarmed"), theme.style(Role::Stale)),
+                (false, _) => Span::styled(format!("{mark}disarmed"), theme.style(Role::Good)),
+            }
+        }
+    }
+}
+
+/// Time to release, or since ignition.
+pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.countdown_s() {
+        None => Span::styled(" T --", theme.style(Role::Label)),
+        Some(time) => {
+            let (mark, role) = age_mark(&time, now);
+            let sign = if time.value > 0.0 { '-' } else { '+' };
+            let role = if role == Role::Stale { role } else { Role::Title };
+            Span::styled(format!("{mark}T{sign}{:.1}", time.value.abs()), theme.style(role))
+        }
+    }
+}
+
+/// The link, in a word and its age.
+pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.link.state(now) {
+        LinkState::NeverHeard => Span::styled("link: not heard", theme.style(Role::Caution)),
+        LinkState::Alive(age) => Span::styled(format!("link ok {}", seconds(age)), theme.style(Role::Good)),
+        LinkState::Doubtful(age) => {
+            Span::styled(format!("LINK? {}", seconds(age)), theme.style(Role::Caution))
+        }
+        LinkState::Lost(age) => Span::styled(format!("LINK LOST {}", seconds(age)), theme.style(Role::Alarm)),
+    }
+}
+
+/// What an abort would do now, or what became of the one that was asked for.
+pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let effect = abort_effect(model, now);
+    let chord_open = model.abort_pressed_at.is_some_and(|at| now.saturating_sub(at) <= ABORT_TIME_LIMIT);
+    if chord_open {
+        return Line::styled(format!(" Ctrl-X AGAIN TO ABORT: {effect}"), theme.style(Role::Alarm));
+    }
+    if let Some(track) = model.commands.of(CommandKind::Abort) {
+        return facts(track, theme, now);
+    }
+    Line::from(vec![
+        Span::styled(" abort now: ", theme.style(Role::Label)),
+        Span::styled(effect, theme.style(Role::Plain)),
+    ])
+}
+
+/// What an abort would do now, marked when that was said too long ago.
+fn abort_effect(model: &Model, now: Duration) -> String {
+    let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
+    let mark = if status.is_stale(now) { "~" } else { "" };
+    format!("{mark}{}", words::abort_effect(status.value.abort_effect))
+}
+
+/// After an abort on the pad: nobody goes there yet.
+pub fn pad_wait(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let wait_s =
+        model.vehicle.status.as_ref().map(|status| status.value.pad_wait_s).filter(|wait| *wait > 0)?;
+    Some(Line::styled(format!(" STAY OFF THE PAD for {wait_s} s"), theme.style(Role::Alarm)))
+}
+
+/// The three facts for narrow screens.
+pub fn facts_short(track: &Track, theme: Theme, now: Duration) -> Line<'static> {
+    let (acknowledged, acknowledged_role) = match track.acknowledged {
+        Acknowledged::Waiting | Acknowledged::InProgress => ("-", Role::Caution),
+        Acknowledged::Nothing => ("NEVER", Role::Alarm),
+        Acknowledged::Answered(_) if track.accepted() => ("ok", Role::Good),
+        Acknowledged::Answered(_) => ("REFUSED", Role::Alarm),
+    };
+    let (observed, observed_role) = match track.observed_at {
+        Some(_) => ("ok", Role::Good),
+        None if track.disagrees(now) => ("NO", Role::Alarm),
+        None => ("-", Role::Plain),
+    };
+    Line::from(vec![
+        Span::styled(format!("{} x{}", track.kind.name(), track.attempts), theme.style(Role::Title)),
+        Span::styled(" ack ", theme.style(Role::Label)),
+        Span::styled(acknowledged, theme.style(acknowledged_role)),
+        Span::styled(" obs ", theme.style(Role::Label)),
+        Span::styled(observed, theme.style(observed_role)),
+    ])
+}
+
+/// Commanded, acknowledged, observed: three facts of one command.
+pub fn facts(track: &Track, theme: Theme, now: Duration) -> Line<'static> {
+    let label = |text: &str| Span::styled(text.to_owned(), theme.style(Role::Label));
+    let (acknowledged, acknowledged_role) = match track.acknowledged {
+        Acknowledged::Waiting => ("waiting".to_owned(), Role::Caution),
+        Acknowledged::InProgress => ("in progress".to_owned(), Role::Caution),
+        Acknowledged::Nothing => ("NEVER".to_owned(), Role::Alarm),
+        Acknowledged::Answered(_) if track.accepted() => ("accepted".to_owned(), Role::Good),
+        Acknowledged::Answered(result) => (format!("REFUSED ({})", refusal(result)), Role::Alarm),
+    };
+    let (observed, observed_role) = match track.observed_at {
+        Some(_) => ("yes".to_owned(), Role::Good),
+        None if track.disagrees(now) => ("NOT OBSERVED".to_owned(), Role::Alarm),
+        None => ("not yet".to_owned(), Role::Plain),
+    };
+    Line::from(vec![
+        Span::styled(format!(" {:<6} ", track.kind.name()), theme.style(Role::Title)),
+        label("commanded "),
+        Span::styled(
+            format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts),
+            theme.style(Role::Plain),
+        ),
+        label("  acknowledged "),
+        Span::styled(acknowledged, theme.style(acknowledged_role)),
+        label("  observed "),
+        Span::styled(observed, theme.style(observed_role)),
+    ])
+}
+
+fn refusal(result: u8) -> &'static str {
+    match result {
+        1 => "not now",
+        2 => "denied",
+        3 => "unsupported",
+        4 => "failed",
+        6 => "cancelled",
+        _ => "unknown",
+    }
+}
+
+/// The wait after an abort; else the latest command besides an abort; before the first, whether the
+/// vehicle may be armed.
+pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(wait) = pad_wait(model, theme) {
+        return wait;
+    }
+    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
+    if let Some(track) = latest {
+        return facts(track, theme, now);
+    }
+    match model.vehicle.status.as_ref() {
+        None => Line::default(),
+        Some(status) if status.value.checks_failed == 0 => {
+            Line::styled(" GO: every arming check passes", theme.style(Role::Good))
+        }
+        Some(status) => {
+            let failing = words::failed_checks(status.value.checks_failed).join(", ");
+            Line::styled(format!(" NO-GO: {failing}"), theme.style(Role::Caution))
+        }
+    }
+}

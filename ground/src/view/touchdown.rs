@@ -1,0 +1,59 @@
+//! The touchdown, predicted or reached, against its limits.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use super::number::{age_mark, fixed};
+use super::theme::{Role, Theme};
+use crate::limits::Touchdown;
+use crate::model::Model;
+
+/// The panel's title and rows: the verdict once there is one, the prediction before.
+pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
+    if let Some(verdict) = model.vehicle.verdict {
+        let mut rows = limit_rows(&verdict.value.touchdown, theme, " ", Role::Plain);
+        let (word, role) = verdict_word(verdict.value.landed);
+        rows.push(Line::styled(word, theme.style(role)));
+        return ("Verdict", rows);
+    }
+    let Some(prediction) = model.vehicle.prediction else {
+        return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(Role::Label))]);
+    };
+    let (mark, role) = age_mark(&prediction, now);
+    let mut rows = limit_rows(&prediction.value.touchdown, theme, mark, role);
+    rows.push(Line::from(vec![
+        Span::styled("in      ", theme.style(Role::Label)),
+        Span::styled(format!("{mark}{:>7}", fixed(prediction.value.time_to_go_s, 2)), theme.style(role)),
+        Span::styled(" s", theme.style(Role::Label)),
+    ]));
+    rows.push(match prediction.value.touchdown.violations() {
+        None => Line::styled("inside every limit", theme.style(Role::Good)),
+        Some(names) => Line::styled(format!("OUTSIDE {names}"), theme.style(Role::Alarm)),
+    });
+    ("Touchdown predicted", rows)
+}
+
+/// The verdict in the words that decide.
+pub fn verdict_word(landed: bool) -> (&'static str, Role) {
+    if landed { ("LANDED inside every limit", Role::Good) } else { ("NOT LANDED", Role::Alarm) }
+}
+
+/// Three decimals decide about a speed; a large value needs its room for the digits before.
+fn decimals(value: f64) -> usize {
+    if value.abs() < 100.0 { 3 } else { 1 }
+}
+
+fn limit_rows(touchdown: &Touchdown, theme: Theme, mark: &'static str, role: Role) -> Vec<Line<'static>> {
+    let rows = touchdown.rows();
+    let line = |row: &crate::limits::LimitRow| {
+        let (word, word_role) = if row.kept { ("ok", Role::Good) } else { ("NO", Role::Alarm) };
+        Line::from(vec![
+            Span::styled(word, theme.style(word_role)),
+            Span::styled(format!(" {:<5}", row.name), theme.style(Role::Label)),
+            Span::styled(format!("{mark}{:>7}", fixed(row.value, decimals(row.value))), theme.style(role)),
+            Span::styled(format!(" {} {}", row.limit, row.unit), theme.style(Role::Label)),
+        ])
+    };
+    rows.iter().map(line).collect()
+}

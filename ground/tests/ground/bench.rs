@@ -1,0 +1,304 @@
+//! A ground station on a bench: its model, a clock turned by hand, and a vehicle made of frames.
+
+use std::time::Duration;
+
+use ground::key::Key;
+use ground::model::{Model, Settings};
+use ground::update::{Action, Msg, update};
+use ground::view::theme::Theme;
+use ground::view::view;
+use protocol::command::CommandAnswer;
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
+    MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdControlLevel, TdInterlock, TdLimit, TdPhase,
+    TdSolverStatus,
+};
+use protocol::frame::{Encoder, Frame};
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::text::chunks;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+
+pub(crate) const MONO: Theme = Theme { colour: false };
+
+pub(crate) struct Bench {
+    pub(crate) model: Model,
+    pub(crate) now: Duration,
+    pub(crate) actions: Vec<Action>,
+    /// The vehicle, as its telemetry will show it.
+    pub(crate) phase: TdPhase,
+    pub(crate) armed: bool,
+    pub(crate) countdown_ms: i32,
+    pub(crate) abort_effect: TdAbortEffect,
+    pub(crate) interlocks: TdInterlock,
+    pub(crate) checks_failed: u16,
+    pub(crate) pad_wait_s: u16,
+    /// Whether the vehicle sends anything at all.
+    pub(crate) speaks: bool,
+    encoder: Encoder,
+}
+
+impl Bench {
+    pub(crate) fn new(settings: Settings) -> Self {
+        Self {
+            model: Model::new(settings),
+            now: Duration::ZERO,
+            actions: Vec::new(),
+            phase: TdPhase::TD_PHASE_PAD_IDLE,
+            armed: false,
+            countdown_ms: i32::MAX,
+            abort_effect: TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD,
+            interlocks: TdInterlock::TD_INTERLOCK_PIN_OUT,
+            checks_failed: 0,
+            pad_wait_s: 0,
+            speaks: true,
+            encoder: Encoder::new(VEHICLE),
+        }
+    }
+
+    /// A crewed ground whose vehicle has been heard.
+    pub(crate) fn crewed() -> Self {
+        let mut bench = Self::new(settings(false, true));
+        bench.run(1.0);
+        bench
+    }
+
+    pub(crate) fn msg(&mut self, msg: Msg) {
+        let actions = update(&mut self.model, msg, self.now);
+        self.actions.extend(actions);
+    }
+
+    pub(crate) fn key(&mut self, key: Key) {
+        self.msg(Msg::Key(key));
+    }
+
+    pub(crate) fn keys(&mut self, keys: &[Key]) {
+        for key in keys {
+            self.key(*key);
+        }
+    }
+
+    /// Ten ticks a second; the vehicle speaks at its usual rates.
+    pub(crate) fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds * 10.0).round() as u64 {
+            self.now += Duration::from_millis(100);
+            if self.speaks {
+                if self.now.subsec_millis() == 0 {
+                    self.heartbeat();
+                }
+                self.flight_status();
+            }
+            self.msg(Msg::Tick);
+        }
+    }
+
+    pub(crate) fn boot_ms(&self) -> u32 {
+        u32::try_from(self.now.as_millis()).unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn hear(&mut self, message: &MavMessage) {
+        let frame = self.encoder.encode(message);
+        self.msg(Msg::Frame(frame));
+    }
+
+    pub(crate) fn hear_from(&mut self, source: Address, message: &MavMessage) {
+        let frame = Encoder::new(source).encode(message);
+        self.msg(Msg::Frame(frame));
+    }
+
+    pub(crate) fn hear_payload(&mut self, message_id: u32, payload: &[u8]) {
+        if let Some(frame) = self.encoder.encode_payload(message_id, payload) {
+            self.msg(Msg::Frame(frame));
+        }
+    }
+
+    pub(crate) fn heartbeat(&mut self) {
+        let base_mode =
+            if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+        let phase = self.phase as u32;
+        self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: phase,
+            mavtype: MavType::MAV_TYPE_ROCKET,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            base_mode,
+            system_status: MavState::MAV_STATE_ACTIVE,
+            mavlink_version: 3,
+        }));
+    }
+
+    pub(crate) fn flight_status(&mut self) {
+        let status = TD_FLIGHT_STATUS_DATA {
+            time_boot_ms: self.boot_ms(),
+            countdown_ms: self.countdown_ms,
+            interlocks: self.interlocks,
+            checks_failed: self.checks_failed,
+            pad_wait_s: self.pad_wait_s,
+            phase: self.phase,
+            abort_effect: self.abort_effect,
+        };
+        self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
+    }
+
+    pub(crate) fn answer(&mut self, command: MavCmd, result: u8) {
+        self.answer_to(GROUND, command, result);
+    }
+
+    pub(crate) fn answer_to(&mut self, target: Address, command: MavCmd, result: u8) {
+        let answer = CommandAnswer { command: command as u16, result, progress: 0, target };
+        let frame: Option<Frame> = answer.encode(&mut self.encoder);
+        if let Some(frame) = frame {
+            self.msg(Msg::Frame(frame));
+        }
+    }
+
+    pub(crate) fn text(&mut self, text: &str) {
+        for chunk in chunks(protocol::dialect::MavSeverity::MAV_SEVERITY_WARNING, text, 7) {
+            self.hear(&MavMessage::STATUSTEXT(chunk));
+        }
+    }
+
+    /// Upright at an altitude, moving.
+    pub(crate) fn state(&mut self, x: f32, altitude: f32, vx: f32, climb: f32, pitch_deg: f64) {
+        let (sin, cos) = libm::sincos(pitch_deg.to_radians() / 2.0);
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+            time_boot_ms,
+            q1: cos as f32,
+            q3: sin as f32,
+            pitchspeed: -0.005,
+            ..Default::default()
+        }));
+        self.hear(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+            time_boot_ms,
+            x,
+            z: -altitude,
+            vx,
+            vz: -climb,
+            ..Default::default()
+        }));
+    }
+
+    pub(crate) fn actuators(&mut self, gimbal_cdeg: i16) {
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+            time_boot_ms,
+            commanded: [9000; 4],
+            measured: [9000, 8990, 9000, 8400],
+        }));
+        self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+            time_boot_ms,
+            pitch_commanded: gimbal_cdeg,
+            pitch_measured: gimbal_cdeg / 2,
+            ..Default::default()
+        }));
+    }
+
+    pub(crate) fn plan(&mut self, violated: TdLimit) {
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+            time_boot_ms,
+            tick: 12,
+            cost: 8465.2,
+            kkt_stationarity: 2.4e-7,
+            kkt_feasibility: 1.1e-9,
+            thrust_scale: 1.0,
+            solve_time_us: 1_234,
+            deadline_margin_us: 98_766,
+            iterations: 3,
+            level: TdControlLevel::TD_CONTROL_LEVEL_CONVERGED,
+            solver_status: TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
+        }));
+        self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+            time_boot_ms,
+            time_to_go_ms: 2_300,
+            x_m: -1.4,
+            altitude_m: 0.0,
+            pitch_rad: 1.555,
+            u_m_s: -0.05,
+            w_m_s: 0.03,
+            q_rad_s: -0.008,
+            limits_violated: violated,
+        }));
+        let (mut x, mut altitude) = ([0; 12], [0; 12]);
+        for k in 0..12_i16 {
+            x[usize::from(11_u8) - usize::from(k.unsigned_abs())] = -140 + 10 * k;
+            altitude[usize::from(11_u8) - usize::from(k.unsigned_abs())] = 60 * k;
+        }
+        self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
+            time_boot_ms,
+            x,
+            altitude,
+            count: 12,
+        }));
+    }
+
+    pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
+        self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+            time_boot_ms: self.boot_ms(),
+            x_m: -1.428,
+            altitude_m: 0.0,
+            pitch_rad: 1.554,
+            u_m_s: if landed { -0.058 } else { -1.2 },
+            w_m_s: 0.029,
+            q_rad_s: -0.0078,
+            limits_violated: violated,
+            landed: u8::from(landed),
+        }));
+    }
+
+    /// Takes every command sent since the last call.
+    pub(crate) fn take_commands(&mut self) -> Vec<COMMAND_LONG_DATA> {
+        let actions = std::mem::take(&mut self.actions);
+        let command = |action| match action {
+            Action::Send(message) => match *message {
+                MavMessage::COMMAND_LONG(command) => Some(command),
+                _ => None,
+            },
+            _ => None,
+        };
+        actions.into_iter().filter_map(command).collect()
+    }
+
+    pub(crate) fn wants_to_quit(&self) -> bool {
+        self.actions.contains(&Action::Quit)
+    }
+
+    pub(crate) fn events(&self) -> String {
+        self.model.events.newest(500).map(|event| event.text.as_str()).collect::<Vec<_>>().join("\n")
+    }
+
+    pub(crate) fn screen(&self, columns: u16, rows: u16) -> String {
+        let terminal = self.draw(columns, rows, MONO);
+        terminal.backend().to_string()
+    }
+
+    pub(crate) fn draw(&self, columns: u16, rows: u16, theme: Theme) -> Terminal<TestBackend> {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test terminal");
+        terminal.draw(|frame| view(&self.model, theme, self.now, frame)).expect("drawing in memory");
+        terminal
+    }
+}
+
+pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
+    Settings {
+        link_name: "udpin:127.0.0.1:14550".to_owned(),
+        log_path: Some("flight.mcap".to_owned()),
+        auto,
+        interactive,
+        time_limit: None,
+    }
+}
+
+pub(crate) fn is_arm(command: &COMMAND_LONG_DATA) -> bool {
+    command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 > 0.5
+}
+
+pub(crate) fn is_abort(command: &COMMAND_LONG_DATA) -> bool {
+    command.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION && command.param1 > 0.5
+}
+
+pub(crate) fn typed(word: &str) -> Vec<Key> {
+    word.chars().map(Key::Char).collect()
+}

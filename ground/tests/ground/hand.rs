@@ -1,0 +1,244 @@
+//! The safety of the hand: what keys can and cannot do, on a simulated clock.
+
+use crate::bench::{Bench, is_abort, is_arm, typed};
+use ground::key::Key;
+use ground::model::dialog::{ABORT_TIME_LIMIT, ARM_TIME_LIMIT, Dialog};
+use protocol::dialect::{MavCmd, TdPhase};
+
+const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+const ACCEPTED: u8 = 0;
+const TEMPORARILY_REJECTED: u8 = 1;
+const DENIED: u8 = 2;
+
+pub(crate) fn ladder() -> Vec<Key> {
+    [vec![Key::Char('A')], typed("ARM"), vec![Key::Enter]].concat()
+}
+
+#[test]
+fn the_complete_ladder_arms_once_and_is_never_resent() {
+    let mut bench = Bench::crewed();
+    bench.keys(&ladder());
+    bench.run(60.0);
+    let arms = bench.take_commands().into_iter().filter(is_arm).count();
+    assert_eq!(arms, 1);
+    assert!(bench.events().contains("ARM not acknowledged after 1 attempts"));
+}
+
+#[test]
+fn each_missing_rung_leaves_the_vehicle_disarmed() {
+    for missing in 0..ladder().len() {
+        let mut keys = ladder();
+        keys.remove(missing);
+        let mut bench = Bench::crewed();
+        bench.keys(&keys);
+        bench.run(20.0);
+        assert!(!bench.take_commands().iter().any(is_arm), "without key {missing}");
+    }
+}
+
+#[test]
+fn the_offer_to_arm_ends_by_itself() {
+    let mut bench = Bench::crewed();
+    bench.keys(&typed("AARM"));
+    bench.run(ARM_TIME_LIMIT.as_secs_f64() + 0.1);
+    bench.key(Key::Enter);
+    assert!(!bench.take_commands().iter().any(is_arm));
+    assert!(bench.events().contains("time is up"));
+}
+
+#[test]
+fn arming_is_not_even_asked_for_on_a_lost_link_or_off_the_pad() {
+    let mut bench = Bench::crewed();
+    bench.speaks = false;
+    bench.run(5.0);
+    bench.keys(&ladder());
+    assert!(!bench.take_commands().iter().any(is_arm));
+    let mut bench = Bench::crewed();
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.run(1.0);
+    bench.keys(&ladder());
+    assert!(!bench.take_commands().iter().any(is_arm));
+    assert!(bench.events().contains("cannot arm: phase POWERED"));
+}
+
+#[test]
+fn a_vehicle_that_changed_while_the_word_was_typed_is_not_armed() {
+    let mut bench = Bench::crewed();
+    bench.keys(&typed("AARM"));
+    bench.phase = TdPhase::TD_PHASE_BOOST;
+    bench.run(1.0);
+    bench.key(Key::Enter);
+    assert!(!bench.take_commands().iter().any(is_arm));
+}
+
+#[test]
+fn abort_works_from_every_dialog_and_closes_it() {
+    let openings: [&[Key]; 6] = [
+        &[],
+        &[Key::Char('A')],
+        &[Key::Char('A'), Key::Char('A')],
+        &[Key::Char('D')],
+        &[Key::Char('?')],
+        &[Key::Char('q')],
+    ];
+    for opening in openings {
+        let mut bench = Bench::crewed();
+        bench.armed = opening == [Key::Char('q')];
+        bench.run(1.0);
+        bench.keys(opening);
+        bench.take_commands();
+        bench.key(Key::CtrlX);
+        assert!(!bench.take_commands().iter().any(is_abort), "one press is not enough");
+        assert!(bench.screen(80, 24).contains("AGAIN TO ABORT"));
+        bench.key(Key::CtrlX);
+        assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
+        assert_eq!(bench.model.dialog, Dialog::Closed);
+    }
+}
+
+#[test]
+fn half_an_abort_chord_expires_and_another_key_breaks_it() {
+    let mut bench = Bench::crewed();
+    bench.key(Key::CtrlX);
+    bench.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.1);
+    bench.key(Key::CtrlX);
+    bench.key(Key::Escape);
+    bench.key(Key::CtrlX);
+    assert!(!bench.take_commands().iter().any(is_abort));
+}
+
+#[test]
+fn an_abort_is_repeated_until_acknowledged_and_its_attempts_are_shown() {
+    let mut bench = Bench::crewed();
+    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.speaks = false;
+    bench.run(10.0);
+    let aborts: Vec<_> = bench.take_commands().into_iter().filter(is_abort).collect();
+    assert!((20..=21).contains(&aborts.len()), "{}", aborts.len());
+    assert!(aborts.iter().zip(0..).all(|(abort, resends)| abort.confirmation == resends));
+    assert!(bench.screen(80, 24).contains(&format!("x{}", aborts.len())));
+    bench.answer(ABORT, ACCEPTED);
+    bench.run(10.0);
+    assert!(!bench.take_commands().iter().any(is_abort));
+}
+
+#[test]
+fn not_now_is_no_answer_to_an_abort() {
+    let mut bench = Bench::crewed();
+    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.take_commands();
+    bench.answer(ABORT, TEMPORARILY_REJECTED);
+    bench.run(1.0);
+    assert!(bench.take_commands().iter().any(is_abort));
+}
+
+#[test]
+fn an_abort_ends_a_start_that_is_still_being_resent() {
+    let mut bench = Bench::crewed();
+    bench.armed = true;
+    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    bench.run(1.0);
+    bench.keys(&[Key::Char('S'), Key::Enter]);
+    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.take_commands();
+    bench.run(5.0);
+    assert!(bench.take_commands().iter().all(is_abort));
+}
+
+#[test]
+fn a_start_takes_two_keys_and_is_resent_a_few_times() {
+    let mut bench = Bench::crewed();
+    bench.armed = true;
+    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    bench.run(1.0);
+    bench.key(Key::Char('S'));
+    assert!(bench.take_commands().is_empty());
+    bench.key(Key::Enter);
+    bench.run(10.0);
+    let starts = bench.take_commands();
+    assert_eq!(starts.len(), 4);
+    assert!(starts.iter().all(|command| command.command == START));
+    bench.keys(&[Key::Char('S')]);
+    bench.run(6.0);
+    bench.key(Key::Enter);
+    assert!(bench.take_commands().is_empty(), "the offer to start has ended");
+}
+
+#[test]
+fn acknowledged_is_not_observed() {
+    let mut bench = Bench::crewed();
+    bench.keys(&ladder());
+    bench.answer(ARM, ACCEPTED);
+    bench.run(4.0);
+    assert!(bench.events().contains("ARM acknowledged, not observed"));
+    assert!(bench.screen(80, 24).contains("acknowledged accepted  observed NOT OBSERVED"));
+    bench.armed = true;
+    bench.run(1.0);
+    assert!(bench.screen(80, 24).contains("observed yes"));
+}
+
+#[test]
+fn a_refusal_shows_the_answer_and_the_vehicles_words() {
+    let mut bench = Bench::crewed();
+    bench.keys(&ladder());
+    bench.answer(ARM, DENIED);
+    bench.text("arming refused: pin: found in, required out");
+    let screen = bench.screen(80, 24);
+    assert!(
+        screen.contains("REFUSED (denied)")
+            && screen.contains("found in,")
+            && screen.contains("required out"),
+        "{screen}"
+    );
+}
+
+#[test]
+fn an_answer_for_another_ground_station_is_not_ours() {
+    let mut bench = Bench::crewed();
+    bench.keys(&ladder());
+    let other = protocol::identity::Address { system_id: 254, component_id: 190 };
+    bench.answer_to(other, ARM, ACCEPTED);
+    assert!(!bench.events().contains("acknowledged"));
+}
+
+#[test]
+fn quitting_asks_while_armed_and_does_not_before() {
+    let mut bench = Bench::crewed();
+    bench.key(Key::Char('q'));
+    assert!(bench.wants_to_quit());
+    for (first, second) in [(Key::Char('q'), Key::Char('q')), (Key::CtrlC, Key::CtrlC)] {
+        let mut bench = Bench::crewed();
+        bench.armed = true;
+        bench.run(1.0);
+        bench.key(first);
+        assert!(!bench.wants_to_quit());
+        bench.run(3.2);
+        bench.key(first);
+        assert!(!bench.wants_to_quit(), "the question was asked too long ago");
+        bench.key(second);
+        assert!(bench.wants_to_quit());
+        assert!(bench.take_commands().is_empty(), "quitting neither disarms nor aborts");
+    }
+}
+
+#[test]
+fn a_letter_too_many_closes_the_offer_to_arm() {
+    let mut bench = Bench::crewed();
+    bench.keys(&typed("AARMA"));
+    assert_eq!(bench.model.dialog, Dialog::Closed);
+    bench.keys(&[Key::Backspace, Key::Enter]);
+    assert!(!bench.take_commands().iter().any(is_arm));
+}
+
+#[test]
+fn the_wait_after_an_abort_on_the_pad_is_shown_at_every_size() {
+    let mut bench = Bench::crewed();
+    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.answer(ABORT, ACCEPTED);
+    bench.pad_wait_s = 57;
+    bench.run(0.1);
+    assert!(bench.screen(80, 24).contains("STAY OFF THE PAD for 57 s"));
+    assert!(bench.screen(20, 5).contains("STAY OFF THE PAD"));
+}

@@ -1,0 +1,95 @@
+//! The program itself: its exit codes, its lines and its log.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use protocol::log::reader::LogReader;
+
+fn ground(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ground"))
+        .args(arguments)
+        .current_dir(directory)
+        .output()
+        .expect("the program can be started")
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn help_is_a_success_and_documents_the_exit_codes() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = ground(directory.path(), &["--help"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(out(&output).contains(ground::exit::HELP));
+}
+
+#[test]
+fn a_wrong_command_line_is_code_2() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = ground(directory.path(), &["--connect", "tcp:host:1"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(err(&output).contains("udpin:ADDRESS:PORT"));
+}
+
+#[test]
+fn an_unknown_profile_and_an_existing_log_are_code_1_and_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = ground(directory.path(), &["--profile", "no-such"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(err(&output).contains("no-such"));
+    std::fs::write(directory.path().join("old.mcap"), "precious").unwrap();
+    let output = ground(directory.path(), &["--log", "old.mcap"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(err(&output).contains("old.mcap"));
+    assert_eq!(std::fs::read(directory.path().join("old.mcap")).unwrap(), b"precious");
+}
+
+#[test]
+fn nothing_heard_is_code_5() {
+    let directory = tempfile::tempdir().unwrap();
+    let arguments = ["--connect", "udpin:127.0.0.1:0", "--timeout-s", "0.3", "--log", "none"];
+    let output = ground(directory.path(), &arguments);
+    assert_eq!(output.status.code(), Some(5), "{}", out(&output));
+    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0, "no log was wanted");
+}
+
+/// The demonstration, through real sockets, faster than real time.
+#[test]
+fn the_demonstration_lands_with_code_0_and_names_its_log() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = ground(directory.path(), &["--speed", "4"]);
+    let text = out(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}{}", err(&output));
+    for words in [
+        "ARM commanded",
+        "ARM acknowledged: accepted",
+        "ARM observed",
+        "START observed",
+        "LANDED inside every limit",
+    ] {
+        assert!(text.contains(words), "{words} is missing in\n{text}");
+    }
+    let log = text.lines().find_map(|line| line.strip_prefix("log: ")).unwrap();
+    let mut reader = LogReader::new(std::fs::File::open(directory.path().join(log)).unwrap());
+    while reader.next_item().unwrap().is_some() {}
+    assert_eq!(reader.damage(), None);
+    let both_sides = |topic: &str| {
+        let mut ends: Vec<_> = reader
+            .channels()
+            .filter(|(_, channel)| channel.topic == topic)
+            .filter_map(|(_, channel)| channel.metadata.get("endpoint").cloned())
+            .collect();
+        ends.sort();
+        ends == ["ground", "vehicle"]
+    };
+    assert!(both_sides("/mavlink/rx/raw") && both_sides("/mavlink/tx/raw"));
+    for topic in ["/telemetry", "/operator", "/events", "/controller/tick", "/verdict"] {
+        assert!(reader.channels().any(|(_, channel)| channel.topic == topic), "{topic} is missing");
+    }
+}

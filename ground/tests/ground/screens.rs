@@ -1,0 +1,165 @@
+//! Whole screens, as text. `cargo insta review` or `INSTA_UPDATE=always cargo test` takes new ones.
+
+use crate::bench::{Bench, MONO, is_abort, settings, typed};
+use ground::key::Key;
+use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdLimit, TdPhase};
+use ratatui::style::Color;
+
+const SIZES: [(u16, u16); 3] = [(80, 24), (40, 12), (20, 5)];
+
+fn snapshot(name: &str, bench: &Bench) {
+    for (columns, rows) in SIZES {
+        insta::assert_snapshot!(format!("{name}_{columns}x{rows}"), bench.screen(columns, rows));
+    }
+}
+
+fn on_the_pad() -> Bench {
+    let mut bench = Bench::crewed();
+    bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
+    bench.actuators(0);
+    bench.plan(TdLimit::empty());
+    bench
+}
+
+fn armed() -> Bench {
+    let mut bench = on_the_pad();
+    bench.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    bench.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
+    bench.armed = true;
+    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    bench.interlocks |= TdInterlock::TD_INTERLOCK_ARMED;
+    bench.run(1.0);
+    bench
+}
+
+fn counting() -> Bench {
+    let mut bench = armed();
+    bench.keys(&[Key::Char('S'), Key::Enter]);
+    bench.answer(MavCmd::MAV_CMD_MISSION_START, 0);
+    bench.countdown_ms = 3_200;
+    bench.run(1.0);
+    bench
+}
+
+fn powered() -> Bench {
+    let mut bench = counting();
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.countdown_ms = -2_700;
+    bench.run(1.0);
+    for k in 0..20_u16 {
+        let fallen = f32::from(k) * 0.4;
+        bench.state(-0.05 * fallen, 15.0 - fallen, -0.1, -3.4, 89.0);
+        bench.run(0.1);
+    }
+    bench.actuators(-640);
+    bench.plan(TdLimit::empty());
+    bench
+}
+
+#[test]
+fn regress_pad() {
+    snapshot("pad", &on_the_pad());
+}
+
+#[test]
+fn regress_pad_no_go() {
+    let mut bench = on_the_pad();
+    bench.checks_failed = 0b1010;
+    bench.run(0.1);
+    bench.key(Key::Char('A'));
+    bench.keys(&typed("AR"));
+    snapshot("pad_no_go_arming", &bench);
+}
+
+#[test]
+fn regress_countdown() {
+    snapshot("countdown", &counting());
+}
+
+#[test]
+fn regress_powered() {
+    snapshot("powered", &powered());
+}
+
+#[test]
+fn regress_abort_chord_and_abort() {
+    let mut bench = powered();
+    bench.key(Key::CtrlX);
+    snapshot("abort_chord", &bench);
+    bench.key(Key::CtrlX);
+    bench.run(1.0);
+    assert!(bench.take_commands().iter().any(is_abort));
+    snapshot("abort_sent", &bench);
+}
+
+#[test]
+fn regress_landed() {
+    let mut bench = powered();
+    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    bench.verdict(true, TdLimit::empty());
+    bench.run(0.5);
+    snapshot("landed", &bench);
+}
+
+#[test]
+fn regress_not_landed() {
+    let mut bench = powered();
+    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    bench.verdict(false, TdLimit::TD_LIMIT_AXIAL_SPEED | TdLimit::TD_LIMIT_PITCH);
+    bench.run(0.5);
+    snapshot("not_landed", &bench);
+}
+
+#[test]
+fn regress_link_lost() {
+    let mut bench = powered();
+    bench.speaks = false;
+    bench.run(6.0);
+    snapshot("link_lost", &bench);
+}
+
+#[test]
+fn regress_nothing_heard() {
+    let mut bench = Bench::new(settings(false, true));
+    bench.speaks = false;
+    bench.run(1.0);
+    snapshot("nothing_heard", &bench);
+}
+
+#[test]
+fn regress_help() {
+    let mut bench = on_the_pad();
+    bench.key(Key::F1);
+    snapshot("help", &bench);
+}
+
+/// Colour only repeats: without it the same words stand in the same cells, and no cell has a colour.
+#[test]
+fn colour_carries_nothing_alone() {
+    let bench = powered();
+    let mono = bench.draw(80, 24, MONO);
+    let coloured = bench.draw(80, 24, ground::view::theme::Theme { colour: true });
+    let cells = |terminal: &ratatui::Terminal<ratatui::backend::TestBackend>| {
+        terminal.backend().buffer().content.iter().map(|cell| cell.symbol().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(cells(&mono), cells(&coloured));
+    assert!(
+        mono.backend().buffer().content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset)
+    );
+}
+
+/// Phase, armed, countdown, link and the abort key stay where they are under every dialog.
+#[test]
+fn the_top_lines_keep_their_place() {
+    let top = |bench: &Bench| bench.screen(80, 24).lines().take(1).collect::<String>();
+    let mut bench = armed();
+    let before = top(&bench);
+    for key in
+        [Key::Char('S'), Key::Escape, Key::Char('D'), Key::Escape, Key::F1, Key::Escape, Key::Char('q')]
+    {
+        bench.key(key);
+        assert_eq!(top(&bench), before, "after {key:?}");
+    }
+}
