@@ -36,7 +36,7 @@ fn fly_to(phase: TdPhase) -> Flight {
 /// Arms as soon as the checks pass: the landing's first rehearsal takes a moment.
 fn arm(ground: &mut BareGround) {
     ground.wait_for("every check passed", |_, message| match message {
-        Some(protocol::dialect::MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed == 0 => {
+        Some(protocol::dialect::MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed.is_empty() => {
             Some(())
         }
         _ => None,

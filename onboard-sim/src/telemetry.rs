@@ -14,7 +14,7 @@ use protocol::dialect::{
     MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState,
     MavSysStatusSensor, MavType, MavVtolState, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdControlLevel, TdInterlock, TdLimit, TdPhase,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase,
     TdSolverStatus, VFR_HUD_DATA,
 };
 
@@ -179,7 +179,7 @@ fn flight_status(snapshot: &Snapshot) -> MavMessage {
         time_boot_ms: boot_ms(snapshot.time_s),
         countdown_ms: seconds.map_or(i32::MAX, |s| (1000.0 * s).round() as i32),
         interlocks: interlocks(locks),
-        checks_failed: snapshot.checks_failed,
+        checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
         pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| s.ceil() as u16),
         phase: td_phase(snapshot.phase),
         abort_effect: match snapshot.abort_effect {
@@ -352,4 +352,54 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
         *place = byte;
     }
     CharArray::new(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use flight::profile::Profile;
+
+    use super::*;
+    use crate::scatter::draw;
+    use crate::vehicle::{DeadlinePolicy, Vehicle};
+
+    /// The bits of `checks_failed` follow the order of the vehicle's checks: each bit's name begins its check's.
+    #[test]
+    fn the_dialect_names_the_arming_checks_in_their_order() {
+        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+        let checks = vehicle.arming_checks();
+        let bits: Vec<_> = TdCheck::all().iter_names().collect();
+        assert_eq!(bits.len(), checks.len());
+        for (place, (check, (name, bit))) in checks.iter().zip(bits).enumerate() {
+            assert_eq!(bit.bits(), 1 << place);
+            let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+            assert!(
+                check.name.replace('-', " ").starts_with(&words),
+                "bit {place}: {name} is not {}",
+                check.name
+            );
+        }
+    }
+
+    #[test]
+    fn phases_levels_and_statuses_have_the_same_numbers_on_the_wire_and_in_flight() {
+        for phase in Phase::ALL {
+            assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
+        }
+        for level in flight::controller::ControlLevel::ALL {
+            assert_eq!(td_level(level) as u32, u32::from(level.index()));
+        }
+        use flight::nmpc::SolveStatus as S;
+        for status in [
+            S::NotRun,
+            S::Converged,
+            S::IterationLimit,
+            S::Stalled,
+            S::SubproblemFailed,
+            S::NotLandable,
+            S::BadInput,
+        ] {
+            assert_eq!(td_status(status) as u32, u32::from(status.index()));
+        }
+    }
 }

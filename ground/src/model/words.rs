@@ -2,24 +2,7 @@
 
 use std::fmt::Debug;
 
-use protocol::dialect::{TdAbortEffect, TdPhase};
-
-/// The arming checks by their bit in `checks_failed`, in the vehicle's order.
-pub const ARMING_CHECKS: [&str; 13] = [
-    "abort latch",
-    "pin",
-    "self-test",
-    "tilt from vertical",
-    "rotation",
-    "speed",
-    "estimator",
-    "fins answering",
-    "igniter continuity",
-    "log",
-    "log space",
-    "controller warm",
-    "predicted touchdown",
-];
+use protocol::dialect::{TdAbortEffect, TdCheck, TdPhase};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
@@ -48,14 +31,10 @@ pub fn abort_effect(effect: TdAbortEffect) -> &'static str {
     }
 }
 
-/// The failing checks' names, or `None` if all pass.
-pub fn failed_checks(bits: u16) -> Vec<String> {
-    (0..16)
-        .filter(|bit| bits & (1 << bit) != 0)
-        .map(|bit| {
-            ARMING_CHECKS.get(bit).map_or_else(|| format!("check {}", bit + 1), |name| (*name).to_owned())
-        })
-        .collect()
+/// The failing checks' names.
+pub fn failed_checks(checks: TdCheck) -> Vec<String> {
+    let words = |name: &str| name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+    checks.iter_names().map(|(name, _)| words(name)).collect()
 }
 
 #[cfg(test)]
@@ -70,8 +49,9 @@ mod tests {
     }
 
     #[test]
-    fn unknown_checks_are_numbered() {
-        assert_eq!(failed_checks(0b10), ["pin"]);
-        assert_eq!(failed_checks(1 << 15), ["check 16"]);
+    fn failing_checks_are_named() {
+        let failing = TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_LOG_SPACE;
+        assert_eq!(failed_checks(failing), ["pin", "log space"]);
+        assert!(failed_checks(TdCheck::empty()).is_empty());
     }
 }

@@ -23,7 +23,7 @@ pub(super) fn step(model: &mut Model, now: Duration) {
             Some(TdPhase::TD_PHASE_PAD_ARMED) if armed => start(model, now),
             Some(TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE) => {
                 let ready =
-                    model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed == 0);
+                    model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
                 if (ready && phase == Some(TdPhase::TD_PHASE_PAD_IDLE)) || now >= PATIENCE {
                     model.info(now, "automatic mode: arming");
                     model.auto_step = AutoStep::WaitForArmed;

@@ -171,7 +171,7 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     }
     match model.vehicle.status.as_ref() {
         None => Line::default(),
-        Some(status) if status.value.checks_failed == 0 => {
+        Some(status) if status.value.checks_failed.is_empty() => {
             Line::styled(" GO: every arming check passes", theme.style(Role::Good))
         }
         Some(status) => {

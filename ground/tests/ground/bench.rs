@@ -12,7 +12,7 @@ use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
     MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdControlLevel, TdInterlock, TdLimit, TdPhase,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase,
     TdSolverStatus,
 };
 use protocol::frame::{Encoder, Frame};
@@ -133,7 +133,7 @@ impl Bench {
             time_boot_ms: self.boot_ms(),
             countdown_ms: self.countdown_ms,
             interlocks: self.interlocks,
-            checks_failed: self.checks_failed,
+            checks_failed: TdCheck::from_bits_truncate(self.checks_failed),
             pad_wait_s: self.pad_wait_s,
             phase: self.phase,
             abort_effect: self.abort_effect,
