@@ -79,7 +79,7 @@ pub enum FlyError {
         given: String,
     },
     /// The profile's file cannot be read.
-    #[error("profile {path}: {source}")]
+    #[error("cannot read the profile {path}")]
     ReadProfile {
         /// The file.
         path: String,
@@ -93,7 +93,7 @@ pub enum FlyError {
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
     /// A link cannot be opened.
-    #[error("link {link}: {source}")]
+    #[error("cannot open the link {link}")]
     Link {
         /// The link.
         link: String,

@@ -24,7 +24,7 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
     /// The file could not be made.
-    #[error("cannot create the log {}: {source}", path.display())]
+    #[error("cannot create the log {}", path.display())]
     Create {
         /// The file.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum RecorderError {
         source: std::io::Error,
     },
     /// Writing failed; what was synced before can still be read.
-    #[error("the log {}: {source}", path.display())]
+    #[error("cannot write the log {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,

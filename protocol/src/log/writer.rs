@@ -36,7 +36,7 @@ pub struct LogHeader {
 #[derive(Debug, thiserror::Error)]
 pub enum LogWriteError {
     /// The MCAP writer refused or the file failed.
-    #[error("writing the log: {0}")]
+    #[error("the MCAP writer failed")]
     Mcap(#[from] mcap::McapError),
     /// A Foxglove message could not be encoded.
     #[error("encoding {topic}: {reason}")]
