@@ -5,12 +5,14 @@
 //! * [`vehicle`]: the flight computer: phases, checks, controller ticks, around one plant. Pure.
 //! * [`commands`]: what the radio may ask for and how it is answered. Pure.
 //! * [`telemetry`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's budget. Pure.
+//! * [`paper`]: the landing paper's experiments, its numbers beside ours.
 //! * [`fly`]: the run loop: clock, links, log.
 #![warn(missing_docs)]
 
 pub mod commands;
 pub mod endpoint;
 pub mod fly;
+pub mod paper;
 pub mod plant;
 pub mod scatter;
 pub mod solve_times;

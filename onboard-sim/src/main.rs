@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use clap::{Parser, Subcommand};
 use flight::profile::BUILTIN;
 use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, load_profile, log_header};
+use onboard_sim::paper;
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
@@ -30,6 +31,12 @@ enum Command {
     /// Exit codes: 0 landed inside every limit; 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
     /// 5 stopped before its end.
     Fly(FlyArguments),
+    /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
+    Paper {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// List the built-in profiles, or print one as a file to start from.
     Profiles {
         /// Print this profile's TOML.
@@ -79,12 +86,25 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
+        Command::Paper { json } => repeat_paper(json),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
             runtime.block_on(fly(arguments))
         }
     }
+}
+
+fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {
+    let rows = paper::experiments()?;
+    let printed = paper::as_printed()?;
+    let mut out = std::io::stdout().lock();
+    if json {
+        writeln!(out, "{:#}", paper::to_json(&rows, &printed))?;
+    } else {
+        paper::write_tables(&mut out, &rows, &printed)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {

@@ -356,6 +356,7 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 
 #[cfg(test)]
 mod tests {
+    use flight::nmpc::SolveStatus as S;
     use flight::profile::Profile;
 
     use super::*;
@@ -389,7 +390,6 @@ mod tests {
         for level in flight::controller::ControlLevel::ALL {
             assert_eq!(td_level(level) as u32, u32::from(level.index()));
         }
-        use flight::nmpc::SolveStatus as S;
         for status in [
             S::NotRun,
             S::Converged,
