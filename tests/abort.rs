@@ -20,7 +20,9 @@ fn fly_to(phase: TdPhase) -> Flight {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
     let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--mavlink", &ground.link(), "--log", "flight.mcap"]).current_dir(folder.path());
+    command
+        .args(["fly", "--stay", "--mavlink", &ground.link(), "--log", "flight.mcap"])
+        .current_dir(folder.path());
     let vehicle = Running::start(&mut command);
     ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
     if phase != TdPhase::TD_PHASE_PAD_IDLE {
@@ -44,7 +46,9 @@ fn arm(ground: &mut BareGround) {
     assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
 }
 
+/// Told to stop, the vehicle says how its flight ended.
 fn ended(flight: Flight) -> Ended {
+    flight.vehicle.signal(Signal::SIGTERM);
     flight.vehicle.wait()
 }
 
@@ -73,6 +77,9 @@ fn in_the_countdown_nothing_is_released() {
     let mut flight = fly_to(TdPhase::TD_PHASE_PAD_ARMED);
     assert_eq!(flight.ground.command(START, 0.0), ACCEPTED);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
+    // Longer than the countdown would have taken.
+    let aborted_at_ms = flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms;
+    while flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms < aborted_at_ms + 6_000 {}
     let ended = ended(flight);
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(!ended.output.contains("LAND_ARMED"), "{}", ended.output);
@@ -84,8 +91,9 @@ fn under_thrust_it_holds_upright_and_says_that_no_cut_off_exists() {
     let before = flight.ground.wait_for_phase(TdPhase::TD_PHASE_POWERED);
     assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
+    flight.ground.wait_for_phase(TdPhase::TD_PHASE_SAFED);
     let ended = ended(flight);
-    assert_eq!(ended.code, Some(3), "{}", ended.output);
+    assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);
     assert!(ended.output.contains("STABILISER") && !ended.output.contains("CHUTE"), "{}", ended.output);
 }
@@ -94,6 +102,7 @@ fn under_thrust_it_holds_upright_and_says_that_no_cut_off_exists() {
 fn on_the_ground_there_is_nothing_left_to_abort() {
     let mut flight = fly_to(TdPhase::TD_PHASE_TOUCHDOWN);
     assert_eq!(flight.ground.command(ABORT, 1.0), FAILED);
+    flight.ground.wait_for_phase(TdPhase::TD_PHASE_SAFED);
     let ended = ended(flight);
     assert_eq!(ended.code, Some(0), "a landing stays a landing: {}", ended.output);
 }
@@ -104,8 +113,6 @@ fn a_termination_of_nought_does_nothing() {
     assert_eq!(flight.ground.command(ABORT, 0.0), FAILED);
     let beat = flight.ground.wait_for_heartbeat();
     assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED));
-    // A vehicle that is told to stop says how far it came.
-    flight.vehicle.signal(Signal::SIGTERM);
     let ended = ended(flight);
     assert_eq!(ended.code, Some(5), "{}", ended.output);
 }

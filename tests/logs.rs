@@ -51,13 +51,14 @@ fn one_flipped_bit_in_one_output_is_found_at_its_tick() {
     assert_eq!(fly(folder.path(), "good.mcap", None).code, Some(0));
     let bad = folder.path().join("bad.mcap");
     rewrite_log(&folder.path().join("good.mcap"), &bad, |ticks| {
+        assert_eq!(ticks[30].input.tick, 30);
         let output = &mut ticks[30].output;
         output.gimbal_command_rad = f64::from_bits(output.gimbal_command_rad.to_bits() ^ 1);
     });
     let verified = verify(&bad, None);
     assert_eq!(verified.code, Some(1), "{}", verified.output);
     assert!(
-        verified.output.contains("30") && verified.output.contains("gimbal_command_rad"),
+        verified.output.contains("first at tick 30 ") && verified.output.contains("gimbal_command_rad"),
         "{}",
         verified.output
     );
@@ -69,7 +70,7 @@ fn a_killed_recorder_loses_a_fraction_of_a_second() {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--log", "killed.mcap"]).current_dir(folder.path());
     let mut flight = Running::start(&mut command);
-    // Killed the moment it says that it has touched the ground.
+    // Killed the moment it says that its motor has burnt out.
     flight.wait_for_line("burn-out");
     flight.signal(Signal::SIGKILL);
     flight.wait();

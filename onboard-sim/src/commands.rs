@@ -66,9 +66,10 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
             unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
         }
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
-        Ok(Command::SetInterval { message_id: id(param1), interval_us: param2 })
+        Ok(Command::SetInterval { message_id: message_id(param1)?, interval_us: param2 })
     } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
-        Ok(Command::SendMessage { message_id: id(param1), of: id(param2) })
+        // Parameter 2 means something to two messages only; for the others it may be NaN.
+        Ok(Command::SendMessage { message_id: message_id(param1)?, of: message_id(param2).unwrap_or(0) })
     } else {
         Err(Unfit { result: MavResult::MAV_RESULT_UNSUPPORTED, reason: None })
     }
@@ -84,10 +85,14 @@ pub fn mav_result(answer: &Answer) -> MavResult {
     }
 }
 
-/// A message id sent as a float: saturates, and NaN becomes 0, which no message request is refused for but
-/// HEARTBEAT answers.
-fn id(param: f32) -> u32 {
-    param as u32
+/// A message id sent as a float.
+fn message_id(param: f32) -> std::result::Result<u32, Unfit> {
+    let largest = 0x00FF_FFFF_u32 as f32;
+    if (0.0..=largest).contains(&param) && param.fract() == 0.0 {
+        return Ok(param as u32);
+    }
+    let reason = format!("message id {param}: must be a whole number from 0 to 16777215");
+    Err(Unfit { result: MavResult::MAV_RESULT_DENIED, reason: Some(reason) })
 }
 
 #[cfg(test)]
@@ -131,6 +136,18 @@ mod tests {
         for param1 in [0.0, 0.5, f32::NAN, -1.0] {
             assert_eq!(result_of(&command(185, param1, 0.0)), MavResult::MAV_RESULT_FAILED, "{param1}");
         }
+    }
+
+    #[test]
+    fn a_message_id_is_a_whole_number_and_nan_is_none() {
+        for bad in [f32::NAN, -1.0, 0.5, f32::INFINITY, 2e7] {
+            assert_eq!(result_of(&command(511, bad, -1.0)), MavResult::MAV_RESULT_DENIED, "{bad}");
+            assert_eq!(result_of(&command(512, bad, 0.0)), MavResult::MAV_RESULT_DENIED, "{bad}");
+        }
+        assert_eq!(
+            parse(&command(512, 148.0, f32::NAN)),
+            Ok(Command::SendMessage { message_id: 148, of: 0 })
+        );
     }
 
     #[test]

@@ -2,85 +2,49 @@
 //!
 //! Telemetry is scheduled within a radio's budget; answers and texts go first and count against it.
 
+mod streams;
+
+use std::collections::{BTreeSet, VecDeque};
+
 use flight::phase::Phase;
 use mavlink::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
 use protocol::dialect::PING_DATA;
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, AVAILABLE_MODES_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA,
-    LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity, SYS_STATUS_DATA,
-    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TIMESYNC_DATA, VFR_HUD_DATA,
+    AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
+    TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::text;
 
+use self::streams::Streams;
 use crate::commands::{self, Command};
 use crate::telemetry;
 use crate::vehicle::{Severity, Snapshot, Vehicle, VehicleEvent};
 
-/// Bytes around a payload: header and checksum.
-const FRAME_OVERHEAD: usize = 12;
 /// Unsent telemetry may save up this much of the budget for a burst.
 const BURST_BYTES: f64 = 400.0;
 
-/// A message that is sent by itself, with its longest payload and its default rate.
-struct Standard {
-    message_id: u32,
-    payload_len: usize,
-    rate_hz: f64,
-}
-
-const fn standard(message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
-    Standard { message_id, payload_len, rate_hz }
-}
-
-/// What is sent unasked. In the order in which it is given up when the budget runs short: last first.
-const STANDARD: [Standard; 13] = [
-    standard(HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
-    standard(TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
-    standard(TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
-    // Without its optional offset quaternion, which is never set and therefore cut.
-    standard(ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
-    standard(LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
-    standard(TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
-    standard(TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
-    standard(TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
-    standard(TD_TOUCHDOWN_PREDICTION_DATA::ID, TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN, 2.0),
-    standard(TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
-    standard(SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard(EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
-    standard(VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
-];
-
-#[derive(Debug, Clone, Copy)]
-struct Stream {
-    message_id: u32,
-    payload_len: usize,
-    default_interval_s: f64,
-    /// `None`: switched off.
-    interval_s: Option<f64>,
-    due_s: f64,
-}
-
-impl Stream {
-    fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
-        interval_s.map_or(0.0, |interval_s| (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s)
-    }
-}
-
+/// Requested messages that may wait; more are refused for the time being.
+const MAX_REQUESTED: usize = 32;
+/// Sources that are greeted; a forged flood of ids cannot grow memory.
+const MAX_KNOWN: usize = 16;
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
     encoder: Encoder,
-    streams: Vec<Stream>,
+    streams: Streams,
     /// Answers and texts that wait to be sent.
     urgent: Vec<Frame>,
+    /// Messages that were asked for; they wait for room in the budget.
+    requested: VecDeque<MavMessage>,
     text_id: u16,
     credit_bytes: f64,
     last_poll_s: f64,
     warned_of_twin: bool,
+    /// Whoever has sent anything yet; a newcomer is told the limits at once.
+    known: BTreeSet<Address>,
 }
 
 impl Default for VehicleEndpoint {
@@ -92,22 +56,16 @@ impl Default for VehicleEndpoint {
 impl VehicleEndpoint {
     /// With the standard messages at their default rates.
     pub fn new() -> Self {
-        let streams = STANDARD.iter().enumerate().map(|(place, standard)| Stream {
-            message_id: standard.message_id,
-            payload_len: standard.payload_len,
-            default_interval_s: 1.0 / standard.rate_hz,
-            interval_s: Some(1.0 / standard.rate_hz),
-            // Spread, so that the slow ones do not all fall into the same instant.
-            due_s: 0.02 * place as f64,
-        });
         Self {
             encoder: Encoder::new(VEHICLE),
-            streams: streams.collect(),
+            streams: Streams::standard(),
             urgent: Vec::new(),
+            requested: VecDeque::new(),
             text_id: 0,
             credit_bytes: BURST_BYTES,
             last_poll_s: 0.0,
             warned_of_twin: false,
+            known: BTreeSet::new(),
         }
     }
 
@@ -120,6 +78,9 @@ impl VehicleEndpoint {
             }
             return;
         }
+        if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
+            self.streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
+        }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if VEHICLE.accepts(request.target) {
                 self.on_command(&request, vehicle);
@@ -127,7 +88,9 @@ impl VehicleEndpoint {
             return;
         }
         match frame.decode() {
-            Ok(MavMessage::TIMESYNC(sync)) if sync.tc1 == 0 => {
+            Ok(MavMessage::TIMESYNC(sync))
+                if sync.tc1 == 0 && is_for_us(sync.target_system, sync.target_component) =>
+            {
                 let answer = TIMESYNC_DATA {
                     tc1: (1e9 * vehicle.time_s()) as i64,
                     ts1: sync.ts1,
@@ -135,15 +98,6 @@ impl VehicleEndpoint {
                     target_component: frame.source().component_id,
                 };
                 self.answer(&MavMessage::TIMESYNC(answer));
-            }
-            #[expect(deprecated, reason = "older ground stations still measure their round trip with PING")]
-            Ok(MavMessage::PING(ping)) if ping.target_system == 0 => {
-                let answer = PING_DATA {
-                    target_system: frame.source().system_id,
-                    target_component: frame.source().component_id,
-                    ..ping
-                };
-                self.answer(&MavMessage::PING(answer));
             }
             Ok(message) => {
                 if let Some(pong) = pong(&message, frame.source()) {
@@ -161,10 +115,10 @@ impl VehicleEndpoint {
             VehicleEvent::Text { severity, text } => self.say(*severity, text),
             VehicleEvent::PhaseChanged { .. } => {
                 // The crew learns of a new phase at once, by the two messages that carry it.
-                self.hurry(HEARTBEAT_DATA::ID);
-                self.hurry(TD_FLIGHT_STATUS_DATA::ID);
+                self.streams.hurry(HEARTBEAT_DATA::ID);
+                self.streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
             }
-            VehicleEvent::Verdict { .. } => self.hurry(TD_LANDING_VERDICT_DATA::ID),
+            VehicleEvent::Verdict { .. } => self.streams.hurry(TD_LANDING_VERDICT_DATA::ID),
             VehicleEvent::Tick(_) => {}
         }
     }
@@ -176,26 +130,28 @@ impl VehicleEndpoint {
         self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
         self.last_poll_s = now_s;
         let mut frames = std::mem::take(&mut self.urgent);
-        for stream in &mut self.streams {
-            let Some(interval_s) = stream.interval_s else {
-                continue;
-            };
-            if now_s < stream.due_s {
-                continue;
-            }
+        for message_id in self.streams.due(now_s) {
             let pending: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
             // The heartbeat is what the ground believes us alive by: it is never held back.
-            if self.credit_bytes < pending as f64 && stream.message_id != HEARTBEAT_DATA::ID {
+            if self.credit_bytes < pending as f64 && message_id != HEARTBEAT_DATA::ID {
                 continue;
             }
-            if let Some(message) = telemetry::message(stream.message_id, snapshot) {
+            if let Some(message) = telemetry::message(message_id, snapshot) {
                 frames.push(self.encoder.encode(&message));
             }
-            // From when it was due, not from now, or the frame grid would eat into the rate.
-            stream.due_s = (stream.due_s + interval_s).max(now_s);
+            self.streams.on_sent(message_id, now_s);
         }
-        let sent: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
-        self.credit_bytes -= sent as f64;
+        let mut sent: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
+        // What was asked for comes after what the crew lives by.
+        while self.credit_bytes >= sent as f64
+            && let Some(message) = self.requested.pop_front()
+        {
+            let frame = self.encoder.encode(&message);
+            sent += frame.as_bytes().len();
+            frames.push(frame);
+        }
+        // A flood of commands, each answered, must not silence telemetry for longer than a burst.
+        self.credit_bytes = (self.credit_bytes - sent as f64).max(-BURST_BYTES);
         frames
     }
 
@@ -207,7 +163,7 @@ impl VehicleEndpoint {
                 (commands::mav_result(&vehicle.request(asked)), None)
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
-                self.set_interval(message_id, interval_us)
+                self.streams.set_interval(message_id, interval_us, self.last_poll_s)
             }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(message_id, of, vehicle),
         };
@@ -219,71 +175,29 @@ impl VehicleEndpoint {
         }
     }
 
-    fn set_interval(&mut self, message_id: u32, interval_us: f32) -> (MavResult, Option<String>) {
-        let Some(place) = self.streams.iter().position(|stream| stream.message_id == message_id) else {
-            return (
-                MavResult::MAV_RESULT_FAILED,
-                Some(format!("message {message_id} is not sent by this vehicle")),
-            );
-        };
-        let wanted = match interval_us {
-            -1.0 => None,
-            0.0 => Some(self.streams[place].default_interval_s),
-            us if us >= 1.0 => Some(f64::from(us) * 1e-6),
-            _ => {
-                let reason =
-                    format!("interval {interval_us} us: must be -1 (off), 0 (default) or 1 and above");
+    fn send_message(&mut self, message_id: u32, of: u32, vehicle: &Vehicle) -> (MavResult, Option<String>) {
+        let messages: Vec<MavMessage> = match message_id {
+            // 0 asks for all of them, k for the k-th.
+            AVAILABLE_MODES_DATA::ID if of as usize > Phase::ALL.len() => {
+                let reason = format!("mode {of}: there are {}", Phase::ALL.len());
                 return (MavResult::MAV_RESULT_DENIED, Some(reason));
             }
+            AVAILABLE_MODES_DATA::ID => telemetry::available_modes()
+                .enumerate()
+                .filter(|(place, _)| of == 0 || of as usize == place + 1)
+                .map(|(_, message)| message)
+                .collect(),
+            MESSAGE_INTERVAL_DATA::ID => vec![self.streams.interval_of(of)],
+            _ => telemetry::message(message_id, &vehicle.snapshot()).into_iter().collect(),
         };
-        let others: f64 = self
-            .streams
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| *other != place)
-            .map(|(_, stream)| stream.bytes_s(stream.interval_s))
-            .sum();
-        let total = others + self.streams[place].bytes_s(wanted);
-        if wanted.is_some() && total > f64::from(RADIO_BUDGET_BYTES_S) {
-            let reason = format!(
-                "message {message_id}: {total:.0} B/s in all, the link's budget is {RADIO_BUDGET_BYTES_S}"
-            );
-            return (MavResult::MAV_RESULT_DENIED, Some(reason));
+        if messages.is_empty() {
+            return (MavResult::MAV_RESULT_UNSUPPORTED, None);
         }
-        self.streams[place].interval_s = wanted;
+        if self.requested.len() + messages.len() > MAX_REQUESTED {
+            return (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, None);
+        }
+        self.requested.extend(messages);
         (MavResult::MAV_RESULT_ACCEPTED, None)
-    }
-
-    fn send_message(&mut self, message_id: u32, of: u32, vehicle: &Vehicle) -> (MavResult, Option<String>) {
-        if message_id == AVAILABLE_MODES_DATA::ID {
-            // 0 asks for all of them, k for the k-th.
-            for (place, message) in telemetry::available_modes().enumerate() {
-                if of == 0 || of as usize == place + 1 {
-                    self.answer(&message);
-                }
-            }
-            let known = of as usize <= Phase::ALL.len();
-            return (if known { MavResult::MAV_RESULT_ACCEPTED } else { MavResult::MAV_RESULT_DENIED }, None);
-        }
-        if message_id == MESSAGE_INTERVAL_DATA::ID {
-            let interval = self.streams.iter().find(|stream| stream.message_id == of).map(|s| s.interval_s);
-            let interval_us = match interval {
-                Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
-                Some(None) => -1,
-                // As the standard has it: 0 means the message is not available.
-                None => 0,
-            };
-            let message_id = u16::try_from(of).unwrap_or(u16::MAX);
-            self.answer(&MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA { interval_us, message_id }));
-            return (MavResult::MAV_RESULT_ACCEPTED, None);
-        }
-        match telemetry::message(message_id, &vehicle.snapshot()) {
-            Some(message) => {
-                self.answer(&message);
-                (MavResult::MAV_RESULT_ACCEPTED, None)
-            }
-            None => (MavResult::MAV_RESULT_UNSUPPORTED, None),
-        }
     }
 
     fn answer(&mut self, message: &MavMessage) {
@@ -304,12 +218,10 @@ impl VehicleEndpoint {
             self.answer(&MavMessage::STATUSTEXT(chunk));
         }
     }
+}
 
-    fn hurry(&mut self, message_id: u32) {
-        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
-            stream.due_s = f64::NEG_INFINITY;
-        }
-    }
+fn is_for_us(system_id: u8, component_id: u8) -> bool {
+    VEHICLE.accepts(Address { system_id, component_id })
 }
 
 /// The answer to a PING that asks for one. Deprecated, but older ground stations still measure with it.

@@ -143,6 +143,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         } else {
             DeadlinePolicy::Observe
         },
+        log_clock: None,
     };
     let (stop, stopped) = watch::channel(false);
     tokio::spawn(async move {

@@ -14,8 +14,8 @@ use protocol::dialect::{
     MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState,
     MavSysStatusSensor, MavType, MavVtolState, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase,
-    TdSolverStatus, VFR_HUD_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel,
+    TdInterlock, TdLimit, TdPhase, TdSolverStatus, VFR_HUD_DATA,
 };
 
 use crate::vehicle::{AbortEffect, Snapshot};
@@ -41,6 +41,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
         TD_TOUCHDOWN_PREDICTION_DATA::ID => touchdown_prediction(snapshot),
         TD_PREDICTED_PATH_DATA::ID => predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => landing_verdict(snapshot),
+        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(touchdown_limits(snapshot)),
         _ => None,
     }
 }
@@ -332,6 +333,20 @@ fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
         limits_violated: TdLimit::from_bits_truncate(crate::vehicle::violations(verdict)),
         landed: u8::from(verdict.landed()),
     }))
+}
+
+fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
+    let limits = &snapshot.limits;
+    MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+        x_m: limits.x_m as f32,
+        altitude_min_m: limits.altitude_min_m as f32,
+        altitude_max_m: limits.altitude_max_m as f32,
+        pitch_error_rad: limits.pitch_error_rad as f32,
+        u_m_s: limits.u_m_s as f32,
+        w_m_s: limits.w_m_s as f32,
+        q_rad_s: limits.pitch_rate_rad_s as f32,
+        gimbal_limit_rad: snapshot.gimbal_limit_rad as f32,
+    })
 }
 
 fn boot_ms(time_s: f64) -> u32 {

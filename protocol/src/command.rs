@@ -115,16 +115,21 @@ impl CommandAnswer {
 
     /// The result in an operator's words.
     pub fn result_words(&self) -> &'static str {
-        match self.result {
-            0 => "accepted",
-            1 => "temporarily rejected",
-            2 => "denied",
-            3 => "unsupported",
-            4 => "failed",
-            5 => "in progress",
-            6 => "cancelled",
-            _ => "answered with an unknown result",
-        }
+        result_words(self.result)
+    }
+}
+
+/// A MAV_RESULT number in an operator's words.
+pub fn result_words(result: u8) -> &'static str {
+    match result {
+        0 => "accepted",
+        1 => "temporarily rejected",
+        2 => "denied",
+        3 => "unsupported",
+        4 => "failed",
+        5 => "in progress",
+        6 => "cancelled",
+        _ => "answered with an unknown result",
     }
 }
 
@@ -163,6 +168,15 @@ pub enum CommandEvent {
         /// MAV_RESULT number.
         result: u8,
     },
+    /// Answered for good, but no longer waited for: given up, or replaced by another of its number.
+    AnsweredLate {
+        /// MAV_CMD number.
+        command: u16,
+        /// MAV_RESULT number.
+        result: u8,
+        /// Which one, as [`CommandSender::submit`] named it.
+        ticket: Ticket,
+    },
     /// Given up without an answer.
     TimedOut {
         /// MAV_CMD number.
@@ -176,9 +190,24 @@ pub enum CommandEvent {
 pub const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
 /// Wait after an answer "in progress".
 pub const PROGRESS_TIMEOUT: Duration = Duration::from_secs(3);
+/// The answer to a command that was sent once may still be on its way for this long.
+pub const LATE_ANSWER_WITHIN: Duration = Duration::from_secs(10);
+
+/// One submission, told apart from others of the same number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ticket(u64);
+
+/// An answer that may still come for a command that nobody waits for any more.
+#[derive(Debug)]
+struct Late {
+    command: MavCmd,
+    ticket: Ticket,
+    until: Duration,
+}
 
 #[derive(Debug)]
 struct Pending {
+    ticket: Ticket,
     message: COMMAND_LONG_DATA,
     resend: Resend,
     attempts: u32,
@@ -186,11 +215,28 @@ struct Pending {
     in_progress: bool,
 }
 
+impl Pending {
+    /// The answer that is still to come when this is waited for no longer. Only of a command that is
+    /// sent once is it known how many answers are outstanding.
+    fn into_late(self, now: Duration) -> Option<Late> {
+        let outstanding = self.resend == Resend::Never && self.attempts > 0;
+        let late =
+            Late { command: self.message.command, ticket: self.ticket, until: now + LATE_ANSWER_WITHIN };
+        outstanding.then_some(late)
+    }
+}
+
 /// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] says what to send.
+///
+/// An answer names its command by number alone, and arming and disarming share one. So the late answer
+/// to an arming is waited for even after a disarming has replaced it, and is never taken for the
+/// disarming's own. If it was lost instead, the disarming is sent once more than needed.
 #[derive(Debug, Default)]
 pub struct CommandSender {
     pending: Vec<Pending>,
+    late: Vec<Late>,
     events: Vec<CommandEvent>,
+    submitted: u64,
 }
 
 impl CommandSender {
@@ -207,8 +253,8 @@ impl CommandSender {
         params: [f32; 7],
         resend: Resend,
         now: Duration,
-    ) {
-        self.pending.retain(|pending| pending.message.command != command);
+    ) -> Ticket {
+        self.withdraw(now, |pending| pending.message.command == command);
         let message = COMMAND_LONG_DATA {
             param1: params[0],
             param2: params[1],
@@ -222,16 +268,30 @@ impl CommandSender {
             target_component: target.component_id,
             confirmation: 0,
         };
-        self.pending.push(Pending { message, resend, attempts: 0, due_at: now, in_progress: false });
+        self.submitted += 1;
+        let ticket = Ticket(self.submitted);
+        self.pending.push(Pending { ticket, message, resend, attempts: 0, due_at: now, in_progress: false });
+        ticket
+    }
+
+    /// Stops sending whatever is under way. What was sent is sent: its answers may still come.
+    pub fn withdraw_all(&mut self, now: Duration) {
+        self.withdraw(now, |_| true);
+    }
+
+    fn withdraw(&mut self, now: Duration, which: impl Fn(&Pending) -> bool) {
+        self.late.retain(|late| now < late.until);
+        let withdrawn = self.pending.extract_if(.., |pending| which(pending));
+        self.late.extend(withdrawn.filter_map(|pending| pending.into_late(now)));
     }
 
     /// What is to be sent now; call it a few times a second.
     pub fn poll(&mut self, now: Duration) -> Vec<MavMessage> {
         let mut messages = Vec::new();
         let events = &mut self.events;
-        self.pending.retain_mut(|pending| {
+        let given_up = self.pending.extract_if(.., |pending| {
             if now < pending.due_at {
-                return true;
+                return false;
             }
             let may_send = !pending.in_progress
                 && match pending.resend {
@@ -242,31 +302,49 @@ impl CommandSender {
             let command = pending.message.command as u16;
             if !may_send {
                 events.push(CommandEvent::TimedOut { command, attempts: pending.attempts });
-                return false;
+                return true;
             }
             pending.message.confirmation = u8::try_from(pending.attempts).unwrap_or(u8::MAX);
             pending.attempts += 1;
             pending.due_at = now + ANSWER_TIMEOUT;
             events.push(CommandEvent::Sent { command, attempt: pending.attempts });
             messages.push(MavMessage::COMMAND_LONG(pending.message.clone()));
-            true
+            false
         });
+        self.late.extend(given_up.filter_map(|pending| pending.into_late(now)));
+        self.late.retain(|late| now < late.until);
         messages
     }
 
-    /// Takes note of an answer.
-    pub fn on_answer(&mut self, answer: &CommandAnswer, now: Duration) {
-        let Some(index) = self.pending.iter().position(|p| p.message.command as u16 == answer.command) else {
-            return;
-        };
-        if answer.result == MavResult::MAV_RESULT_IN_PROGRESS as u8 {
+    /// Takes note of an answer. Returns whether any command could still be answered by it.
+    pub fn on_answer(&mut self, answer: &CommandAnswer, now: Duration) -> bool {
+        let final_answer = answer.result != MavResult::MAV_RESULT_IN_PROGRESS as u8;
+        let waiting = self.pending.iter().position(|p| p.message.command as u16 == answer.command);
+        // Answers come in the order of their commands. A second arming is the same question again: the
+        // first answer to come is its answer, too.
+        let repeats = waiting.is_some_and(|index| self.pending[index].resend == Resend::Never);
+        let late = self
+            .late
+            .iter()
+            .position(|late| late.command as u16 == answer.command && now < late.until && !repeats);
+        if let Some(index) = late {
+            if final_answer {
+                let Late { ticket, .. } = self.late.remove(index);
+                let (command, result) = (answer.command, answer.result);
+                self.events.push(CommandEvent::AnsweredLate { command, result, ticket });
+            }
+            return true;
+        }
+        let Some(index) = waiting else { return false };
+        if final_answer {
+            self.pending.remove(index);
+            self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
+        } else {
             self.pending[index].in_progress = true;
             self.pending[index].due_at = now + PROGRESS_TIMEOUT;
             self.events.push(CommandEvent::InProgress { command: answer.command, progress: answer.progress });
-        } else {
-            self.pending.remove(index);
-            self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
         }
+        true
     }
 
     /// Whether this command still waits for its answer.

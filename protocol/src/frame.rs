@@ -2,24 +2,23 @@
 //!
 //! [`Framer`] keeps what a typed reader would throw away: the frame's exact bytes (for the log),
 //! counters of what was rejected and why, and frames whose fields hold values the dialect does not
-//! know (so that an unknown command can still be answered). Wire format:
-//! <https://mavlink.io/en/guide/serialization.html>.
+//! know (so that an unknown command can still be answered). MAVLink 2 only: its predecessor's frames are
+//! garbage here, because their one-byte marker and unchecked ids would make a framer wait on noise for bytes that
+//! never come. Wire format: <https://mavlink.io/en/guide/serialization.html>.
 
 use mavlink::{MavlinkVersion, Message as _};
 
 use crate::dialect::MavMessage;
 use crate::identity::Address;
 
-const MAGIC_V1: u8 = 0xFE;
-const MAGIC_V2: u8 = 0xFD;
-const HEADER_V1: usize = 6;
-const HEADER_V2: usize = 10;
+const MAGIC: u8 = 0xFD;
+const HEADER_LEN: usize = 10;
 const CRC_LEN: usize = 2;
 const SIGNATURE_LEN: usize = 13;
 const INCOMPAT_SIGNED: u8 = 0x01;
 
 /// The longest MAVLink 2 frame: header, 255 bytes of payload, CRC, signature.
-pub const MAX_FRAME_LEN: usize = HEADER_V2 + 255 + CRC_LEN + SIGNATURE_LEN;
+pub const MAX_FRAME_LEN: usize = HEADER_LEN + 255 + CRC_LEN + SIGNATURE_LEN;
 
 /// One whole frame whose CRC is right.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,40 +32,24 @@ impl Frame {
         &self.bytes
     }
 
-    /// Protocol version by its start marker.
-    pub fn version(&self) -> MavlinkVersion {
-        if self.bytes[0] == MAGIC_V1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 }
-    }
-
     /// The sender's sequence number.
     pub fn sequence(&self) -> u8 {
-        self.bytes[if self.is_v1() { 2 } else { 4 }]
+        self.bytes[4]
     }
 
     /// The sender.
     pub fn source(&self) -> Address {
-        let at = if self.is_v1() { 3 } else { 5 };
-        Address { system_id: self.bytes[at], component_id: self.bytes[at + 1] }
+        Address { system_id: self.bytes[5], component_id: self.bytes[6] }
     }
 
     /// Message id.
     pub fn message_id(&self) -> u32 {
-        if self.is_v1() {
-            u32::from(self.bytes[5])
-        } else {
-            u32::from_le_bytes([self.bytes[7], self.bytes[8], self.bytes[9], 0])
-        }
-    }
-
-    /// Whether the frame carries a signature (which has not been checked).
-    pub fn is_signed(&self) -> bool {
-        !self.is_v1() && self.bytes[2] & INCOMPAT_SIGNED != 0
+        u32::from_le_bytes([self.bytes[7], self.bytes[8], self.bytes[9], 0])
     }
 
     /// The payload as sent: trailing zeros may be cut.
     pub fn payload(&self) -> &[u8] {
-        let start = if self.is_v1() { HEADER_V1 } else { HEADER_V2 };
-        &self.bytes[start..start + usize::from(self.bytes[1])]
+        &self.bytes[HEADER_LEN..HEADER_LEN + usize::from(self.bytes[1])]
     }
 
     /// The payload padded with the zeros that the sender cut.
@@ -82,12 +65,8 @@ impl Frame {
     /// # Errors
     /// A field holds a value that the dialect does not define.
     pub fn decode(&self) -> Result<MavMessage, DecodeError> {
-        MavMessage::parse(self.version(), self.message_id(), self.payload())
+        MavMessage::parse(MavlinkVersion::V2, self.message_id(), self.payload())
             .map_err(|error| DecodeError { message_id: self.message_id(), reason: error.to_string() })
-    }
-
-    fn is_v1(&self) -> bool {
-        self.bytes[0] == MAGIC_V1
     }
 }
 
@@ -110,6 +89,8 @@ pub struct FramerCounters {
     pub crc_errors: u64,
     /// Candidates with a message id outside the dialect (their CRC cannot be checked).
     pub unknown_ids: u64,
+    /// Candidates that ended before their length.
+    pub cut_short: u64,
     /// Candidates with incompatibility flags that this implementation does not know.
     pub unknown_flags: u64,
     /// Bytes that belonged to no frame.
@@ -118,12 +99,15 @@ pub struct FramerCounters {
 
 /// Finds frames in a stream of bytes.
 ///
-/// A rejected candidate is retried from its second byte, so that a start marker inside garbage
-/// never hides the frame behind it. Holds at most one partial frame between calls.
+/// A rejected candidate is retried from its second byte, so that a start marker inside garbage never hides the
+/// frame behind it. A candidate that waits for bytes is rejected too as soon as it is known that none will come:
+/// at the end of a datagram, and when a serial line falls silent. Holds at most one partial frame between calls.
 #[derive(Debug, Default)]
 pub struct Framer {
     buffer: Vec<u8>,
     start: usize,
+    /// No byte will follow what is in the buffer.
+    ended: bool,
     counters: FramerCounters,
 }
 
@@ -133,11 +117,25 @@ impl Framer {
         Self::default()
     }
 
-    /// Appends received bytes; call [`Framer::next_frame`] until it returns `None` afterwards.
+    /// Appends bytes of a stream; call [`Framer::next_frame`] until it returns `None` afterwards.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.start);
         self.start = 0;
         self.buffer.extend_from_slice(bytes);
+        self.ended = false;
+    }
+
+    /// Appends a whole datagram, whose end is the end of its frames; call [`Framer::next_frame`] until it returns
+    /// `None` afterwards.
+    pub fn push_datagram(&mut self, bytes: &[u8]) {
+        self.push(bytes);
+        self.ended = true;
+    }
+
+    /// The stream has fallen silent for longer than a frame may pause: what is incomplete will stay so. Call
+    /// [`Framer::next_frame`] until it returns `None` afterwards: a whole frame may stand behind it.
+    pub fn on_silence(&mut self) {
+        self.ended = true;
     }
 
     /// Counters since the start.
@@ -145,19 +143,11 @@ impl Framer {
         self.counters
     }
 
-    /// Forgets a partial frame: a datagram's end is the end of its frames.
-    pub fn end_of_datagram(&mut self) {
-        self.counters.garbage_bytes += (self.buffer.len() - self.start) as u64;
-        self.buffer.clear();
-        self.start = 0;
-    }
-
     /// The next whole frame, or `None` until more bytes arrive.
     pub fn next_frame(&mut self) -> Option<Frame> {
         loop {
             let candidate = &self.buffer[self.start..];
-            let marker = candidate.iter().position(|byte| matches!(*byte, MAGIC_V1 | MAGIC_V2));
-            let Some(skipped) = marker else {
+            let Some(skipped) = candidate.iter().position(|byte| *byte == MAGIC) else {
                 self.counters.garbage_bytes += candidate.len() as u64;
                 self.start = self.buffer.len();
                 return None;
@@ -165,23 +155,20 @@ impl Framer {
             self.counters.garbage_bytes += skipped as u64;
             self.start += skipped;
             match examine(&self.buffer[self.start..]) {
-                Candidate::Incomplete => return None,
+                Candidate::Incomplete if !self.ended => return None,
+                Candidate::Incomplete => self.counters.cut_short += 1,
                 Candidate::Whole(len) => {
                     let bytes = self.buffer[self.start..self.start + len].to_vec();
                     self.start += len;
                     self.counters.frames += 1;
                     return Some(Frame { bytes });
                 }
-                Candidate::Rejected(why) => {
-                    match why {
-                        Rejection::Crc => self.counters.crc_errors += 1,
-                        Rejection::UnknownId => self.counters.unknown_ids += 1,
-                        Rejection::UnknownFlags => self.counters.unknown_flags += 1,
-                    }
-                    self.counters.garbage_bytes += 1;
-                    self.start += 1;
-                }
+                Candidate::BadCrc => self.counters.crc_errors += 1,
+                Candidate::UnknownId => self.counters.unknown_ids += 1,
+                Candidate::UnknownFlags => self.counters.unknown_flags += 1,
             }
+            self.counters.garbage_bytes += 1;
+            self.start += 1;
         }
     }
 }
@@ -189,37 +176,26 @@ impl Framer {
 enum Candidate {
     Incomplete,
     Whole(usize),
-    Rejected(Rejection),
-}
-
-enum Rejection {
-    Crc,
+    BadCrc,
     UnknownId,
     UnknownFlags,
 }
 
 /// Looks at bytes that begin with a start marker.
 fn examine(candidate: &[u8]) -> Candidate {
-    let (header_len, signature_len) = match candidate {
-        [MAGIC_V1, ..] => (HEADER_V1, 0),
-        [_, _, flags, ..] if flags & !INCOMPAT_SIGNED != 0 => {
-            return Candidate::Rejected(Rejection::UnknownFlags);
-        }
-        [_, _, flags, ..] if flags & INCOMPAT_SIGNED != 0 => (HEADER_V2, SIGNATURE_LEN),
-        _ => (HEADER_V2, 0),
+    let signature_len = match candidate {
+        [_, _, flags, ..] if flags & !INCOMPAT_SIGNED != 0 => return Candidate::UnknownFlags,
+        [_, _, flags, ..] if flags & INCOMPAT_SIGNED != 0 => SIGNATURE_LEN,
+        _ => 0,
     };
-    if candidate.len() < header_len {
+    if candidate.len() < HEADER_LEN {
         return Candidate::Incomplete;
     }
-    let message_id = if header_len == HEADER_V1 {
-        u32::from(candidate[5])
-    } else {
-        u32::from_le_bytes([candidate[7], candidate[8], candidate[9], 0])
-    };
+    let message_id = u32::from_le_bytes([candidate[7], candidate[8], candidate[9], 0]);
     let Some(crc_extra) = crc_extra(message_id) else {
-        return Candidate::Rejected(Rejection::UnknownId);
+        return Candidate::UnknownId;
     };
-    let crc_at = header_len + usize::from(candidate[1]);
+    let crc_at = HEADER_LEN + usize::from(candidate[1]);
     let len = crc_at + CRC_LEN + signature_len;
     if candidate.len() < len {
         return Candidate::Incomplete;
@@ -228,7 +204,7 @@ fn examine(candidate: &[u8]) -> Candidate {
     if mavlink::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
         Candidate::Whole(len)
     } else {
-        Candidate::Rejected(Rejection::Crc)
+        Candidate::BadCrc
     }
 }
 
@@ -278,9 +254,9 @@ impl Encoder {
 
     fn frame(&mut self, message_id: u32, crc_extra: u8, payload: &[u8]) -> Frame {
         let id = message_id.to_le_bytes();
-        let mut bytes = Vec::with_capacity(HEADER_V2 + payload.len() + CRC_LEN);
+        let mut bytes = Vec::with_capacity(HEADER_LEN + payload.len() + CRC_LEN);
         bytes.extend_from_slice(&[
-            MAGIC_V2,
+            MAGIC,
             payload.len() as u8,
             0,
             0,

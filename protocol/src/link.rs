@@ -8,6 +8,8 @@ use crate::identity::Address;
 
 /// The span that rates and loss are taken over.
 pub const WINDOW: Duration = Duration::from_secs(10);
+/// A frame may be overtaken by this many others.
+const REORDER: u8 = 32;
 /// Sources remembered at most; a forged flood of ids cannot grow memory.
 const MAX_SOURCES: usize = 64;
 
@@ -63,31 +65,32 @@ impl LinkStats {
         self.bucket(now).tx_bytes += count as u64;
     }
 
-    /// A frame that arrived. A jump of more than half the sequence range is taken for a restart or a
-    /// reordered frame, not for loss.
+    /// A frame that arrived. One that comes late is taken off the loss that its absence was; a jump backwards by
+    /// more than [`REORDER`] is a restarted sender.
     pub fn on_frame(&mut self, frame: &Frame, now: Duration) {
         let (source, sequence) = (frame.source(), frame.sequence());
         let known = self.sources.get(&source).copied();
-        let lost = known.map_or(0, |known| {
-            let gap = sequence.wrapping_sub(known.last_sequence).wrapping_sub(1);
-            if gap < 128 { u64::from(gap) } else { 0 }
-        });
+        let ahead = known.map_or(1, |known| sequence.wrapping_sub(known.last_sequence));
+        let late = ahead == 0 || ahead > u8::MAX - REORDER;
+        let (lost, last_sequence) = match known {
+            Some(known) if late => (0, known.last_sequence),
+            _ if ahead < 128 => (u64::from(ahead) - 1, sequence),
+            _ => (0, sequence),
+        };
         if known.is_some() || self.sources.len() < MAX_SOURCES {
-            self.sources.insert(source, Source { last_sequence: sequence, last_seen: now });
+            self.sources.insert(source, Source { last_sequence, last_seen: now });
         }
         let bucket = self.bucket(now);
         bucket.received += 1;
         bucket.lost += lost;
+        if late {
+            bucket.lost = bucket.lost.saturating_sub(1);
+        }
     }
 
     /// Time since the last frame of this component; `None` if it was never heard.
     pub fn age(&self, source: Address, now: Duration) -> Option<Duration> {
         self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
-    }
-
-    /// Every component heard on this link.
-    pub fn sources(&self) -> impl Iterator<Item = Address> + '_ {
-        self.sources.keys().copied()
     }
 
     /// The figures over the last [`WINDOW`], or over the link's life while it is younger.

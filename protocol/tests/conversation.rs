@@ -164,6 +164,16 @@ fn loss_and_rate_are_those_of_the_last_ten_seconds() {
 }
 
 #[test]
+fn a_frame_that_was_overtaken_is_not_lost() {
+    let frames = heartbeats(&mut Encoder::new(VEHICLE), 20);
+    let mut stats = LinkStats::new();
+    for place in [0, 1, 3, 2, 4, 7, 5, 6, 8] {
+        stats.on_frame(&frames[place], ms(10 * place as u64));
+    }
+    assert!(stats.figures(ms(100)).loss.abs() < f64::EPSILON, "{:?}", stats.figures(ms(100)));
+}
+
+#[test]
 fn a_restarted_sender_is_not_taken_for_loss() {
     let mut stats = LinkStats::new();
     for frame in heartbeats(&mut Encoder::new(VEHICLE), 200) {

@@ -125,14 +125,43 @@ fn a_datagram_s_end_ends_its_frame() {
     let frame = &frames()[0];
     let (head, tail) = frame.as_bytes().split_at(7);
     let mut framer = Framer::new();
-    framer.push(head);
+    framer.push_datagram(head);
     assert!(framer.next_frame().is_none());
-    framer.end_of_datagram();
-    framer.push(tail);
+    framer.push_datagram(tail);
     assert!(framer.next_frame().is_none(), "two halves in two datagrams are no frame");
-    framer.end_of_datagram();
-    framer.push(frame.as_bytes());
+    framer.push_datagram(frame.as_bytes());
     assert_eq!(framer.next_frame().as_ref(), Some(frame));
+}
+
+/// Stray bytes, markers of both protocol versions among them, and the beginnings of frames that lost their rest.
+fn noises() -> Vec<Vec<u8>> {
+    let cut = frames()[1].as_bytes()[..20].to_vec();
+    vec![vec![0xFE], vec![0xFD], vec![0xFE, 0xFD], vec![0xFD, 0xFF, 0x00], vec![0xFD, 0xFF, 0x01, 0x00], cut]
+}
+
+#[test]
+fn noise_before_a_frame_in_its_datagram_hides_nothing() {
+    let frame = &frames()[3];
+    for noise in noises() {
+        let mut framer = Framer::new();
+        framer.push_datagram(&[&noise, frame.as_bytes()].concat());
+        assert_eq!(drain(&mut framer).last(), Some(frame), "{noise:x?}");
+    }
+}
+
+#[test]
+fn noise_before_a_frame_on_a_line_hides_nothing_once_the_line_is_silent() {
+    let frame = &frames()[3];
+    for noise in noises() {
+        let mut framer = Framer::new();
+        framer.push(&noise);
+        let mut found = drain(&mut framer);
+        framer.push(frame.as_bytes());
+        found.extend(drain(&mut framer));
+        framer.on_silence();
+        found.extend(drain(&mut framer));
+        assert_eq!(found.last(), Some(frame), "{noise:x?}");
+    }
 }
 
 #[test]
@@ -161,7 +190,10 @@ proptest! {
                 let _ = frame.decode();
             }
         }
-        framer.end_of_datagram();
+        framer.on_silence();
+        for frame in drain(&mut framer) {
+            framed += frame.as_bytes().len();
+        }
         let total: usize = chunks.iter().map(Vec::len).sum();
         prop_assert_eq!(framer.counters().garbage_bytes as usize + framed, total);
     }

@@ -5,10 +5,11 @@ use std::time::Duration;
 use flight::profile::Profile;
 use proptest::prelude::*;
 use protocol::command::CommandAnswer;
-use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
+use protocol::dialect::{ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, MavCmd, TD_FINS_DATA};
 use protocol::identity::GROUND;
 use protocol::text::Reassembler;
 
+use super::streams::STANDARD;
 use super::*;
 use crate::scatter::draw;
 use crate::vehicle::{DeadlinePolicy, LogState};
@@ -26,7 +27,7 @@ impl Bench {
         vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
         vehicle.pull_pin();
         let mut bench = Self { vehicle, endpoint: VehicleEndpoint::new(), ground: Encoder::new(GROUND) };
-        bench.run(0.2);
+        bench.run(0.5);
         bench
     }
 
@@ -80,8 +81,7 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_kept() {
-    let total: f64 =
-        VehicleEndpoint::new().streams.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum();
+    let total: f64 = Streams::standard().bytes_s();
     assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
     let mut bench = Bench::new();
     let sent = bench.run(10.0);
@@ -197,15 +197,98 @@ fn intervals_can_be_set_within_the_budget_and_read_back() {
 #[test]
 fn every_phase_has_a_name_for_other_people_s_clients() {
     let mut bench = Bench::new();
-    bench.ask(512, AVAILABLE_MODES_DATA::ID as f32, 0.0);
-    let names: Vec<String> = telemetry::available_modes()
-        .filter_map(|message| match message {
-            MavMessage::AVAILABLE_MODES(mode) => mode.mode_name.to_str().ok().map(str::to_owned),
+    let request = CommandRequest {
+        source: GROUND,
+        target: VEHICLE,
+        command: 512,
+        params: [AVAILABLE_MODES_DATA::ID as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        confirmation: 0,
+    };
+    bench.endpoint.on_command(&request, &mut bench.vehicle);
+    // A second request while the first still waits for room is put off, not queued without end.
+    for _ in 0..3 {
+        bench.endpoint.on_command(&request, &mut bench.vehicle);
+    }
+    let sent = bench.run(2.0);
+    let answers: Vec<_> =
+        sent.iter().filter_map(CommandAnswer::from_frame).map(|answer| answer.result).collect();
+    assert_eq!(answers, [0, 0, 1, 1]);
+    let names: Vec<String> = sent
+        .iter()
+        .filter_map(|frame| match frame.decode() {
+            Ok(MavMessage::AVAILABLE_MODES(mode)) => mode.mode_name.to_str().ok().map(str::to_owned),
             _ => None,
         })
+        .take(Phase::ALL.len())
         .collect();
     assert_eq!(names.len(), Phase::ALL.len());
     assert_eq!(names[9], "POWERED");
+}
+
+#[test]
+fn a_stream_that_was_slowed_comes_back_at_once_and_vital_ones_are_not_slowed() {
+    let mut bench = Bench::new();
+    let attitude = ATTITUDE_QUATERNION_DATA::ID as f32;
+    assert_eq!(bench.ask(511, attitude, 60e6).0, 0);
+    assert!(count(&bench.run(5.0), ATTITUDE_QUATERNION_DATA::ID) <= 1);
+    assert_eq!(bench.ask(511, attitude, 0.0).0, 0);
+    assert!(count(&bench.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 19);
+    for (vital, interval_us) in [(HEARTBEAT_DATA::ID, -1.0), (TD_FLIGHT_STATUS_DATA::ID, 2e6)] {
+        assert_eq!(bench.ask(511, vital as f32, interval_us).0, MavResult::MAV_RESULT_DENIED as u8);
+    }
+    assert_eq!(bench.ask(511, attitude, f32::INFINITY).0, MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(bench.ask(511, f32::NAN, -1.0).0, MavResult::MAV_RESULT_DENIED as u8);
+}
+
+#[test]
+fn a_flood_of_requests_does_not_silence_telemetry() {
+    let mut bench = Bench::new();
+    for _ in 0..200 {
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: 512,
+            params: [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            confirmation: 0,
+        };
+        bench.endpoint.on_command(&request, &mut bench.vehicle);
+    }
+    bench.run(2.0);
+    assert!(count(&bench.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 18);
+}
+
+#[test]
+fn a_new_phase_is_told_at_once_and_once() {
+    let mut bench = Bench::new();
+    bench.run(1.03);
+    bench.vehicle.request(crate::vehicle::Request::Arm);
+    let sent = bench.run(0.1);
+    assert_eq!(count(&sent, HEARTBEAT_DATA::ID), 1);
+    assert_eq!(count(&sent, TD_FLIGHT_STATUS_DATA::ID), 1);
+}
+
+#[test]
+fn a_newcomer_is_told_the_limits() {
+    let mut bench = Bench::new();
+    bench.run(1.0);
+    let beat = bench.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    bench.endpoint.on_frame(&beat, &mut bench.vehicle);
+    let limits = bench.run(0.1).iter().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => Some(limits),
+        _ => None,
+    });
+    assert!((limits.unwrap().u_m_s - 0.4).abs() < 1e-6);
+}
+
+#[test]
+fn time_is_told_to_those_who_ask_this_vehicle() {
+    let mut bench = Bench::new();
+    for (target_system, answered) in [(0, true), (1, true), (2, false)] {
+        let sync = TIMESYNC_DATA { ts1: 77, target_system, ..TIMESYNC_DATA::default() };
+        let frame = bench.ground.encode(&MavMessage::TIMESYNC(sync));
+        bench.endpoint.on_frame(&frame, &mut bench.vehicle);
+        assert_eq!(count(&bench.run(0.1), TIMESYNC_DATA::ID) == 1, answered, "target {target_system}");
+    }
 }
 
 proptest! {
@@ -225,5 +308,8 @@ proptest! {
         }
         let beats = count(&bench.run(2.0), HEARTBEAT_DATA::ID);
         prop_assert!(beats >= 1);
+        // None of these payloads is the arm command with exactly 1: nothing was armed or started.
+        prop_assert!(!bench.vehicle.mode().interlocks.armed);
+        prop_assert!(bench.vehicle.phase() == Phase::PadIdle);
     }
 }

@@ -32,9 +32,10 @@ impl Links {
         let mut frames = Vec::new();
         for (transport, framer, name) in &mut self.open {
             while let Some(received) = transport.try_receive() {
-                let datagram = matches!(received, Received::Datagram(_));
                 match received {
-                    Received::Datagram(bytes) | Received::Stream(bytes) => framer.push(&bytes),
+                    Received::Datagram(bytes) => framer.push_datagram(&bytes),
+                    Received::Stream(bytes) => framer.push(&bytes),
+                    Received::Silence => framer.on_silence(),
                     Received::Up(peer) => {
                         note(self.recorder.as_ref(), time_s, &format!("link {name} up: {peer}"));
                     }
@@ -46,9 +47,6 @@ impl Links {
                     record_raw(self.recorder.as_ref(), Direction::Rx, name, frame.as_bytes(), time_s);
                     frames.push(frame);
                 }
-                if datagram {
-                    framer.end_of_datagram();
-                }
             }
         }
         frames
@@ -56,9 +54,16 @@ impl Links {
 
     pub(super) fn send(&mut self, bytes: &[u8], time_s: f64) {
         for (transport, _, name) in &self.open {
-            transport.sender().send(bytes.to_vec());
-            self.tx_bytes += bytes.len() as u64;
-            record_raw(self.recorder.as_ref(), Direction::Tx, name, bytes, time_s);
+            // What found no room was not sent, and the log must not say so.
+            if transport.sender().send(bytes.to_vec()) {
+                self.tx_bytes += bytes.len() as u64;
+                record_raw(self.recorder.as_ref(), Direction::Tx, name, bytes, time_s);
+            }
         }
+    }
+
+    /// Frames that found no room on their link.
+    pub(super) fn dropped(&self) -> u64 {
+        self.open.iter().map(|(transport, ..)| transport.sender().dropped()).sum()
     }
 }

@@ -7,6 +7,8 @@ mod recording;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use flight::phase::Phase;
 use flight::profile::{BUILTIN, Profile, ProfileError};
@@ -19,7 +21,7 @@ use tokio::sync::watch;
 use self::autopilot::AutoPilot;
 use self::links::Links;
 use self::pace::Pace;
-use self::recording::{log_state, record};
+use self::recording::{log_state, nanoseconds, note, record};
 use crate::endpoint::VehicleEndpoint;
 use crate::plant::Impact;
 use crate::scatter::draw;
@@ -67,6 +69,28 @@ pub struct FlyOptions {
     pub exit_when_safed: bool,
     /// What a late controller output leads to.
     pub deadline_policy: DeadlinePolicy,
+    /// Told the vehicle's time every frame, for others who write into the same log.
+    pub log_clock: Option<LogClock>,
+}
+
+/// The vehicle's time as its log counts it: one log has one clock, however fast the simulation runs.
+#[derive(Debug, Clone, Default)]
+pub struct LogClock(Arc<AtomicU64>);
+
+impl LogClock {
+    /// A clock at nought.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Time since the vehicle's power-up, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    fn set(&self, time_ns: u64) {
+        self.0.store(time_ns, Ordering::Relaxed);
+    }
 }
 
 /// Why a flight could not be run.
@@ -199,6 +223,7 @@ pub async fn fly_observed(
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
+    let mut dropped = 0;
 
     let stopped = loop {
         if vehicle.time_s() >= log_state_due_s {
@@ -212,6 +237,9 @@ pub async fn fly_observed(
         let stopwatch = pace.clock();
         let events = vehicle.advance_frame(&mut || stopwatch.elapsed());
         let time_s = vehicle.time_s();
+        if let Some(clock) = &options.log_clock {
+            clock.set(nanoseconds(time_s));
+        }
         for event in &events {
             endpoint.on_event(event);
             observe(time_s, event);
@@ -225,6 +253,10 @@ pub async fn fly_observed(
         }
         for frame in endpoint.poll(&snapshot) {
             links.send(frame.as_bytes(), time_s);
+        }
+        if links.dropped() > dropped {
+            dropped = links.dropped();
+            note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
         let over = vehicle.is_over() || pilot.refused.is_some();
         if over && options.exit_when_safed && pace.has_lingered(!options.links.is_empty()) {
@@ -242,10 +274,11 @@ pub async fn fly_observed(
     };
     let verdict = vehicle.verdict().copied();
     let outcome = match (&verdict, pilot.refused) {
-        (Some((_, verdict)), _) if verdict.landed() && !vehicle.aborted() => Outcome::Landed,
+        // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
+        _ if vehicle.aborted() => Outcome::Aborted,
+        (Some((_, verdict)), _) if verdict.landed() => Outcome::Landed,
         (Some(_), _) => Outcome::OutsideLimits,
         (None, Some(reason)) => Outcome::Refused(reason),
-        (None, None) if vehicle.aborted() => Outcome::Aborted,
         (None, None) => {
             debug_assert!(stopped, "a flight that is over has a verdict, a refusal or an abort");
             Outcome::Stopped

@@ -9,7 +9,7 @@ use protocol::log::v1;
 
 use crate::vehicle::{LogState, Severity, Snapshot, VehicleEvent};
 
-fn nanoseconds(time_s: f64) -> u64 {
+pub(super) fn nanoseconds(time_s: f64) -> u64 {
     (1e9 * time_s) as u64
 }
 

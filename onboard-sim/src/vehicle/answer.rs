@@ -55,7 +55,8 @@ impl Vehicle {
             Request::Arm => locks.armed && self.mode.phase == Phase::PadArmed,
             Request::Disarm => !locks.armed && matches!(self.mode.phase, Phase::PadIdle | Phase::Safed),
             Request::Start => locks.armed && self.mode.countdown_end_s.is_some(),
-            Request::Abort => locks.abort_latched,
+            // Repeated, an abort may mean more than the first time: the phase table decides.
+            Request::Abort => false,
         };
         if already {
             return Answer::accepted();
@@ -68,7 +69,7 @@ impl Vehicle {
             Request::Abort => self.abort_event(),
         };
         match self.happen(event) {
-            None => Answer::accepted(),
+            None | Some(Refusal::AlreadyAborted) => Answer::accepted(),
             Some(refusal) => {
                 let reason = match refusal {
                     Refusal::ChecksFailed => {

@@ -2,15 +2,16 @@
 
 use std::time::Duration;
 
-use flight::arming;
-use flight::controller::{self, ControllerInput};
+use flight::arming::Check;
+use flight::controller::{self, ControlLevel, ControllerInput};
 use flight::dynamics::PlanarParams;
 use flight::phase::{Event, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
 use flight::thrust_estimate::ThrustSample;
 use flight::verdict::LandingVerdict;
 
 use super::{
-    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
+    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, SELF_TEST_LIMIT_S, SELF_TEST_RAD, SelfTest, Severity,
+    THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
 };
 use crate::plant::Impact;
 
@@ -31,41 +32,87 @@ impl Vehicle {
     /// The part that falls on a controller sample: actuators first, then phases, then the controller.
     fn run_sample(&mut self, stopwatch: &mut dyn FnMut() -> Duration) {
         let time_s = self.time_s();
-        self.gimbal_applied_rad = self.next_gimbal_rad;
-        self.plant.command(self.gimbal_applied_rad, self.fin_command_rad);
+        if self.mode.phase != Phase::Safe {
+            self.gimbal_applied_rad = self.next_gimbal_rad;
+            self.plant.command(self.gimbal_applied_rad, self.fin_command_rad);
+        }
 
         if self.mode.phase == Phase::Safe {
-            self.happen(Event::SelfTestPassed);
+            self.test_itself(time_s);
         }
         if self.mode.countdown_remaining_s(time_s).is_some_and(|left_s| left_s <= 0.0)
             && self.happen(Event::ReleasedAt(StartPoint::Ignition)).is_none()
         {
             self.plant.release(self.draw.release);
         }
+        let sample = self.frame / self.frames_per_sample;
+        if self.controller_is_due(sample) {
+            self.run_controller(sample, stopwatch);
+        }
+        // After the controller: the gate judges a plan from where the vehicle is now, not a rehearsal.
         if self.mode.phase == Phase::LandArmed {
             self.evaluate_gate();
         }
-        let rehearsing = self.mode.phase.on_pad();
-        let samples_between = if rehearsing {
-            (REHEARSAL_PERIOD_S / self.profile.nmpc.sample_time_s).round() as u64
-        } else {
-            1
-        };
-        let sample = self.frame / self.frames_per_sample;
-        if self.mode.phase != Phase::Safed && sample.is_multiple_of(samples_between.max(1)) {
-            self.run_controller(sample, stopwatch);
+    }
+
+    /// Every sample in flight; on the pad when there is no rehearsal yet and then once in a while.
+    fn controller_is_due(&self, sample: u64) -> bool {
+        let between = (REHEARSAL_PERIOD_S / self.profile.nmpc.sample_time_s).round().max(1.0) as u64;
+        match self.mode.phase {
+            Phase::Safed => false,
+            phase if phase.on_pad() => {
+                let rehearsed =
+                    self.output.as_ref().is_some_and(|output| output.level == ControlLevel::Rehearsal);
+                sample.is_multiple_of(between) || (phase != Phase::Safe && !rehearsed)
+            }
+            _ => true,
+        }
+    }
+
+    /// Moves every actuator and brings it back.
+    fn test_itself(&mut self, time_s: f64) {
+        let closed_rad = self.profile.fins.closed_rad();
+        match self.self_test {
+            SelfTest::NotBegun => {
+                self.plant.command(SELF_TEST_RAD, [closed_rad + SELF_TEST_RAD; 4]);
+                self.self_test = SelfTest::Moved;
+            }
+            SelfTest::Moved if self.actuators_answer() => {
+                self.plant.command(0.0, [closed_rad; 4]);
+                self.self_test = SelfTest::BroughtBack;
+            }
+            SelfTest::BroughtBack if self.actuators_answer() => {
+                self.happen(Event::SelfTestPassed);
+            }
+            SelfTest::Moved | SelfTest::BroughtBack if time_s > SELF_TEST_LIMIT_S => {
+                let fins = self.fins_answering().iter().filter(|answers| **answers).count();
+                self.say(
+                    Severity::Error,
+                    format!("self-test failed: an actuator does not answer ({fins} of 4 fins do)"),
+                );
+                self.self_test = SelfTest::Failed;
+            }
+            SelfTest::Moved | SelfTest::BroughtBack | SelfTest::Failed => {}
         }
     }
 
     fn evaluate_gate(&mut self) {
         let checks = self.gate_checks();
-        let open = arming::all_passed(&checks);
-        if let Some(reason) = arming::first_refusal(&checks) {
+        let failing = checks.iter().find(|check| !check.passed);
+        let open = failing.is_none();
+        // Said when the reason changes, not ten times a second over a radio.
+        let complaint = failing.map(|check| check.name);
+        if complaint != self.gate_complaint
+            && let Some(reason) = failing.and_then(Check::refusal)
+        {
             self.say(Severity::Critical, format!("ignition gate closed: {reason}"));
         }
-        if let Some(refusal) = self.happen(Event::IgnitionGate { open }) {
+        if let Some(refusal) = self.happen(Event::IgnitionGate { open })
+            && complaint != self.gate_complaint
+        {
             self.say(Severity::Critical, format!("no ignition: {}", refusal.reason()));
         }
+        self.gate_complaint = complaint;
     }
 
     fn run_controller(&mut self, sample: u64, stopwatch: &mut dyn FnMut() -> Duration) {
@@ -122,8 +169,9 @@ impl Vehicle {
         let time_s = self.time_s();
         self.weigh_the_motor(time_s);
         let in_phase_s = time_s - self.mode.entered_at_s;
+        let thrust_confirmed = self.thrust_is_confirmed(time_s);
         match self.mode.phase {
-            Phase::Ignition if self.plant.thrust_n() > 0.0 && in_phase_s >= THRUST_CONFIRM_S => {
+            Phase::Ignition if thrust_confirmed => {
                 self.happen(Event::ThrustConfirmed);
             }
             Phase::Ignition
@@ -149,6 +197,17 @@ impl Vehicle {
                 self.judge();
             }
         }
+    }
+
+    /// Whether the accelerometer, since ignition, has felt at least half the nominal thrust for long enough.
+    fn thrust_is_confirmed(&mut self, time_s: f64) -> bool {
+        let half_m_s2 = 0.5 * self.profile.motor.thrust_n / self.profile.vehicle.mass_kg;
+        let lit = self.mode.phase == Phase::Ignition && !self.plant.in_contact();
+        if !lit || self.plant.axial_specific_force_m_s2() < half_m_s2 {
+            self.thrust_felt_since_s = None;
+            return false;
+        }
+        time_s - *self.thrust_felt_since_s.get_or_insert(time_s) >= THRUST_CONFIRM_S
     }
 
     /// Learns the motor's strength, once thrust is confirmed and until contact.

@@ -33,6 +33,12 @@ use crate::scatter::Draw;
 const FRAME_MIN_S: f64 = 0.02;
 /// The landing is rehearsed this often while the vehicle waits on the pad.
 const REHEARSAL_PERIOD_S: f64 = 1.0;
+/// Fins and gimbal are moved by this much in the self-test.
+const SELF_TEST_RAD: f64 = 0.05;
+/// An actuator that is farther than this from its command does not answer.
+const ANSWERING_RAD: f64 = 0.02;
+/// The self-test has failed if it has not passed by then.
+const SELF_TEST_LIMIT_S: f64 = 3.0;
 /// Thrust is believed once it has been sensed for this long: one spike is not a burning motor.
 const THRUST_CONFIRM_S: f64 = 0.04;
 /// Time on the ground before everything is shut down.
@@ -80,6 +86,15 @@ pub enum DeadlinePolicy {
     Enforce,
 }
 
+/// How far the self-test has come: every actuator is moved and brought back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SelfTest {
+    NotBegun,
+    Moved,
+    BroughtBack,
+    Failed,
+}
+
 /// One vehicle, one flight.
 pub struct Vehicle {
     profile: Profile,
@@ -98,6 +113,11 @@ pub struct Vehicle {
     output: Option<ControllerOutput>,
     solve_time_s: f64,
     thrust: ThrustEstimate,
+    self_test: SelfTest,
+    /// Since when thrust has been felt without a break.
+    thrust_felt_since_s: Option<f64>,
+    /// The gate check that was last complained of.
+    gate_complaint: Option<&'static str>,
     /// The command that the actuators get at the next sample.
     next_gimbal_rad: f64,
     gimbal_applied_rad: f64,
@@ -149,6 +169,9 @@ impl Vehicle {
             output: None,
             solve_time_s: 0.0,
             thrust: ThrustEstimate::default(),
+            self_test: SelfTest::NotBegun,
+            thrust_felt_since_s: None,
+            gate_complaint: None,
             next_gimbal_rad: 0.0,
             gimbal_applied_rad: 0.0,
             fin_command_rad: [profile.fins.closed_rad(); 4],
@@ -198,8 +221,14 @@ impl Vehicle {
         self.mode.interlocks.abort_latched
     }
 
-    /// Tells the vehicle how its log fares.
+    /// Tells the vehicle how its log fares; a log that stops is announced.
     pub fn set_log_state(&mut self, log: LogState) {
+        if self.log.running && !log.running {
+            self.say(
+                Severity::Error,
+                "the log has stopped: this flight is no longer recorded whole".to_owned(),
+            );
+        }
         self.log = log;
     }
 
@@ -265,9 +294,15 @@ impl Vehicle {
         gate_checks(&self.profile.gate, &input)
     }
 
-    /// Fins whose actual angle follows the commanded one, or is on its way at full rate.
+    /// Fins that have come to their commanded angle.
     fn fins_answering(&self) -> [bool; 4] {
         let (commanded, actual) = self.plant.fins_rad();
-        std::array::from_fn(|fin| commanded[fin].is_finite() && actual[fin].is_finite())
+        std::array::from_fn(|fin| (commanded[fin] - actual[fin]).abs() <= ANSWERING_RAD)
+    }
+
+    /// Whether gimbal and fins have come to their commanded angles.
+    fn actuators_answer(&self) -> bool {
+        let (commanded, actual) = self.plant.gimbal_rad();
+        (commanded - actual).abs() <= ANSWERING_RAD && self.fins_answering() == [true; 4]
     }
 }

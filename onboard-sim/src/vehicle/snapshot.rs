@@ -3,7 +3,7 @@
 use flight::controller::ControllerOutput;
 use flight::dynamics::PlanarState;
 use flight::phase::{Effect, Interlocks, Phase, transition};
-use flight::verdict::LandingVerdict;
+use flight::verdict::{LandingVerdict, TouchdownLimits};
 
 use super::Vehicle;
 use crate::plant::Impact;
@@ -64,6 +64,10 @@ pub struct Snapshot {
     pub deadline_s: f64,
     /// Estimated thrust over nominal.
     pub thrust_scale: f64,
+    /// What counts as a landing.
+    pub limits: TouchdownLimits,
+    /// Mechanical stop of the gimbal on either side, rad.
+    pub gimbal_limit_rad: f64,
     /// Limits that the end of the plan violates, one bit each in the verdict's order.
     pub predicted_violations: u16,
     /// The verdict, once touched down.
@@ -102,6 +106,8 @@ impl Vehicle {
             solve_time_s: self.solve_time_s,
             deadline_s: self.profile.nmpc.sample_time_s,
             thrust_scale: self.thrust.scale(),
+            limits: self.limits,
+            gimbal_limit_rad: self.profile.gimbal.limit_rad(),
             predicted_violations: planned.map_or(0, |output| {
                 let verdict = LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state);
                 violations(&verdict)

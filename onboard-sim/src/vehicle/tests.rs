@@ -85,7 +85,8 @@ fn ticks_are_numbered_without_gaps_and_fall_on_samples_since_ignition() {
     for pair in ticks.windows(2) {
         assert_eq!(pair[1].tick, pair[0].tick + 1);
     }
-    let powered: Vec<_> = ticks.iter().filter(|tick| tick.phase.in_landing_burn()).collect();
+    // The gate opens on the plan of the first tick, which therefore still belongs to the phase before.
+    let powered: Vec<_> = ticks.iter().filter(|tick| tick.phase.is_landing()).collect();
     assert!(powered.len() >= 50, "{}", powered.len());
     for (k, tick) in powered.iter().enumerate() {
         assert!((tick.time_since_ignition_s - 0.1 * k as f64).abs() < 1e-9);
@@ -232,6 +233,54 @@ fn a_gate_that_does_not_open_lights_nothing() {
         matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("ignition gate closed: tilt"))
     });
     assert!(gate_words);
+}
+
+/// The motor cannot be cut off: it is lit only on a plan from where the vehicle really is, not on a rehearsal.
+#[test]
+fn a_release_that_no_plan_lands_from_lights_nothing() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    for (altitude_m, w_m_s) in [(6.0, 0.0), (40.0, 0.0), (15.0, 30.0)] {
+        let mut truth = draw(&profile, 1);
+        truth.release.z_m = altitude_m;
+        truth.release.w_m_s = w_m_s;
+        profile.gate.speed_error_max_fraction = 100.0;
+        let mut vehicle = Vehicle::new(&profile, truth, DeadlinePolicy::Observe).unwrap();
+        vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+        vehicle.pull_pin();
+        run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+        assert_eq!(vehicle.request(Request::Arm).result, Result::Accepted);
+        vehicle.request(Request::Start);
+        let events = run_until(&mut vehicle, Vehicle::is_over);
+        assert!(!phases(&events).contains(&Phase::Ignition), "{altitude_m} m, {w_m_s} m/s");
+        let said = |event: &&VehicleEvent| matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("ignition gate closed"));
+        let complaints = events.iter().filter(said).count();
+        assert!((1..=4).contains(&complaints), "said when it changes, not every sample: {complaints}");
+    }
+}
+
+#[test]
+fn an_actuator_that_does_not_move_fails_the_self_test() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    profile.fins.rate_limit_deg_s = 1e-6;
+    let mut vehicle = vehicle_of(&profile);
+    let mut events = Vec::new();
+    for _ in 0..300 {
+        events.extend(vehicle.advance_frame(&mut still()));
+    }
+    assert_eq!(vehicle.phase(), Phase::Safe);
+    assert!(events.iter().any(|event| {
+        matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("self-test failed"))
+    }));
+}
+
+#[test]
+fn a_log_that_stops_in_flight_is_announced() {
+    let mut vehicle = in_phase(Phase::Powered);
+    vehicle.set_log_state(LogState { running: false, space_bytes: 0 });
+    let events = vehicle.advance_frame(&mut still());
+    assert!(events.iter().any(|event| {
+        matches!(event, VehicleEvent::Text { severity: Severity::Error, text } if text.contains("log has stopped"))
+    }));
 }
 
 #[test]

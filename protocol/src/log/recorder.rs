@@ -1,9 +1,9 @@
 //! A thread that writes a log file, so that neither the control loop nor the screen waits for a disk.
 //!
 //! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can wait);
-//! [`Recorder::try_record`] never waits and counts what did not fit. The open chunk is ended and synced
-//! to the disk at least every 200 ms and at every [`Recorder::sync_soon`]: a killed process loses no
-//! more than that.
+//! [`Recorder::try_record`] never waits and counts what did not fit. The open chunk is ended and handed to
+//! the system at least every 200 ms and at every [`Recorder::sync_soon`], so a killed process loses no more
+//! than that; a second thread puts it on the disk, so that a slow disk does not stretch the 200 ms.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -87,10 +87,21 @@ impl Recorder {
             thread: Mutex::new(None),
         });
         let for_thread = Arc::clone(&shared);
+        let (sync_wanted, wishes) = sync_channel::<()>(1);
+        let syncing = disk.try_clone().map_err(create_error)?;
+        std::thread::Builder::new()
+            .name("log sync".to_owned())
+            .spawn(move || {
+                while wishes.recv().is_ok() {
+                    // A disk that fails shows in the writes and in the last sync, which are looked at.
+                    let _ = syncing.sync_data();
+                }
+            })
+            .map_err(create_error)?;
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
-                let ended = write_until_finished(writer, &disk, &inbox);
+                let ended = write_until_finished(writer, &disk, &inbox, &sync_wanted);
                 for_thread.failed.store(ended.is_err(), Ordering::Release);
                 ended
             })
@@ -161,6 +172,7 @@ fn write_until_finished(
     mut writer: LogWriter<BufWriter<File>>,
     disk: &File,
     inbox: &Receiver<Order>,
+    sync_wanted: &SyncSender<()>,
 ) -> Result<(), LogWriteError> {
     let mut flush_due: Option<Instant> = None;
     loop {
@@ -174,12 +186,12 @@ fn write_until_finished(
                 let due = *flush_due.get_or_insert_with(|| Instant::now() + FLUSH_INTERVAL);
                 // Under a steady stream the receive never times out.
                 if Instant::now() >= due {
-                    sync(&mut writer, disk)?;
+                    hand_over(&mut writer, sync_wanted)?;
                     flush_due = None;
                 }
             }
             Ok(Order::SyncSoon) | Err(RecvTimeoutError::Timeout) => {
-                sync(&mut writer, disk)?;
+                hand_over(&mut writer, sync_wanted)?;
                 flush_due = None;
             }
             Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
@@ -191,8 +203,14 @@ fn write_until_finished(
     }
 }
 
-fn sync(writer: &mut LogWriter<BufWriter<File>>, disk: &File) -> Result<(), LogWriteError> {
+/// Hands everything to the system, which keeps it whatever becomes of this process, and asks for it to be put on
+/// the disk, which may take longer than the next flush can wait.
+fn hand_over(
+    writer: &mut LogWriter<BufWriter<File>>,
+    sync_wanted: &SyncSender<()>,
+) -> Result<(), LogWriteError> {
     writer.flush()?;
-    disk.sync_data().map_err(mcap::McapError::from)?;
+    // Full means that a sync is wanted already.
+    let _ = sync_wanted.try_send(());
     Ok(())
 }

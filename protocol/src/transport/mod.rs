@@ -25,6 +25,8 @@ pub enum Received {
     Datagram(Vec<u8>),
     /// A piece of a stream.
     Stream(Vec<u8>),
+    /// The stream has paused for longer than a frame may: what is incomplete will stay so.
+    Silence,
     /// The link works; says with whom.
     Up(String),
     /// The link does not work; says why. It is tried again.
@@ -47,11 +49,13 @@ pub struct TransportSender {
 }
 
 impl TransportSender {
-    /// Queues bytes; drops and counts them if the link is too slow to take them.
-    pub fn send(&self, bytes: Vec<u8>) {
-        if self.queue.try_send(bytes).is_err() {
+    /// Queues bytes; says whether there was room. A link that is too slow to take them drops and counts them.
+    pub fn send(&self, bytes: Vec<u8>) -> bool {
+        let queued = self.queue.try_send(bytes).is_ok();
+        if !queued {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
+        queued
     }
 
     /// Writes that found no room.

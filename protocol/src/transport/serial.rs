@@ -2,13 +2,15 @@
 
 use std::time::Duration;
 
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, ReadHalf, WriteHalf};
 use tokio::sync::mpsc::{Receiver, Sender};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
 use super::Received;
 
 const REOPEN_AFTER: Duration = Duration::from_millis(500);
+/// A pause longer than any within a frame: at 9,600 baud the longest frame takes 0.3 s, but without pauses.
+const SILENCE: Duration = Duration::from_millis(100);
 
 pub(super) fn open(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
     tokio::spawn(run(path, baud, inbox, outbox));
@@ -46,26 +48,45 @@ async fn run(path: String, baud: u32, inbox: Sender<Received>, mut outbox: Recei
     }
 }
 
-/// Carries bytes until the line fails (says why) or nobody wants it any more (`None`).
+/// Carries bytes until the line fails (says why) or nobody wants it any more (`None`). Reading and writing do
+/// not wait for each other: a line that takes nothing must still deliver an abort.
 async fn carry(
     port: SerialStream,
     inbox: &Sender<Received>,
     outbox: &mut Receiver<Vec<u8>>,
 ) -> Option<String> {
-    let (mut reader, mut writer) = tokio::io::split(port);
+    let (reader, writer) = tokio::io::split(port);
+    tokio::select! {
+        ended = read_all(reader, inbox) => ended,
+        ended = write_all(writer, outbox) => ended,
+    }
+}
+
+async fn read_all(mut reader: ReadHalf<SerialStream>, inbox: &Sender<Received>) -> Option<String> {
     let mut buffer = [0; 1024];
+    let mut in_burst = false;
     loop {
-        tokio::select! {
-            count = reader.read(&mut buffer) => match count {
-                Ok(0) => return Some("the line was closed".to_owned()),
-                Ok(count) => inbox.send(Received::Stream(buffer[..count].to_vec())).await.ok()?,
-                Err(error) => return Some(error.to_string()),
-            },
-            bytes = outbox.recv() => {
-                if let Err(error) = writer.write_all(&bytes?).await {
-                    return Some(error.to_string());
+        let count = match tokio::time::timeout(SILENCE, reader.read(&mut buffer)).await {
+            Ok(Ok(0)) => return Some("the line was closed".to_owned()),
+            Ok(Ok(count)) => count,
+            Ok(Err(error)) => return Some(error.to_string()),
+            Err(_elapsed) => {
+                // Said once a burst, not ten times a second.
+                if std::mem::take(&mut in_burst) {
+                    inbox.send(Received::Silence).await.ok()?;
                 }
+                continue;
             }
+        };
+        in_burst = true;
+        inbox.send(Received::Stream(buffer[..count].to_vec())).await.ok()?;
+    }
+}
+
+async fn write_all(mut writer: WriteHalf<SerialStream>, outbox: &mut Receiver<Vec<u8>>) -> Option<String> {
+    loop {
+        if let Err(error) = writer.write_all(&outbox.recv().await?).await {
+            return Some(error.to_string());
         }
     }
 }

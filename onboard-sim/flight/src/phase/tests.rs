@@ -68,7 +68,7 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
         (P::PadArmed, E::PinInserted | E::DisarmRequested) => (P::PadIdle, &[Disarm]),
         (P::PadIdle, E::ArmRequested { checks_passed: true }) => (P::PadArmed, &[]),
         (P::PadArmed, E::StartRequested { .. }) => (P::PadArmed, &[StartCountdown]),
-        (P::PadArmed, E::LiftOff) => (P::Boost, &[]),
+        (P::PadArmed | P::Boost, E::LiftOff) => (P::Boost, &[]),
         (P::Boost, E::Burnout) => (P::Coast, &[]),
         (P::Powered, E::Burnout) => (P::Powered, &[]),
         (P::Boost | P::Coast, E::Apogee) => (P::Deploy, &[FinsOpen]),
@@ -312,9 +312,13 @@ proptest! {
         events in prop::collection::vec(likely_event(), 0..60),
     ) {
         let mut mode = Mode::power_up(0.0);
-        let mut lit = 0;
+        let (mut lit, mut ascents) = (0, 0);
         for (second, event) in events.into_iter().enumerate() {
             let answer = transition(&mode, event, second as f64);
+            if answer.effects.contains(Effect::IgniteAscentMotor) {
+                ascents += 1;
+                prop_assert!(ascents == 1 && mode.interlocks.armed && answer.mode.phase == Phase::Boost);
+            }
             if answer.effects.contains(Effect::IgniteLandingMotor) {
                 lit += 1;
                 let locks = mode.interlocks;

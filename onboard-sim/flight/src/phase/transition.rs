@@ -40,6 +40,7 @@ pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
     clippy::match_same_arms,
     reason = "rows of different phases stay apart even where they say the same"
 )]
+#[expect(clippy::too_many_lines, reason = "one table, read as one")]
 fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
     use Event as E;
     use Phase as P;
@@ -86,9 +87,12 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         },
         (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
 
-        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => {
-            Row::Go(Mode { countdown_end_s: None, ..*mode }, phase, Effects::of(&[Effect::IgniteAscentMotor]))
-        }
+        // From here on nobody approaches or disarms it: a motor that lights late is still a motor that lights.
+        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
+            Mode { countdown_end_s: None, ..*mode },
+            P::Boost,
+            Effects::of(&[Effect::IgniteAscentMotor]),
+        ),
         (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
         }
@@ -103,8 +107,12 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),
 
         // Ascent.
-        (P::PadArmed, E::LiftOff) => go(P::Boost),
-        (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED lifts off"),
+        // Also without a countdown: a vehicle that rises has to be flown.
+        (P::PadArmed, E::LiftOff) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Boost, Effects::NONE)
+        }
+        (P::Boost, E::LiftOff) => go(phase),
+        (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED and BOOST lift off"),
         (P::Boost, E::Burnout) => go(P::Coast),
         // The landing motor ended; contact decides what follows.
         (P::Powered, E::Burnout) => go(phase),

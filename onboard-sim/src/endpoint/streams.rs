@@ -1,0 +1,174 @@
+//! What is sent unasked, and how often.
+
+use mavlink::MessageData as _;
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
+    MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+};
+use protocol::identity::RADIO_BUDGET_BYTES_S;
+
+/// Bytes around a payload: header and checksum.
+const FRAME_OVERHEAD: usize = 12;
+/// Slowest interval that can be asked for, s.
+const MAX_INTERVAL_S: f64 = 60.0;
+
+/// A message that is sent by itself, with its longest payload and its default rate.
+pub(super) struct Standard {
+    pub(super) message_id: u32,
+    payload_len: usize,
+    pub(super) rate_hz: f64,
+}
+
+const fn standard(message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
+    Standard { message_id, payload_len, rate_hz }
+}
+
+/// What is sent unasked. In the order in which it is given up when the budget runs short: last first.
+pub(super) const STANDARD: [Standard; 14] = [
+    standard(HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
+    standard(TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
+    standard(TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
+    // Without its optional offset quaternion, which is never set and therefore cut.
+    standard(ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
+    standard(LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
+    standard(TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
+    standard(TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
+    standard(TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
+    standard(TD_TOUCHDOWN_PREDICTION_DATA::ID, TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN, 2.0),
+    standard(TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
+    standard(SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
+    standard(EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
+    standard(VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
+    standard(TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+];
+
+#[derive(Debug, Clone, Copy)]
+struct Stream {
+    message_id: u32,
+    payload_len: usize,
+    default_interval_s: f64,
+    /// `None`: switched off.
+    interval_s: Option<f64>,
+    due_s: f64,
+}
+
+impl Stream {
+    fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
+        interval_s.map_or(0.0, |interval_s| (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s)
+    }
+}
+
+/// Every stream, in the order of [`STANDARD`].
+pub(super) struct Streams(Vec<Stream>);
+
+impl Streams {
+    /// Every standard message at its default rate.
+    pub(super) fn standard() -> Self {
+        let streams = STANDARD.iter().enumerate().map(|(place, standard)| Stream {
+            message_id: standard.message_id,
+            payload_len: standard.payload_len,
+            default_interval_s: 1.0 / standard.rate_hz,
+            interval_s: Some(1.0 / standard.rate_hz),
+            // Spread, so that the slow ones do not all fall into the same instant.
+            due_s: 0.02 * place as f64,
+        });
+        Self(streams.collect())
+    }
+
+    /// The messages whose time has come, most important first.
+    pub(super) fn due(&self, now_s: f64) -> Vec<u32> {
+        let due = |stream: &&Stream| stream.interval_s.is_some() && now_s >= stream.due_s;
+        self.0.iter().filter(due).map(|stream| stream.message_id).collect()
+    }
+
+    /// A message was sent, or there was nothing to say in it.
+    pub(super) fn on_sent(&mut self, message_id: u32, now_s: f64) {
+        for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
+            let Some(interval_s) = stream.interval_s else { continue };
+            // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
+            // or held back is not sent twice.
+            let next_s = stream.due_s + interval_s;
+            stream.due_s = if next_s > now_s { next_s } else { now_s + interval_s };
+        }
+    }
+
+    /// Sends a message at the next opportunity.
+    pub(super) fn hurry(&mut self, message_id: u32) {
+        for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
+            stream.due_s = f64::NEG_INFINITY;
+        }
+    }
+
+    /// Bytes per second of all of them, at their longest.
+    #[cfg(test)]
+    pub(super) fn bytes_s(&self) -> f64 {
+        self.0.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
+    }
+
+    /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
+    pub(super) fn set_interval(
+        &mut self,
+        message_id: u32,
+        interval_us: f32,
+        now_s: f64,
+    ) -> (MavResult, Option<String>) {
+        let Some(place) = self.0.iter().position(|stream| stream.message_id == message_id) else {
+            return (
+                MavResult::MAV_RESULT_FAILED,
+                Some(format!("message {message_id} is not sent by this vehicle")),
+            );
+        };
+        let wanted = match interval_us {
+            -1.0 => None,
+            0.0 => Some(self.0[place].default_interval_s),
+            us if us >= 1.0 && f64::from(us) * 1e-6 <= MAX_INTERVAL_S => Some(f64::from(us) * 1e-6),
+            _ => {
+                let reason =
+                    format!("interval {interval_us} us: must be -1 (off), 0 (default) or 1 to 60000000");
+                return (MavResult::MAV_RESULT_DENIED, Some(reason));
+            }
+        };
+        let default_s = self.0[place].default_interval_s;
+        let vital = matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID);
+        if vital && wanted.is_none_or(|interval_s| interval_s > default_s) {
+            let reason = format!("message {message_id}: the crew lives by it; it is not slowed down");
+            return (MavResult::MAV_RESULT_DENIED, Some(reason));
+        }
+        let others: f64 = self
+            .0
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != place)
+            .map(|(_, stream)| stream.bytes_s(stream.interval_s))
+            .sum();
+        let total = others + self.0[place].bytes_s(wanted);
+        if wanted.is_some() && total > f64::from(RADIO_BUDGET_BYTES_S) {
+            let reason = format!(
+                "message {message_id}: {total:.0} B/s in all, the link's budget is {RADIO_BUDGET_BYTES_S}"
+            );
+            return (MavResult::MAV_RESULT_DENIED, Some(reason));
+        }
+        let stream = &mut self.0[place];
+        stream.interval_s = wanted;
+        // A new rate counts from now, also after a long interval.
+        if let Some(interval_s) = wanted {
+            stream.due_s = stream.due_s.min(now_s + interval_s);
+        }
+        (MavResult::MAV_RESULT_ACCEPTED, None)
+    }
+
+    /// MESSAGE_INTERVAL of a message.
+    pub(super) fn interval_of(&self, message_id: u32) -> MavMessage {
+        let stream = self.0.iter().find(|stream| stream.message_id == message_id);
+        let interval_us = match stream.map(|stream| stream.interval_s) {
+            Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
+            Some(None) => -1,
+            // As the standard has it: 0 means the message is not available.
+            None => 0,
+        };
+        let message_id = u16::try_from(message_id).unwrap_or(u16::MAX);
+        MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA { interval_us, message_id })
+    }
+}
