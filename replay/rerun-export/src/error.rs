@@ -1,0 +1,43 @@
+//! Why a log could not be exported.
+
+use std::path::PathBuf;
+
+use re_sdk::RecordingStreamError;
+use replay::log::LogError;
+
+/// Why a log could not be exported. Damage inside a log is not among the reasons.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The log cannot be used.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The recording's file is there already.
+    #[error("{}: is there already; --force overwrites it", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The recording would overwrite the log.
+    #[error("{}: is the log itself; name another file for the recording", path.display())]
+    IsTheLog {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The recording's file cannot be written.
+    #[error("{}: cannot be written", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Rerun cannot encode the recording or write it to its file.
+    #[error("the recording cannot be encoded or written: {reason}")]
+    Encode {
+        /// What Rerun said.
+        reason: String,
+    },
+    /// Rerun refuses a record.
+    #[error("the recording cannot take a record")]
+    Record(#[from] RecordingStreamError),
+}

@@ -1,0 +1,245 @@
+//! Numbers over time, with the limits they are held against.
+
+use std::collections::BTreeSet;
+
+use flight::controller::ControlLevel;
+use flight::phase::Phase;
+use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
+use re_sdk::{RecordingStream, RecordingStreamResult};
+use re_sdk_types::archetypes::{Scalars, SeriesLines, StateChange};
+use re_sdk_types::components::InterpolationMode;
+use re_sdk_types::datatypes::Rgba32;
+
+use crate::entity;
+use crate::pose::pitch_error_deg;
+use crate::times::{Instant, Times};
+
+const BLUE: Rgba32 = Rgba32::from_rgb(92, 170, 255);
+const ORANGE: Rgba32 = Rgba32::from_rgb(255, 176, 59);
+const GREEN: Rgba32 = Rgba32::from_rgb(120, 200, 130);
+const RED: Rgba32 = Rgba32::from_rgb(200, 70, 70);
+
+/// A plot: its name with its unit, as in its entity path, and its title.
+pub(crate) struct Plot {
+    pub(crate) name: &'static str,
+    pub(crate) title: &'static str,
+    /// A legend covers much of a plot; the colours mean the same in all of them.
+    pub(crate) legend: bool,
+}
+
+/// Every plot, in the order of the layout.
+pub(crate) const PLOTS: [Plot; 10] = [
+    Plot { name: "altitude_m", title: "Altitude, m", legend: true },
+    Plot { name: "x_m", title: "Horizontal position, m", legend: false },
+    Plot { name: "u_m_s", title: "Axial velocity u, m/s", legend: false },
+    Plot { name: "w_m_s", title: "Lateral velocity w, m/s", legend: false },
+    Plot { name: "pitch_error_deg", title: "Pitch from upright, deg", legend: false },
+    Plot { name: "q_deg_s", title: "Pitch rate q, deg/s", legend: false },
+    Plot { name: "gimbal_deg", title: "Gimbal, deg", legend: true },
+    Plot { name: "solve_time_ms", title: "Solve time, ms", legend: false },
+    Plot { name: "iterations", title: "Newton iterations", legend: false },
+    Plot { name: "level", title: "Control level (0 idle, 2 converged, 5 stabiliser)", legend: false },
+];
+
+/// Whose number it is, or what else a line shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Line {
+    Truth,
+    Estimate,
+    Telemetry,
+    Commanded,
+    Actual,
+    Measured,
+    Deadline,
+    Lowest,
+    Highest,
+}
+
+impl Line {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Truth => "true",
+            Self::Estimate => "estimated",
+            Self::Telemetry => "telemetry",
+            Self::Commanded => "commanded",
+            Self::Actual => "actual",
+            Self::Measured => "controller",
+            Self::Deadline => "deadline",
+            Self::Lowest => "limit_low",
+            Self::Highest => "limit_high",
+        }
+    }
+
+    fn style(self) -> SeriesLines {
+        let (color, width) = match self {
+            Self::Truth | Self::Actual | Self::Measured => (BLUE, 1.5),
+            Self::Estimate | Self::Commanded => (ORANGE, 1.0),
+            Self::Telemetry => (GREEN, 1.0),
+            Self::Deadline | Self::Lowest | Self::Highest => (RED, 0.75),
+        };
+        let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([self.name()]);
+        // What a tick decides holds until the next one.
+        let steps = matches!(self, Self::Commanded | Self::Measured);
+        if steps { style.with_interpolation_mode(InterpolationMode::StepAfter) } else { style }
+    }
+}
+
+/// A range that a plot's number should stay in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlotLimit {
+    /// The plot's name.
+    pub(crate) plot: &'static str,
+    /// Lowest value, in the plot's unit.
+    pub(crate) lowest: f64,
+    /// Highest value, in the plot's unit.
+    pub(crate) highest: f64,
+}
+
+/// The plot of a number that the landing verdict judges, by the verdict's name for it.
+pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "x" => "x_m",
+        "altitude" => "altitude_m",
+        "pitch error" => "pitch_error_deg",
+        "u" => "u_m_s",
+        "w" => "w_m_s",
+        "pitch rate" => "q_deg_s",
+        _ => return None,
+    })
+}
+
+/// The plots being recorded.
+pub(crate) struct Plots<'a> {
+    recording: &'a RecordingStream,
+    styled: BTreeSet<String>,
+    level: Option<u32>,
+    phase: Option<u32>,
+}
+
+impl<'a> Plots<'a> {
+    pub(crate) fn new(recording: &'a RecordingStream) -> Self {
+        Self { recording, styled: BTreeSet::new(), level: None, phase: None }
+    }
+
+    /// What the plant really does.
+    pub(crate) fn truth(&mut self, truth: &PlantTruth) -> RecordingStreamResult<()> {
+        self.state(&truth.state, Line::Truth)?;
+        self.draw("gimbal_deg", Line::Commanded, truth.gimbal_commanded_rad.to_degrees())?;
+        self.draw("gimbal_deg", Line::Actual, truth.gimbal_actual_rad.to_degrees())
+    }
+
+    /// What the controller sees and does. `alone`: nobody else tells the gimbal angles.
+    pub(crate) fn tick(&mut self, tick: &ControllerTick, alone: bool) -> RecordingStreamResult<()> {
+        self.state(&tick.input.state, Line::Estimate)?;
+        if alone {
+            self.draw("gimbal_deg", Line::Commanded, tick.output.gimbal_command_rad.to_degrees())?;
+            self.draw("gimbal_deg", Line::Actual, tick.input.gimbal_applied_rad.to_degrees())?;
+        }
+        self.draw("solve_time_ms", Line::Measured, 1e3 * tick.solve_time_s)?;
+        self.draw("solve_time_ms", Line::Deadline, 1e3 * tick.deadline_s)?;
+        self.draw("iterations", Line::Measured, f64::from(tick.output.solver.iterations))?;
+        self.draw("level", Line::Measured, f64::from(tick.output.level))?;
+        self.level(tick.output.level)
+    }
+
+    /// What the ground station knows. `alone`: the log has nothing better.
+    pub(crate) fn telemetry(&mut self, telemetry: &Telemetry, alone: bool) -> RecordingStreamResult<()> {
+        let degrees = |angle: Option<f64>| angle.map(f64::to_degrees);
+        let line = Line::Telemetry;
+        self.maybe("altitude_m", line, telemetry.altitude_m)?;
+        self.maybe("x_m", line, telemetry.x_m)?;
+        self.maybe("u_m_s", line, telemetry.u_m_s)?;
+        self.maybe("w_m_s", line, telemetry.w_m_s)?;
+        self.maybe("pitch_error_deg", line, telemetry.pitch_rad.map(pitch_error_deg))?;
+        self.maybe("q_deg_s", line, degrees(telemetry.q_rad_s))?;
+        if alone {
+            self.maybe("gimbal_deg", Line::Commanded, degrees(telemetry.gimbal_commanded_rad))?;
+            self.maybe("gimbal_deg", Line::Actual, degrees(telemetry.gimbal_measured_rad))?;
+            self.maybe("solve_time_ms", Line::Measured, telemetry.solve_time_s.map(|time_s| 1e3 * time_s))?;
+            self.maybe("iterations", Line::Measured, telemetry.iterations.map(f64::from))?;
+            self.maybe("level", Line::Measured, telemetry.control_level.map(f64::from))?;
+            if let Some(level) = telemetry.control_level {
+                self.level(level)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The phase now; says its name if it changed.
+    pub(crate) fn phase(&mut self, phase: u32) -> RecordingStreamResult<Option<String>> {
+        if self.phase == Some(phase) {
+            return Ok(None);
+        }
+        self.phase = Some(phase);
+        let known = u8::try_from(phase).ok().and_then(Phase::from_index).map(Phase::name);
+        let name = known.map_or_else(|| format!("unknown ({phase})"), str::to_owned);
+        self.recording.log(entity::PHASE, &StateChange::single(name.clone()))?;
+        Ok(Some(name))
+    }
+
+    /// Limits as straight lines over the whole recording.
+    pub(crate) fn limits(
+        &mut self,
+        limits: &[PlotLimit],
+        (first, last): (Instant, Instant),
+    ) -> RecordingStreamResult<()> {
+        for end in [first, last] {
+            Times::at_instant(self.recording, end);
+            for limit in limits {
+                self.draw(limit.plot, Line::Lowest, limit.lowest)?;
+                self.draw(limit.plot, Line::Highest, limit.highest)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn state(&mut self, state: &PlanarState, line: Line) -> RecordingStreamResult<()> {
+        self.draw("altitude_m", line, state.z_m)?;
+        self.draw("x_m", line, state.x_m)?;
+        self.draw("u_m_s", line, state.u_m_s)?;
+        self.draw("w_m_s", line, state.w_m_s)?;
+        self.draw("pitch_error_deg", line, pitch_error_deg(state.theta_rad))?;
+        self.draw("q_deg_s", line, state.q_rad_s.to_degrees())
+    }
+
+    fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
+        if self.level == Some(level) {
+            return Ok(());
+        }
+        self.level = Some(level);
+        let known = u8::try_from(level).ok().and_then(ControlLevel::from_index).map(ControlLevel::name);
+        let name = known.map_or_else(|| format!("unknown ({level})"), str::to_owned);
+        self.recording.log(entity::LEVEL, &StateChange::single(name))
+    }
+
+    fn maybe(&mut self, plot: &str, line: Line, value: Option<f64>) -> RecordingStreamResult<()> {
+        value.map_or(Ok(()), |value| self.draw(plot, line, value))
+    }
+
+    fn draw(&mut self, plot: &str, line: Line, value: f64) -> RecordingStreamResult<()> {
+        let path = format!("{}/{plot}/{}", entity::PLOTS, line.name());
+        if !self.styled.contains(&path) {
+            self.recording.log_static(path.as_str(), &line.style())?;
+            self.styled.insert(path.clone());
+        }
+        self.recording.log(path, &Scalars::single(value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flight::dynamics::PlanarState as FlightState;
+    use flight::profile::Profile;
+    use flight::verdict::{LandingVerdict, TouchdownLimits};
+
+    #[test]
+    fn every_number_of_the_verdict_has_a_plot() {
+        let limits = TouchdownLimits::from_profile(&Profile::builtin("paper-calibrated").unwrap());
+        for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
+            let plot = plot_of_verdict(result.name).unwrap();
+            assert!(PLOTS.iter().any(|known| known.name == plot), "{plot}");
+        }
+        assert_eq!(plot_of_verdict("colour"), None);
+    }
+}

@@ -1,0 +1,124 @@
+//! The planar state in the viewer's space.
+//!
+//! The world is x as in the log, y to the left of it and z up. The rocket's own axes are x towards the nose, y as
+//! the world's, and z to complete them; the pitch from the horizontal turns about -y. In these axes the second
+//! body axis of the equations of motion is -z.
+
+use std::f64::consts::FRAC_PI_2;
+
+use protocol::log::v1::PlanarState;
+
+/// Where something is and how it is turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Position, m.
+    pub translation_m: [f32; 3],
+    /// Orientation as a unit quaternion x, y, z, w.
+    pub quaternion_xyzw: [f32; 4],
+}
+
+/// The pose of the rocket.
+pub fn world_from_rocket(state: &PlanarState) -> Pose {
+    Pose { translation_m: point_in_world_m(state), quaternion_xyzw: about_y_xyzw(-state.theta_rad) }
+}
+
+/// The pose of the nozzle in the rocket. Its x axis is the direction of the thrust: a positive gimbal angle pushes
+/// the tail so that the nose pitches down.
+pub fn rocket_from_nozzle(gimbal_rad: f64, pivot_x_m: f64) -> Pose {
+    Pose { translation_m: [pivot_x_m as f32, 0.0, 0.0], quaternion_xyzw: about_y_xyzw(-gimbal_rad) }
+}
+
+/// The position of a state, m.
+pub fn point_in_world_m(state: &PlanarState) -> [f32; 3] {
+    [state.x_m as f32, 0.0, state.z_m as f32]
+}
+
+/// The path through some states, m; states that are not numbers are left out.
+pub fn path_in_world_m(states: &[PlanarState]) -> Vec<[f32; 3]> {
+    states.iter().map(point_in_world_m).filter(|point| point.iter().all(|value| value.is_finite())).collect()
+}
+
+/// Pitch away from upright, positive nose up from the x axis, degrees.
+pub fn pitch_error_deg(theta_rad: f64) -> f64 {
+    (theta_rad - FRAC_PI_2).to_degrees()
+}
+
+/// A rotation about y by `angle_rad`, as a quaternion x, y, z, w.
+fn about_y_xyzw(angle_rad: f64) -> [f32; 4] {
+    let (sin, cos) = libm::sincos(angle_rad / 2.0);
+    [0.0, sin as f32, 0.0, cos as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flight::dynamics::PlanarState as FlightState;
+
+    /// `v + 2 q x (q x v + w v)`.
+    fn rotate([qx, qy, qz, qw]: [f32; 4], [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let cross = |a: [f32; 3], b: [f32; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
+        let inner = cross([qx, qy, qz], [x, y, z]);
+        let outer = cross([qx, qy, qz], [inner[0] + qw * x, inner[1] + qw * y, inner[2] + qw * z]);
+        [x + 2.0 * outer[0], y + 2.0 * outer[1], z + 2.0 * outer[2]]
+    }
+
+    fn assert_close(found: [f32; 3], expected: [f32; 3]) {
+        let distance = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(distance < 1e-6, "{found:?} is not {expected:?}");
+    }
+
+    fn nose(theta_rad: f64) -> [f32; 3] {
+        let pose = world_from_rocket(&PlanarState { theta_rad, ..PlanarState::default() });
+        rotate(pose.quaternion_xyzw, [1.0, 0.0, 0.0])
+    }
+
+    #[test]
+    fn an_upright_rocket_points_up_and_a_level_one_along_x() {
+        assert_close(nose(FRAC_PI_2), [0.0, 0.0, 1.0]);
+        assert_close(nose(0.0), [1.0, 0.0, 0.0]);
+        assert_close(nose(std::f64::consts::PI), [-1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_position_is_x_and_altitude() {
+        let state = PlanarState { x_m: -3.5, z_m: 12.25, ..PlanarState::default() };
+        assert_close(world_from_rocket(&state).translation_m, [-3.5, 0.0, 12.25]);
+    }
+
+    /// The velocity over the ground is the same whether the equations of motion turn it or the pose does.
+    #[test]
+    fn body_velocities_turn_as_in_the_equations_of_motion() {
+        for step in 0..24 {
+            let theta_rad = f64::from(step) * 0.3;
+            let (u_m_s, w_m_s) = (1.25, -0.5);
+            let (vx, vz) =
+                FlightState { theta_rad, u_m_s, w_m_s, ..FlightState::default() }.ground_velocity_m_s();
+            let pose = world_from_rocket(&PlanarState { theta_rad, ..PlanarState::default() });
+            let turned = rotate(pose.quaternion_xyzw, [u_m_s as f32, 0.0, -w_m_s as f32]);
+            assert_close(turned, [vx as f32, 0.0, vz as f32]);
+        }
+    }
+
+    /// `w' = -(T/m) sin(delta)` along the second body axis, which is -z here.
+    #[test]
+    fn a_positive_gimbal_angle_pushes_the_tail_of_an_upright_rocket_backwards() {
+        let delta_rad: f64 = 0.2;
+        let thrust = rotate(rocket_from_nozzle(delta_rad, -0.5).quaternion_xyzw, [1.0, 0.0, 0.0]);
+        assert_close(thrust, [libm::cos(delta_rad) as f32, 0.0, libm::sin(delta_rad) as f32]);
+        let upright = world_from_rocket(&PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() })
+            .quaternion_xyzw;
+        assert!(rotate(upright, thrust)[0] < -0.1, "the tail goes back, so the nose pitches down");
+    }
+
+    #[test]
+    fn a_path_keeps_its_order_and_leaves_out_what_is_no_number() {
+        let states = [(0.0, 15.0), (f64::NAN, 10.0), (-1.0, 0.0)].map(|(x_m, z_m)| PlanarState {
+            x_m,
+            z_m,
+            ..PlanarState::default()
+        });
+        assert_eq!(path_in_world_m(&states), [[0.0, 0.0, 15.0], [-1.0, 0.0, 0.0]]);
+    }
+}

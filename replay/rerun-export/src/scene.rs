@@ -1,0 +1,189 @@
+//! The flight in space: rocket, nozzle, thrust, paths, pad.
+
+use flight::controller::ControlLevel;
+use flight::phase::Phase;
+use flight::profile::Profile;
+use protocol::log::v1::{ControllerTick, PlanarState};
+use re_sdk::{RecordingStream, RecordingStreamResult};
+use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
+use re_sdk_types::components::Radius;
+use re_sdk_types::datatypes::{Quaternion, Rgba32};
+
+use crate::entity;
+use crate::flown::FlownPath;
+use crate::pose::{Pose, path_in_world_m, point_in_world_m, rocket_from_nozzle, world_from_rocket};
+use crate::shape::RocketShape;
+
+const PAD: Rgba32 = Rgba32::from_rgb(150, 158, 168);
+const LIMIT: Rgba32 = Rgba32::from_rgb(220, 70, 70);
+const MARKER: Rgba32 = Rgba32::from_rgb(255, 255, 255);
+const FLAME: Rgba32 = Rgba32::from_rgb(255, 110, 30);
+const FLOWN: Rgba32 = Rgba32::from_rgb(84, 102, 122);
+const TRAIL: Rgba32 = Rgba32::from_rgb(110, 190, 255);
+const PREDICTED: Rgba32 = Rgba32::from_rgb(255, 205, 70);
+const REHEARSED: Rgba32 = Rgba32::from_rgb(150, 140, 90);
+const FIRST_PLAN: Rgba32 = Rgba32::from_rgb(120, 95, 40);
+
+/// Gravity if the log does not say, m/s^2.
+const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
+
+/// Where the rocket is and what drives it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    /// Its state.
+    pub(crate) state: &'a PlanarState,
+    /// Angle of the gimbal, rad, if known.
+    pub(crate) gimbal_rad: Option<f64>,
+    /// Thrust over weight, if known.
+    pub(crate) thrust_in_weights: Option<f64>,
+}
+
+/// What the layout has to know of the space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
+pub(crate) struct Extent {
+    /// Highest point of the path, m.
+    pub(crate) top_m: f32,
+    /// Widest x of the path and the pad on either side, m.
+    pub(crate) x_m: (f32, f32),
+    /// Height of the ground in the viewer's space, m.
+    pub(crate) ground_z_m: f32,
+    /// Length of the rocket, m.
+    pub(crate) rocket_m: f32,
+}
+
+/// The space being recorded.
+pub(crate) struct Scene<'a> {
+    recording: &'a RecordingStream,
+    shape: RocketShape,
+    gravity_m_s2: f64,
+    flown: FlownPath,
+    planned_under_thrust: bool,
+}
+
+impl<'a> Scene<'a> {
+    /// Records what never moves.
+    pub(crate) fn new(
+        recording: &'a RecordingStream,
+        profile: Option<&Profile>,
+    ) -> RecordingStreamResult<Self> {
+        let shape = profile.map_or_else(RocketShape::unknown, |profile| RocketShape::of(&profile.vehicle));
+        recording.log_static(entity::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP())?;
+        recording.log_static(entity::BODY, &shape.body())?;
+        recording.log_static(entity::LEGS, &shape.legs())?;
+        recording.log_static(entity::BELL, &shape.bell())?;
+        let marker = Points3D::new([[0.0; 3]]).with_colors([MARKER]);
+        recording.log_static(entity::MARKER, &marker.with_radii([Radius::new_ui_points(5.0)]))?;
+        let ground_z_m = -shape.standing_height_m();
+        let pad_m = shape.length_m();
+        let cross = [[[-pad_m, 0.0], [pad_m, 0.0]], [[0.0, -pad_m], [0.0, pad_m]]]
+            .map(|ends| ends.map(|[x, y]| [x, y, ground_z_m]).to_vec());
+        let rings = [pad_m, pad_m / 2.0].map(|radius_m| circle(radius_m, ground_z_m));
+        let strips: Vec<Vec<[f32; 3]>> = rings.into_iter().chain(cross).collect();
+        recording.log_static(
+            entity::PAD,
+            &LineStrips3D::new(strips).with_colors([PAD]).with_radii([Radius::new_ui_points(1.0)]),
+        )?;
+        if let Some(profile) = profile {
+            let limit = circle(profile.touchdown_limits.x_m as f32, ground_z_m);
+            let limit = LineStrips3D::new([limit]).with_colors([LIMIT]);
+            recording.log_static(entity::PAD_LIMIT, &limit.with_radii([Radius::new_ui_points(1.0)]))?;
+        }
+        let gravity_m_s2 = profile.map_or(STANDARD_GRAVITY_M_S2, |profile| profile.environment.gravity_m_s2);
+        Ok(Self { recording, shape, gravity_m_s2, flown: FlownPath::new(), planned_under_thrust: false })
+    }
+
+    /// Thrust over weight.
+    pub(crate) fn in_weights(&self, thrust_n: f64, mass_kg: f64) -> f64 {
+        thrust_n / (mass_kg * self.gravity_m_s2)
+    }
+
+    /// Records where the rocket is now.
+    pub(crate) fn rocket(&mut self, seen: &Seen<'_>) -> RecordingStreamResult<()> {
+        let pose = world_from_rocket(seen.state);
+        self.recording.log(entity::ROCKET, &transform(&pose))?;
+        self.recording.log(entity::FOLLOWED, &Transform3D::from_translation(pose.translation_m))?;
+        let nozzle = rocket_from_nozzle(
+            seen.gimbal_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0),
+            f64::from(self.shape.pivot_x_m),
+        );
+        self.recording.log(entity::NOZZLE, &transform(&nozzle))?;
+        if let Some(weights) = seen.thrust_in_weights {
+            self.recording.log(entity::THRUST, &self.thrust_arrow(weights))?;
+        }
+        let here_m = point_in_world_m(seen.state);
+        if let Some(from_m) = self.flown.push(here_m) {
+            let piece = LineStrips3D::new([vec![from_m, here_m]]).with_colors([TRAIL]);
+            self.recording.log(entity::TRAIL, &piece.with_radii([Radius::new_ui_points(2.0)]))?;
+        }
+        Ok(())
+    }
+
+    /// Records what a tick plans.
+    pub(crate) fn plan(&mut self, tick: &ControllerTick) -> RecordingStreamResult<()> {
+        let points_m = path_in_world_m(&tick.output.plan.states);
+        let rehearsed = tick.output.level == u32::from(ControlLevel::Rehearsal.index());
+        let color = if rehearsed { REHEARSED } else { PREDICTED };
+        let in_burn = u8::try_from(tick.input.phase)
+            .ok()
+            .and_then(Phase::from_index)
+            .is_some_and(Phase::in_landing_burn);
+        if in_burn && !points_m.is_empty() && !self.planned_under_thrust {
+            self.planned_under_thrust = true;
+            let first = LineStrips3D::new([points_m.clone()]).with_colors([FIRST_PLAN]);
+            self.recording.log_static(entity::FIRST_PLAN, &first.with_radii([Radius::new_ui_points(1.0)]))?;
+        }
+        let end = Points3D::new(points_m.last().copied())
+            .with_colors([color])
+            .with_radii([Radius::new_ui_points(4.0)]);
+        self.recording.log(entity::PREDICTED_TOUCHDOWN, &end)?;
+        // A tick without a plan clears the one before.
+        let strips = if points_m.is_empty() { vec![] } else { vec![points_m] };
+        let path = LineStrips3D::new(strips).with_colors([color]);
+        self.recording.log(entity::PREDICTED, &path.with_radii([Radius::new_ui_points(1.5)]))
+    }
+
+    /// Records the whole path, and says how much space it took.
+    pub(crate) fn finish(self) -> RecordingStreamResult<Extent> {
+        let points_m = self.flown.into_points_m();
+        let all_x_m = || points_m.iter().map(|[x, _, _]| *x).chain([0.0]);
+        let extent = Extent {
+            top_m: points_m.iter().map(|[_, _, z]| *z).fold(0.0, f32::max),
+            x_m: (all_x_m().fold(0.0, f32::min), all_x_m().fold(0.0, f32::max)),
+            ground_z_m: -self.shape.standing_height_m(),
+            rocket_m: self.shape.length_m(),
+        };
+        if points_m.len() > 1 {
+            let path = LineStrips3D::new([points_m]).with_colors([FLOWN]);
+            self.recording.log_static(entity::FLOWN, &path.with_radii([Radius::new_ui_points(1.0)]))?;
+        }
+        Ok(extent)
+    }
+
+    /// An arrow that pushes the nozzle; where it begins, the flame ends.
+    fn thrust_arrow(&self, weights: f64) -> Arrows3D {
+        let length_m = weights as f32 * self.shape.length_m();
+        let visible = length_m.is_finite() && length_m > 0.0;
+        let length_m = visible.then_some(length_m);
+        Arrows3D::from_vectors(length_m.map(|length_m| [length_m, 0.0, 0.0]))
+            .with_origins(length_m.map(|length_m| [-length_m - self.shape.bell_m(), 0.0, 0.0]))
+            .with_colors([FLAME])
+            .with_radii([0.35 * self.shape.radius_m])
+    }
+}
+
+fn transform(pose: &Pose) -> Transform3D {
+    Transform3D::from_translation(pose.translation_m)
+        .with_quaternion(Quaternion::from_xyzw(pose.quaternion_xyzw))
+}
+
+/// A closed circle on the ground.
+fn circle(radius_m: f32, z_m: f32) -> Vec<[f32; 3]> {
+    const EDGES: u32 = 96;
+    (0..=EDGES)
+        .map(|edge| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(edge) / f64::from(EDGES));
+            [radius_m * cos as f32, radius_m * sin as f32, z_m]
+        })
+        .collect()
+}

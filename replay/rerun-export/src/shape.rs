@@ -1,0 +1,174 @@
+//! What the rocket looks like: bodies of revolution about its x axis, which points to the nose.
+
+use flight::profile::Vehicle;
+use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
+use re_sdk_types::components::Color;
+use re_sdk_types::datatypes::{Rgba32, UVec3D, Vec3D};
+
+/// Edges of what is round.
+const SEGMENTS: u32 = 32;
+
+/// Rings along the nose.
+const NOSE_RINGS: u8 = 8;
+
+const WHITE: Rgba32 = Rgba32::from_rgb(236, 238, 240);
+const BAND: Rgba32 = Rgba32::from_rgb(226, 88, 34);
+const METAL: Rgba32 = Rgba32::from_rgb(120, 126, 134);
+
+/// The measures of a rocket, seen from its centre of gravity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
+pub(crate) struct RocketShape {
+    /// Where the body ends in front, m.
+    pub(crate) nose_x_m: f32,
+    /// Where the body ends behind, m.
+    pub(crate) tail_x_m: f32,
+    /// Where the nozzle turns, m.
+    pub(crate) pivot_x_m: f32,
+    /// Radius of the body, m.
+    pub(crate) radius_m: f32,
+}
+
+impl RocketShape {
+    pub(crate) fn of(vehicle: &Vehicle) -> Self {
+        let middle_x_m = -vehicle.cg_from_mid_m;
+        Self {
+            nose_x_m: (middle_x_m + vehicle.length_m / 2.0) as f32,
+            tail_x_m: (middle_x_m - vehicle.length_m / 2.0) as f32,
+            pivot_x_m: -vehicle.thrust_arm_m() as f32,
+            radius_m: (vehicle.diameter_m / 2.0) as f32,
+        }
+    }
+
+    /// For logs that do not say: a metre long.
+    pub(crate) fn unknown() -> Self {
+        Self { nose_x_m: 0.5, tail_x_m: -0.5, pivot_x_m: -0.5, radius_m: 0.05 }
+    }
+
+    /// Length of the body, m.
+    pub(crate) fn length_m(&self) -> f32 {
+        self.nose_x_m - self.tail_x_m
+    }
+
+    /// Length of the nozzle's bell, m.
+    pub(crate) fn bell_m(&self) -> f32 {
+        1.2 * self.radius_m
+    }
+
+    /// Height of the centre of gravity above the ground when the rocket stands, m.
+    pub(crate) fn standing_height_m(&self) -> f32 {
+        1.4 * self.bell_m() - self.tail_x_m.min(self.pivot_x_m)
+    }
+
+    pub(crate) fn body(&self) -> Mesh3D {
+        let nose_base_x_m = self.nose_x_m - 0.22 * self.length_m();
+        let cylinder = [
+            (self.tail_x_m, 0.0, METAL),
+            (self.tail_x_m, 1.0, WHITE),
+            (self.tail_x_m + 0.55 * self.length_m(), 1.0, WHITE),
+            (self.tail_x_m + 0.55 * self.length_m(), 1.0, BAND),
+            (self.tail_x_m + 0.62 * self.length_m(), 1.0, BAND),
+            (self.tail_x_m + 0.62 * self.length_m(), 1.0, WHITE),
+            (nose_base_x_m, 1.0, WHITE),
+        ];
+        let nose = (1..=NOSE_RINGS).map(|ring| {
+            let along = f32::from(ring) / f32::from(NOSE_RINGS);
+            (nose_base_x_m + along * (self.nose_x_m - nose_base_x_m), (1.0 - along * along).sqrt(), BAND)
+        });
+        let rings: Vec<Ring> = cylinder
+            .into_iter()
+            .chain([(nose_base_x_m, 1.0, BAND)])
+            .chain(nose)
+            .map(|(x_m, part, color)| Ring { x_m, radius_m: part * self.radius_m, color })
+            .collect();
+        body_of_revolution(&rings)
+    }
+
+    /// The bell of the nozzle, seen from its pivot.
+    pub(crate) fn bell(&self) -> Mesh3D {
+        let ring = |along: f32, part: f32| Ring {
+            x_m: -along * self.bell_m(),
+            radius_m: part * self.radius_m,
+            color: METAL,
+        };
+        body_of_revolution(&[ring(1.0, 0.0), ring(1.0, 0.75), ring(0.5, 0.6), ring(0.0, 0.3), ring(0.0, 0.0)])
+    }
+
+    /// Four legs from the body to the ground.
+    pub(crate) fn legs(&self) -> LineStrips3D {
+        let foot_x_m = -self.standing_height_m();
+        let hip_x_m = self.tail_x_m + 0.2 * self.length_m();
+        let out_m = 4.5 * self.radius_m;
+        let strips = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(y, z): (f32, f32)| {
+            [
+                [hip_x_m, y * self.radius_m, z * self.radius_m],
+                [foot_x_m, y * out_m, z * out_m],
+                [self.tail_x_m, y * self.radius_m, z * self.radius_m],
+            ]
+        });
+        LineStrips3D::new(strips).with_colors([METAL]).with_radii([0.1 * self.radius_m])
+    }
+}
+
+/// A ring about the x axis.
+#[derive(Debug, Clone, Copy)]
+struct Ring {
+    x_m: f32,
+    radius_m: f32,
+    color: Rgba32,
+}
+
+/// The surface between neighbouring rings, from the tail forward; each pair has its own normals, so that edges stay
+/// sharp.
+fn body_of_revolution(rings: &[Ring]) -> Mesh3D {
+    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::<Vec3D>::new(), Vec::<Color>::new());
+    let mut triangles = Vec::new();
+    for (start, pair) in (0..).step_by(2 * SEGMENTS as usize).zip(rings.windows(2)) {
+        let [rear, front] = [pair[0], pair[1]];
+        let (along_m, outward_m) = (front.x_m - rear.x_m, front.radius_m - rear.radius_m);
+        let slant_m = along_m.hypot(outward_m);
+        let (normal_x, normal_out) =
+            if slant_m > 0.0 { (-outward_m / slant_m, along_m / slant_m) } else { (-1.0, 0.0) };
+        for segment in 0..SEGMENTS {
+            let angle_rad = std::f64::consts::TAU * f64::from(segment) / f64::from(SEGMENTS);
+            let (sin, cos) = libm::sincos(angle_rad);
+            let (y, z) = (cos as f32, sin as f32);
+            for ring in [rear, front] {
+                positions.push([ring.x_m, ring.radius_m * y, ring.radius_m * z]);
+                normals.push([normal_x, normal_out * y, normal_out * z].into());
+                colors.push(ring.color.into());
+            }
+            let (here, next) = (start + 2 * segment, start + 2 * ((segment + 1) % SEGMENTS));
+            triangles.push(UVec3D::new(here, here + 1, next));
+            triangles.push(UVec3D::new(next, here + 1, next + 1));
+        }
+    }
+    Mesh3D::new(positions)
+        .with_triangle_indices(triangles)
+        .with_vertex_normals(normals)
+        .with_vertex_colors(colors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flight::profile::Profile;
+
+    #[test]
+    fn the_rocket_stands_on_its_feet_below_its_nozzle() {
+        let shape = RocketShape::of(&Profile::builtin("paper-calibrated").unwrap().vehicle);
+        assert!((shape.length_m() - 0.7).abs() < 1e-6);
+        assert!((shape.tail_x_m + 0.52).abs() < 1e-6 && (shape.pivot_x_m + 0.52).abs() < 1e-6);
+        assert!(shape.standing_height_m() > 0.52 + shape.bell_m());
+    }
+
+    #[test]
+    fn its_meshes_are_sound() {
+        for shape in [RocketShape::unknown()] {
+            for mesh in [shape.body(), shape.bell()] {
+                mesh.sanity_check().unwrap();
+                assert!(mesh.num_triangles() > 100);
+            }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! What has to be known of a log before its first record is exported: which records it has, and its events, which
+//! the stream of flight records does not carry.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+
+use flight::profile::Profile;
+use foxglove::messages::Log;
+use foxglove::messages::log::Level;
+use prost::Message as _;
+use protocol::log::reader::{LogItem, LogReader};
+use protocol::log::record::{
+    ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS,
+    TOPIC_PLANT_TRUTH, TOPIC_TELEMETRY,
+};
+use protocol::text::printable;
+
+/// Most events kept; a flight has dozens.
+const EVENTS_KEPT: usize = 100_000;
+
+/// Whose word the pose of the rocket is, best last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum PoseSource {
+    /// Nobody's: the log has no poses.
+    #[default]
+    None,
+    /// The ground station's, from telemetry.
+    Telemetry,
+    /// The vehicle's own, from its controller's input.
+    Estimate,
+    /// The simulated plant's.
+    Truth,
+}
+
+/// An event, fit for a screen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StampedEvent {
+    /// Nanoseconds since the Unix epoch.
+    pub log_time_ns: u64,
+    /// How grave.
+    pub level: EventLevel,
+    /// Who says so, and what.
+    pub text: String,
+}
+
+/// What a log has.
+#[derive(Debug, Clone, Default)]
+pub struct Survey {
+    /// Which run it is: profile, seed and so on.
+    pub run: BTreeMap<String, String>,
+    /// Which build wrote it.
+    pub build: BTreeMap<String, String>,
+    /// The profile, if the log has one that this build can use.
+    pub profile: Option<Profile>,
+    /// What keeps this build from using the profile.
+    pub profile_problem: Option<String>,
+    /// Whose word the pose of the rocket is.
+    pub pose_source: PoseSource,
+    /// The events, by time.
+    pub events: Vec<StampedEvent>,
+    /// Events that cannot be read, or were more than are kept.
+    pub events_left_out: u64,
+    /// Time of the first record, ns since the Unix epoch.
+    pub first_log_time_ns: Option<u64>,
+}
+
+impl Survey {
+    /// Reads a log to its end, or to its damage.
+    ///
+    /// # Errors
+    /// The input cannot be read.
+    pub fn of(input: impl Read) -> std::io::Result<Self> {
+        let mut reader = LogReader::new(input);
+        let mut survey = Self::default();
+        while let Some(item) = reader.next_item()? {
+            match item {
+                LogItem::Metadata { name, entries } if name == METADATA_RUN => survey.run = entries,
+                LogItem::Metadata { name, entries } if name == METADATA_BUILD => survey.build = entries,
+                LogItem::Attachment { name, data } if name == ATTACHMENT_PROFILE => survey.take_profile(data),
+                LogItem::Message { channel_id, log_time_ns, data, .. } => {
+                    survey.first_log_time_ns.get_or_insert(log_time_ns);
+                    if let Some(channel) = reader.channel(channel_id) {
+                        survey.take_message(&channel.topic, &channel.schema_name, log_time_ns, &data);
+                    }
+                }
+                _ => {}
+            }
+        }
+        survey.events.sort_by_key(|event| event.log_time_ns);
+        Ok(survey)
+    }
+
+    /// Start of the run, ns since the Unix epoch: as the log says, or its first record.
+    pub fn start_unix_ns(&self) -> Option<u64> {
+        self.run.get("start_unix_ns").and_then(|text| text.parse().ok()).or(self.first_log_time_ns)
+    }
+
+    fn take_profile(&mut self, data: Vec<u8>) {
+        let parsed = String::from_utf8(data).map_err(|error| error.to_string()).and_then(|text| {
+            Profile::from_toml(&text, ATTACHMENT_PROFILE).map_err(|error| error.to_string())
+        });
+        match parsed {
+            Ok(profile) => self.profile = Some(profile),
+            Err(problem) => self.profile_problem = Some(problem),
+        }
+    }
+
+    fn take_message(&mut self, topic: &str, schema_name: &str, log_time_ns: u64, data: &[u8]) {
+        let ours = schema_name.starts_with("touchdown.");
+        let source = match topic {
+            TOPIC_PLANT_TRUTH if ours => PoseSource::Truth,
+            TOPIC_CONTROLLER_TICK if ours => PoseSource::Estimate,
+            TOPIC_TELEMETRY if ours => PoseSource::Telemetry,
+            TOPIC_EVENTS if schema_name == "foxglove.Log" => return self.take_event(log_time_ns, data),
+            _ => PoseSource::None,
+        };
+        self.pose_source = self.pose_source.max(source);
+    }
+
+    fn take_event(&mut self, log_time_ns: u64, data: &[u8]) {
+        match Log::decode(data) {
+            Ok(log) if self.events.len() < EVENTS_KEPT => {
+                let level = match log.level() {
+                    Level::Unknown | Level::Debug | Level::Info => EventLevel::Info,
+                    Level::Warning => EventLevel::Warning,
+                    Level::Error => EventLevel::Error,
+                    Level::Fatal => EventLevel::Fatal,
+                };
+                let said = printable(log.message.as_bytes());
+                let text = if log.name.is_empty() {
+                    said
+                } else {
+                    format!("{}: {said}", printable(log.name.as_bytes()))
+                };
+                self.events.push(StampedEvent { log_time_ns, level, text });
+            }
+            _ => self.events_left_out += 1,
+        }
+    }
+}

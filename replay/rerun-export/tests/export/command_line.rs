@@ -1,0 +1,46 @@
+//! The program: where it writes, what it says, how it exits.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::logs::{folder, write_log};
+
+/// Exit code and what was said.
+fn run(arguments: &[&Path]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_replay-rerun")).args(arguments).output().unwrap();
+    assert!(output.stdout.is_empty());
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
+    let (_folder, log, rrd) = folder();
+    write_log(&log, true);
+    let (code, said) = run(&[&log]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("flight.rrd: 40 poses, 4 controller ticks, 1 events"), "{said}");
+    assert!(!said.contains("warning"), "{said}");
+    std::fs::write(&rrd, "precious").unwrap();
+    let (code, said) = run(&[&log]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("flight.rrd: is there already; --force overwrites it"), "{said}");
+    assert_eq!(std::fs::read(&rrd).unwrap(), b"precious");
+    assert_eq!(run(&[&log, Path::new("--force")]).0, Some(0));
+    assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));
+}
+
+#[test]
+fn damage_is_a_warning_and_no_log_is_an_error() {
+    let (folder, log, rrd) = folder();
+    write_log(&log, true);
+    let bytes = std::fs::read(&log).unwrap();
+    std::fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
+    let (code, said) = run(&[&log, Path::new("-o"), &rrd]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("flight.mcap is damaged: ends after"), "{said}");
+    let missing = folder.path().join("missing.mcap");
+    let (code, said) = run(&[&missing]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("missing.mcap: cannot be read"), "{said}");
+    assert_eq!(run(&[]).0, Some(2), "wrong usage");
+}
