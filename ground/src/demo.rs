@@ -14,7 +14,7 @@ use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
 use tokio::sync::{oneshot, watch};
 
-pub use onboard_sim::fly::Speed;
+pub use onboard_sim::fly::{LogClock, Speed};
 
 /// How long the simulator's end is waited for.
 const STOP_WITHIN: Duration = Duration::from_secs(3);
@@ -49,11 +49,16 @@ pub struct Demo {
 }
 
 impl Demo {
-    /// Starts a vehicle that speaks to `link`.
+    /// Starts a vehicle that speaks to `link` and sets `log_clock` to its time.
     ///
     /// # Errors
     /// The thread or its runtime cannot be made.
-    pub fn start(options: &DemoOptions, link: Endpoint, recorder: Option<Recorder>) -> io::Result<Self> {
+    pub fn start(
+        options: &DemoOptions,
+        link: Endpoint,
+        recorder: Option<Recorder>,
+        log_clock: LogClock,
+    ) -> io::Result<Self> {
         let fly_options = FlyOptions {
             profile_name_or_path: options.profile.clone(),
             links: vec![link],
@@ -63,6 +68,7 @@ impl Demo {
             auto_start: false,
             exit_when_safed: false,
             deadline_policy: DeadlinePolicy::Observe,
+            log_clock: Some(log_clock),
         };
         let (stop, stopped) = watch::channel(false);
         let (tell, ended) = oneshot::channel();

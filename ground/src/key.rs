@@ -29,8 +29,9 @@ impl Key {
         if event.kind == KeyEventKind::Release {
             return None;
         }
-        // A held chord must not abort: where the terminal tells repeats apart, they do not count.
-        if event.kind == KeyEventKind::Repeat && event.modifiers.contains(KeyModifiers::CONTROL) {
+        // A held key is one press, where the terminal tells repeats apart: neither an abort nor a
+        // confirmed question. Taking letters back may go on.
+        if event.kind == KeyEventKind::Repeat && event.code != KeyCode::Backspace {
             return None;
         }
         if event.modifiers.contains(KeyModifiers::ALT) {
@@ -41,7 +42,11 @@ impl Key {
             KeyCode::Char('c' | 'C') if ctrl => Some(Self::CtrlC),
             KeyCode::Char('l' | 'L') if ctrl => Some(Self::CtrlL),
             KeyCode::Char('x' | 'X') if ctrl => Some(Self::CtrlX),
-            KeyCode::Char(c) if !ctrl && !c.is_control() => Some(Self::Char(c)),
+            KeyCode::Char(c) if !ctrl && !c.is_control() => {
+                // Some terminals tell the key and Shift rather than the letter.
+                let shift = event.modifiers.contains(KeyModifiers::SHIFT);
+                Some(Self::Char(if shift { c.to_ascii_uppercase() } else { c }))
+            }
             KeyCode::Enter => Some(Self::Enter),
             KeyCode::Esc => Some(Self::Escape),
             KeyCode::Backspace => Some(Self::Backspace),
@@ -71,8 +76,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn releases_and_repeated_chords_do_not_count() {
+    fn releases_and_repeats_do_not_count() {
         let chord = |kind| KeyEvent::new_with_kind(KeyCode::Char('x'), KeyModifiers::CONTROL, kind);
+        let held = |code| KeyEvent::new_with_kind(code, KeyModifiers::NONE, KeyEventKind::Repeat);
+        assert_eq!(Key::from_event(&held(KeyCode::Char('q'))), None);
+        assert_eq!(Key::from_event(&held(KeyCode::Backspace)), Some(Key::Backspace));
         assert_eq!(Key::from_event(&chord(KeyEventKind::Press)), Some(Key::CtrlX));
         assert_eq!(Key::from_event(&chord(KeyEventKind::Repeat)), None);
         assert_eq!(Key::from_event(&chord(KeyEventKind::Release)), None);
@@ -80,7 +88,9 @@ mod tests {
 
     #[test]
     fn a_shifted_letter_is_the_capital_letter() {
-        let key = KeyEvent::new(KeyCode::Char('A'), KeyModifiers::SHIFT);
-        assert_eq!(Key::from_event(&key), Some(Key::Char('A')));
+        for c in ['A', 'a'] {
+            let key = KeyEvent::new(KeyCode::Char(c), KeyModifiers::SHIFT);
+            assert_eq!(Key::from_event(&key), Some(Key::Char('A')));
+        }
     }
 }

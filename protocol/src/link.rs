@@ -66,7 +66,7 @@ impl LinkStats {
     }
 
     /// A frame that arrived. One that comes late is taken off the loss that its absence was; a jump backwards by
-    /// more than [`REORDER`] is a restarted sender.
+    /// more than a few dozen is a restarted sender.
     pub fn on_frame(&mut self, frame: &Frame, now: Duration) {
         let (source, sequence) = (frame.source(), frame.sequence());
         let known = self.sources.get(&source).copied();

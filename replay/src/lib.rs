@@ -4,9 +4,9 @@
 //! * [`log`]: a log opened and streamed, with memory that does not grow with its frames.
 //! * [`info`]: what is in a log, how complete it is and what can be done with it.
 //! * [`verify`]: every tick re-executed from its recorded input and compared by bits.
-//! * [`print`]: both as text for people and as JSON for programs.
+//! * [`mod@print`]: both as text for people and as JSON for programs.
 //!
-//! Everything but [`log`] and [`print`] works on values: records in, reports out.
+//! Everything but [`log`] and [`mod@print`] works on values: records in, reports out.
 #![warn(missing_docs)]
 
 pub mod info;

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use crate::demo::LogClock;
+
 /// Time since the start of the run.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
@@ -37,7 +39,26 @@ impl Clock {
     }
 }
 
+/// The time that records are stamped with: one log, one clock.
+#[derive(Debug, Clone)]
+pub enum LogTime {
+    /// The ground's own, since the start of the run.
+    Run(Clock),
+    /// The simulated vehicle's, which writes into the same log and may run faster or slower.
+    Vehicle(LogClock),
+}
+
+impl LogTime {
+    /// Nanoseconds since the log's zero.
+    pub fn now_ns(&self) -> u64 {
+        match self {
+            Self::Run(clock) => nanoseconds(clock.now()),
+            Self::Vehicle(clock) => clock.now_ns(),
+        }
+    }
+}
+
 /// A duration as the log counts it.
-pub fn nanoseconds(duration: Duration) -> u64 {
+fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

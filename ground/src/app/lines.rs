@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
+use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 use protocol::log::recorder::RecorderError;
 
 use crate::model::Model;
@@ -44,7 +45,7 @@ impl Lines {
 pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBuf>, &RecorderError>) {
     let mut text = String::new();
     match model.vehicle.verdict {
-        Some(verdict) => text.push_str(&verdict_table(&verdict.value)),
+        Some(verdict) => text.push_str(&verdict_table(&verdict.value, model.vehicle.limits.as_ref())),
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}
     }
@@ -58,9 +59,9 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
     let _ = print(&text);
 }
 
-fn verdict_table(verdict: &Verdict) -> String {
-    let mut text = String::from("landing verdict (the vehicle's, against Table 2)\n");
-    for row in verdict.touchdown.rows() {
+fn verdict_table(verdict: &Verdict, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> String {
+    let mut text = String::from("landing verdict, against the vehicle's limits\n");
+    for row in verdict.touchdown.rows(limits) {
         let word = if row.kept { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(

@@ -18,11 +18,11 @@ use protocol::transport::Endpoint;
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::cli::{Cli, Seconds};
-use crate::demo::{Demo, DemoOptions};
+use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::{LogHealth, Model, Settings};
 use crate::update::{Action, Msg, update};
-use clock::Clock;
+use clock::{Clock, LogTime};
 use lines::Lines;
 use log::LogGuard;
 use screen::Screen;
@@ -63,21 +63,26 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
     let endpoint = cli.connect.clone().unwrap_or_else(|| Endpoint::UdpIn("127.0.0.1:0".to_owned()));
     let recorder = log::open(cli.log.as_ref(), &header)?;
     let log_guard = LogGuard::new(recorder.clone());
-    let mut wire = Wire::open(endpoint, recorder.clone()).await?;
-    let demo = match &demo_options {
-        Some(options) => Some(start_demo(options, wire.endpoint(), recorder.clone())?),
-        None => None,
+    let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
+    let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
+    let mut wire = Wire::open(endpoint, recorder.clone(), log_time.clone()).await?;
+    let demo = match (&demo_options, vehicle_clock) {
+        (Some(options), Some(vehicle_clock)) => {
+            Some(start_demo(options, wire.endpoint(), recorder.clone(), vehicle_clock)?)
+        }
+        _ => None,
     };
     let auto = cli.starts_by_itself(interactive);
     let mut model = Model::new(Settings {
         link_name: wire.endpoint().to_string(),
+        link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         auto,
         interactive,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
     });
     let output = if interactive { Output::Screen(Screen::open()?) } else { Output::Lines(Lines::new()) };
-    let mut station = Station { clock, recorder, demo, output };
+    let mut station = Station { clock, log_time, recorder, demo, output };
     let ran = station.run(&mut model, &mut wire).await;
     station.close(&model).await;
     let log_path = log_guard.finish();
@@ -91,11 +96,13 @@ fn start_demo(
     options: &DemoOptions,
     listening: &Endpoint,
     recorder: Option<Recorder>,
+    log_clock: LogClock,
 ) -> anyhow::Result<Demo> {
     let Endpoint::UdpIn(address) = listening else {
         anyhow::bail!("the demonstration listens on UDP, not on {listening}");
     };
-    Demo::start(options, Endpoint::UdpOut(address.clone()), recorder).context("starting the simulator")
+    Demo::start(options, Endpoint::UdpOut(address.clone()), recorder, log_clock)
+        .context("starting the simulator")
 }
 
 enum Output {
@@ -105,6 +112,7 @@ enum Output {
 
 struct Station {
     clock: Clock,
+    log_time: LogTime,
     recorder: Option<Recorder>,
     demo: Option<Demo>,
     output: Output,
@@ -118,13 +126,18 @@ impl Station {
         loop {
             let redraw_at = self.output.redraw_at();
             let demo = &mut self.demo;
+            let chord_at = model.abort_chord.acts_at();
             let msgs = tokio::select! {
-                received = wire.receive() => wire.take(received, self.clock.now()),
-                msg = self.output.input() => vec![msg],
-                _ = ticks.tick() => self.tick_msgs(model),
-                failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
+                // In this order. Keys before the clock: one that waits may show that Ctrl-X is held. The
+                // link last: it alone can be busy all the time, and it is read until nothing waits.
+                biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
+                msg = self.output.input() => vec![msg],
+                () = self.clock.sleep_until(chord_at) => vec![Msg::Tick],
+                failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
+                _ = ticks.tick() => self.tick_msgs(model),
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
+                received = wire.receive() => wire.take(received),
             };
             let mut quit = false;
             for msg in msgs {
@@ -156,7 +169,7 @@ impl Station {
         for action in update(model, msg, now) {
             match action {
                 Action::Send(message) => {
-                    let sent = wire.send(&message, now);
+                    let sent = wire.send(&message);
                     // Only counts: it wants nothing done.
                     update(model, sent, now);
                 }
@@ -165,7 +178,8 @@ impl Station {
                         self.output.mark_changed();
                     }
                     if let Some(recorder) = &self.recorder {
-                        recorder.try_record(record, clock::nanoseconds(now));
+                        let at_ns = self.log_time.now_ns();
+                        recorder.try_record(timed(record, at_ns), at_ns);
                     }
                 }
                 Action::SyncLog => {
@@ -190,6 +204,17 @@ impl Station {
             demo.stop().await;
         }
     }
+}
+
+/// What a record itself says about its time agrees with its stamp.
+fn timed(mut record: Record, at_ns: u64) -> Record {
+    let at_s = at_ns as f64 * 1e-9;
+    match &mut record {
+        Record::Telemetry(telemetry) => telemetry.time_s = at_s,
+        Record::OperatorAction(action) => action.time_s = at_s,
+        _ => {}
+    }
+    record
 }
 
 async fn demo_ended(demo: &mut Option<Demo>) -> Option<String> {

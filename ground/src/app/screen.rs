@@ -1,12 +1,18 @@
 //! The full screen: the terminal's state, its keys, and when it is drawn.
 
 use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::Context as _;
 use crossterm::cursor::Show;
-use crossterm::event::{Event, EventStream};
-use crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
+use crossterm::event::{
+    Event, EventStream, KeyboardEnhancementFlags, PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
+};
+use crossterm::terminal::{
+    EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
+    supports_keyboard_enhancement,
+};
 use crossterm::{execute, queue};
 use futures_util::StreamExt as _;
 use ratatui::DefaultTerminal;
@@ -23,6 +29,9 @@ use crate::view::view;
 const FRAME: Duration = Duration::from_millis(100);
 /// Ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
+
+/// What was pushed must be popped, by whichever way the screen ends.
+static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
 pub struct Screen {
@@ -117,7 +126,21 @@ impl Drop for Screen {
 fn take_terminal() -> io::Result<DefaultTerminal> {
     enable_raw_mode()?;
     execute!(io::stdout(), EnterAlternateScreen)?;
+    tell_repeats()?;
     Terminal::new(CrosstermBackend::new(io::stdout()))
+}
+
+/// Asks the terminal to tell a held key's repeats from presses, where it can. Where it cannot say whether
+/// it can, it cannot.
+fn tell_repeats() -> io::Result<()> {
+    if supports_keyboard_enhancement().unwrap_or(false) {
+        // Event types are told in escape codes only; without the other flag Ctrl-X would stay one byte.
+        let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
+            | KeyboardEnhancementFlags::REPORT_EVENT_TYPES;
+        KEYBOARD_ENHANCED.store(true, Ordering::Relaxed);
+        execute!(io::stdout(), PushKeyboardEnhancementFlags(flags))?;
+    }
+    Ok(())
 }
 
 /// Gives the terminal back. It may be gone (a dropped session): then there is nothing to restore, and
@@ -125,6 +148,10 @@ fn take_terminal() -> io::Result<DefaultTerminal> {
 fn restore() {
     let _ = disable_raw_mode();
     let mut out = io::stdout();
+    // Before the alternate screen is left: each screen has its own.
+    if KEYBOARD_ENHANCED.swap(false, Ordering::Relaxed) {
+        let _ = queue!(out, PopKeyboardEnhancementFlags);
+    }
     let _ = queue!(out, LeaveAlternateScreen, Show);
     let _ = io::Write::flush(&mut out);
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::command::{CommandSender, Resend};
+use protocol::command::{CommandSender, Resend, Ticket};
 use protocol::dialect::{MavCmd, MavResult, TdInterlock, TdPhase};
 
 use super::vehicle::Vehicle;
@@ -115,6 +115,7 @@ pub struct Track {
     pub acknowledged_at: Option<Duration>,
     /// When the vehicle's own state showed it.
     pub observed_at: Option<Duration>,
+    pub(crate) ticket: Ticket,
     pub(crate) not_observed_said: bool,
 }
 

@@ -8,8 +8,6 @@ pub const ARM_TIME_LIMIT: Duration = Duration::from_secs(10);
 pub const ARM_WORD: &str = "ARM";
 /// Time to confirm a start or a disarming.
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
-/// Time for the second press of the abort chord.
-pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
 /// Time for the second press that quits.
 pub const QUIT_TIME_LIMIT: Duration = Duration::from_secs(3);
 

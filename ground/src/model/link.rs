@@ -45,6 +45,8 @@ pub struct Link {
     pub send_drops: u64,
     /// Why the transport does not work, if it does not.
     pub trouble: Option<String>,
+    /// The first heartbeat of the vehicle.
+    pub first_heartbeat_at: Option<Duration>,
     /// The last heartbeat of the vehicle.
     pub heartbeat_at: Option<Duration>,
     /// Round trip, measured by TIMESYNC.

@@ -1,5 +1,6 @@
 //! Everything the ground knows, as plain data.
 
+pub mod chord;
 pub mod command;
 pub mod dialog;
 pub mod events;
@@ -15,6 +16,7 @@ use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
 use crate::update::Action;
+use chord::AbortChord;
 use command::Commands;
 use dialog::Dialog;
 use events::{Events, Speaker};
@@ -27,6 +29,8 @@ use vehicle::Vehicle;
 pub struct Settings {
     /// The link's name, as in `udpin:0.0.0.0:14550`.
     pub link_name: String,
+    /// What the link can carry, bytes per second; `None` where nothing is known to bound it.
+    pub link_capacity_bytes_s: Option<u32>,
     /// The log's path; `None` without a log.
     pub log_path: Option<String>,
     /// Arm and start without a hand.
@@ -55,12 +59,20 @@ pub(crate) struct Due {
 }
 
 /// How far the automatic mode is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AutoStep {
-    #[default]
-    WaitForReady,
+    /// Until the checks pass; after a refusal for now, not before some time.
+    WaitForReady {
+        not_before: Duration,
+    },
     WaitForArmed,
     Done,
+}
+
+impl Default for AutoStep {
+    fn default() -> Self {
+        Self::WaitForReady { not_before: Duration::ZERO }
+    }
 }
 
 /// Everything known.
@@ -76,8 +88,8 @@ pub struct Model {
     pub commands: Commands,
     /// The open dialog.
     pub dialog: Dialog,
-    /// When the abort chord was pressed once.
-    pub abort_pressed_at: Option<Duration>,
+    /// How far the abort chord is.
+    pub abort_chord: AbortChord,
     /// What happened.
     pub events: Events,
     /// What became of the flight.
@@ -99,7 +111,7 @@ impl Model {
             link: Link::default(),
             commands: Commands::default(),
             dialog: Dialog::Closed,
-            abort_pressed_at: None,
+            abort_chord: AbortChord::default(),
             events: Events::default(),
             outcome: Outcome::default(),
             log: LogHealth::default(),

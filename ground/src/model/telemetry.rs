@@ -59,6 +59,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         }
         MavMessage::TD_PREDICTED_PATH(data) => vehicle.path = Some(Sample::new(path(data), now)),
         MavMessage::TD_LANDING_VERDICT(data) => vehicle.verdict = Some(Sample::new(verdict(data), now)),
+        MavMessage::TD_TOUCHDOWN_LIMITS(data) => vehicle.limits = Some(data.clone()),
         MavMessage::EXTENDED_SYS_STATE(data) => {
             let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;
             vehicle.on_ground = Some(Sample::new(on_ground, now));

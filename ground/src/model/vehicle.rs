@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_CONTROLLER_DATA, TD_FLIGHT_STATUS_DATA, TdInterlock, TdPhase};
+use protocol::dialect::{
+    TD_CONTROLLER_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase,
+};
 
 use crate::limits::Touchdown;
 
@@ -144,6 +146,8 @@ pub struct Vehicle {
     pub path: Option<Sample<Vec<(f64, f64)>>>,
     /// `TD_LANDING_VERDICT`.
     pub verdict: Option<Sample<Verdict>>,
+    /// `TD_TOUCHDOWN_LIMITS`: what counts as a landing for this vehicle.
+    pub limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
     /// `EXTENDED_SYS_STATE`: on the ground or not.
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: the vehicle's own arming checks pass.

@@ -1,4 +1,4 @@
-//! The automatic mode: arms and starts without a hand, once each, for runs without a crew.
+//! The automatic mode: arms and starts without a hand, for runs without a crew.
 
 use std::time::Duration;
 
@@ -6,11 +6,12 @@ use protocol::dialect::TdPhase;
 
 use super::commands;
 use crate::model::command::CommandKind;
-use crate::model::{AutoStep, Model};
+use crate::model::{AutoStep, Model, words};
 
-/// Failing checks may still pass for this long after the vehicle was first heard; then the arming is
-/// asked for anyway, and the vehicle refuses it in words.
+/// The vehicle has this long, from when it was first heard, to become ready.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// After a refusal for now, what the vehicle says about its checks is believed again only after this.
+const ASK_AGAIN_AFTER: Duration = Duration::from_secs(1);
 
 pub(super) fn step(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.state(now).carries() {
@@ -19,20 +20,13 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
     let phase = model.vehicle.phase().map(|phase| phase.value);
     match model.auto_step {
-        AutoStep::WaitForReady => match phase {
+        AutoStep::WaitForReady { not_before } => match phase {
             Some(TdPhase::TD_PHASE_PAD_ARMED) if armed => start(model, now),
-            Some(TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE) => {
-                let ready =
-                    model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
-                if (ready && phase == Some(TdPhase::TD_PHASE_PAD_IDLE)) || now >= PATIENCE {
-                    model.info(now, "automatic mode: arming");
-                    model.auto_step = AutoStep::WaitForArmed;
-                    commands::submit(model, CommandKind::Arm, now);
-                }
-            }
             // Flying or flown already: there is nothing to start.
-            Some(phase) if phase != TdPhase::TD_PHASE_PAD_ARMED => model.auto_step = AutoStep::Done,
-            _ => {}
+            Some(phase) if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 => {
+                model.auto_step = AutoStep::Done;
+            }
+            _ => arm_if_ready(model, not_before, now),
         },
         AutoStep::WaitForArmed => {
             if armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
@@ -40,6 +34,54 @@ pub(super) fn step(model: &mut Model, now: Duration) {
             }
         }
         AutoStep::Done => {}
+    }
+}
+
+/// An arming was refused for now. Returns whether the automatic mode will ask again, once the checks pass:
+/// a new submission with its own reason, never the old frame sent again.
+pub(super) fn ask_again(model: &mut Model, now: Duration) -> bool {
+    let asked = model.settings.auto && model.auto_step == AutoStep::WaitForArmed;
+    if asked {
+        model.info(now, "automatic mode: refused for now; asks again when the checks pass");
+        model.auto_step = AutoStep::WaitForReady { not_before: now + ASK_AGAIN_AFTER };
+    }
+    asked
+}
+
+fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
+    let why_not = why_not_ready(model, not_before, now);
+    let waited = model.link.first_heartbeat_at.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    match why_not {
+        None => {
+            model.info(now, "automatic mode: the checks pass; arming");
+            model.auto_step = AutoStep::WaitForArmed;
+            commands::submit(model, CommandKind::Arm, now);
+        }
+        Some(why) if waited >= PATIENCE => {
+            let seconds = PATIENCE.as_secs();
+            model.warn(now, format!("automatic mode: gives up {seconds} s after first contact: {why}"));
+            model.auto_step = AutoStep::Done;
+            model.outcome.refusal = Some((format!("ARM not asked for: {why}"), now));
+        }
+        Some(_) => {}
+    }
+}
+
+fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<String> {
+    let Some(status) = model.vehicle.status.as_ref() else {
+        return Some("the vehicle has not said how its checks stand".to_owned());
+    };
+    let failing = words::failed_checks(status.value.checks_failed);
+    if status.is_stale(now) {
+        Some("the vehicle no longer says how its checks stand".to_owned())
+    } else if !failing.is_empty() {
+        Some(format!("failing checks: {}", failing.join(", ")))
+    } else if status.value.phase != TdPhase::TD_PHASE_PAD_IDLE {
+        Some(format!("phase {}", words::phase(status.value.phase)))
+    } else if status.received_at < not_before {
+        Some("refused for now, although no check fails".to_owned())
+    } else {
+        None
     }
 }
 

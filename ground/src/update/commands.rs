@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use protocol::command::{ANSWER_TIMEOUT, CommandAnswer, CommandEvent, CommandSender};
+use protocol::command::{ANSWER_TIMEOUT, CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
 use protocol::identity::VEHICLE;
 use protocol::log::record::EventLevel;
 
-use super::{Action, keys};
+use super::{Action, auto, keys};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::events::Speaker;
 use crate::model::{AutoStep, Model};
@@ -18,16 +18,21 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
     let aborting = commands.of(CommandKind::Abort).is_some_and(|track| is_open(track.acknowledged));
     if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
         // An abort or a disarming ends whatever else is still being resent: a start that arrives
-        // after it would undo it.
-        commands.sender = CommandSender::new();
-        for track in commands.tracks.iter_mut().filter(|track| is_open(track.acknowledged)) {
-            track.acknowledged = Acknowledged::Nothing;
+        // after it would undo it. Nor will its effect be seen; nobody needs to be told.
+        commands.sender.withdraw_all(now);
+        for track in &mut commands.tracks {
+            track.not_observed_said = true;
+            if is_open(track.acknowledged) {
+                track.acknowledged = Acknowledged::Nothing;
+            }
         }
         // The automatic mode yields to the hand.
         model.auto_step = AutoStep::Done;
     }
     // Pressed again while it is under way, an abort is sent at once and its attempts go on counting.
     let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).copied();
+    let ticket = send(model, kind, now);
+    let commands = &mut model.commands;
     commands.tracks.retain(|track| track.kind != kind);
     commands.tracks.push(Track {
         kind,
@@ -36,18 +41,18 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
         acknowledged: Acknowledged::Waiting,
         acknowledged_at: None,
         observed_at: None,
+        ticket,
         not_observed_said: false,
     });
     commands.abort_again_at = None;
     model.outcome.refusal = None;
-    send(model, kind, now);
     poll(model, now);
 }
 
-fn send(model: &mut Model, kind: CommandKind, now: Duration) {
+fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let (command, param1) = kind.wire();
     let params = [param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    model.commands.sender.submit(VEHICLE, command, params, kind.resend(), now);
+    model.commands.sender.submit(VEHICLE, command, params, kind.resend(), now)
 }
 
 fn is_open(acknowledged: Acknowledged) -> bool {
@@ -68,15 +73,15 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
+    let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
         track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledged::Nothing);
-    if given_up {
+    if !awaited && given_up {
         // Slow radio: the answer to a command that is waited for no longer is still a fact.
         let (command, result) = (answer.command, answer.result);
         on_event(model, CommandEvent::Answered { command, result }, now);
         return;
     }
-    model.commands.sender.on_answer(&answer, now);
     poll(model, now);
 }
 
@@ -86,11 +91,16 @@ fn track_of(model: &mut Model, command: u16) -> Option<&mut Track> {
 }
 
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
-    let (CommandEvent::Sent { command, .. }
-    | CommandEvent::InProgress { command, .. }
-    | CommandEvent::Answered { command, .. }
-    | CommandEvent::TimedOut { command, .. }) = event;
-    let Some(track) = track_of(model, command) else { return };
+    let track = match event {
+        CommandEvent::Sent { command, .. }
+        | CommandEvent::InProgress { command, .. }
+        | CommandEvent::Answered { command, .. }
+        | CommandEvent::TimedOut { command, .. } => track_of(model, command),
+        CommandEvent::AnsweredLate { ticket, .. } => {
+            model.commands.tracks.iter_mut().find(|track| track.ticket == ticket)
+        }
+    };
+    let Some(track) = track else { return };
     let kind = track.kind;
     let name = kind.name();
     let (operator_kind, level, text) = match event {
@@ -103,14 +113,15 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged = Acknowledged::InProgress;
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
-        CommandEvent::Answered { result, .. } => {
+        CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => {
             track.acknowledged = Acknowledged::Answered(result);
             track.acknowledged_at = Some(now);
             let words = result_words(result);
+            let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
             if track.accepted() {
-                ("acknowledged", EventLevel::Info, format!("{name} acknowledged: {words}"))
+                ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}"))
             } else {
-                ("refused", EventLevel::Error, format!("{name} REFUSED: {words}"))
+                ("refused", EventLevel::Error, format!("{name} REFUSED{late}: {words}"))
             }
         }
         CommandEvent::TimedOut { attempts, .. } => {
@@ -119,7 +130,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         }
     };
     let answered = match event {
-        CommandEvent::Answered { result, .. } => Some(result),
+        CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => Some(result),
         _ => None,
     };
     keys::record_operator(model, operator_kind, &text, now);
@@ -133,12 +144,14 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
 
 fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Duration) {
     let refused = result != MavResult::MAV_RESULT_ACCEPTED as u8;
+    let for_now = result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
     match kind {
+        CommandKind::Arm if for_now && auto::ask_again(model, now) => {}
         CommandKind::Arm | CommandKind::Start if refused => {
             model.outcome.refusal = Some((format!("{} {}", kind.name(), result_words(result)), now));
         }
         // "Not now" is no answer to an abort.
-        CommandKind::Abort if result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8 => {
+        CommandKind::Abort if for_now => {
             model.commands.abort_again_at = Some(now + ANSWER_TIMEOUT);
             if let Some(track) = model.commands.tracks.iter_mut().find(|track| track.kind == kind) {
                 track.acknowledged = Acknowledged::Waiting;
@@ -146,10 +159,6 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
         }
         _ => {}
     }
-}
-
-fn result_words(result: u8) -> &'static str {
-    CommandAnswer { command: 0, result, progress: 0, target: VEHICLE }.result_words()
 }
 
 /// Compares the vehicle's own state with what was asked.

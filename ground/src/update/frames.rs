@@ -71,6 +71,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         }
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
+            model.link.first_heartbeat_at.get_or_insert(now);
             model.link.heartbeat_at = Some(now);
             if std::mem::take(&mut model.link.lost_said) {
                 model.info(now, "link restored: the vehicle is heard again");
@@ -87,7 +88,8 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     commands::observe(model, now);
 }
 
-/// PING with target 0 asks for itself back, addressed to the sender.
+/// PING with target 0 asks for itself back, addressed to the sender. With any other target it is an
+/// answer itself, to us or to another: answering that would go on for ever.
 #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
 fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
     let MavMessage::PING(data) = message else { return None };
@@ -113,6 +115,7 @@ pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
 
 fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
     let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+    // Another's question is its own to ask, and another's answer is measured by its clock.
     if !GROUND.accepts(Address { system_id: data.target_system, component_id: data.target_component }) {
         return;
     }

@@ -13,9 +13,7 @@ use super::{Action, commands};
 use crate::key::Key;
 use crate::model::Model;
 use crate::model::command::CommandKind;
-use crate::model::dialog::{
-    ABORT_TIME_LIMIT, ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT,
-};
+use crate::model::dialog::{ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT};
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
 
@@ -23,11 +21,13 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     record_operator(model, "key", &key.name(), now);
     expire(model, now);
     if key == Key::CtrlX {
-        abort_chord(model, now);
+        model.abort_chord.press(now);
         return;
     }
-    // The chord is twice the same key with nothing between.
-    model.abort_pressed_at = None;
+    // The chord is twice the same key with nothing between; once complete, nothing takes it back.
+    if model.abort_chord.end() {
+        abort(model, now);
+    }
     match key {
         Key::CtrlC => return quit(model, now),
         Key::CtrlL => return model.outbox.push(Action::Redraw),
@@ -54,9 +54,6 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
 
 /// Closes what has waited too long: an offer to arm does not stay open behind the crew's back.
 pub(super) fn expire(model: &mut Model, now: Duration) {
-    if model.abort_pressed_at.is_some_and(|at| now.saturating_sub(at) > ABORT_TIME_LIMIT) {
-        model.abort_pressed_at = None;
-    }
     if model.dialog.until().is_some_and(|until| now > until) {
         let words = match std::mem::replace(&mut model.dialog, Dialog::Closed) {
             Dialog::Arm { .. } => "arming: time is up, nothing was sent",
@@ -152,11 +149,15 @@ fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
 }
 
-fn abort_chord(model: &mut Model, now: Duration) {
-    if model.abort_pressed_at.take().is_none() {
-        model.abort_pressed_at = Some(now);
-        return;
+/// Lets the abort chord's time pass. Only with the clock, never with a key: that key may be one more
+/// repeat of a Ctrl-X that is held.
+pub(super) fn pass_abort_chord(model: &mut Model, now: Duration) {
+    if model.abort_chord.pass(now) {
+        abort(model, now);
     }
+}
+
+fn abort(model: &mut Model, now: Duration) {
     model.dialog = Dialog::Closed;
     commands::submit(model, CommandKind::Abort, now);
 }

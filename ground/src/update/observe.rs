@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use protocol::command::CommandSender;
 use protocol::dialect::TdPhase;
 use protocol::log::record::EventLevel;
 
@@ -41,7 +40,7 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.outcome = Outcome { error: model.outcome.error.take(), ..Outcome::default() };
     // What was asked of the vehicle before its reboot is not asked of it afterwards; an abort is.
     let aborting = model.commands.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none());
-    model.commands.sender = CommandSender::new();
+    model.commands.sender.withdraw_all(now);
     model.commands.tracks.retain(|track| track.kind == CommandKind::Abort && aborting);
     if aborting {
         model.commands.abort_again_at = Some(now);

@@ -25,6 +25,7 @@ const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
     keys::expire(model, now);
+    keys::pass_abort_chord(model, now);
     heartbeat(model, now);
     if model.link.heartbeat_at.is_some() && is_due(&mut model.due.timesync, TIMESYNC_EVERY, now) {
         let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);

@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
-use super::number::{age_mark, fixed, row};
+use super::number::{age_mark, fixed, row, shortest};
 use super::theme::{Role, Theme};
 use crate::model::Model;
 use crate::model::vehicle::{Deflection, Sample};
 
-/// The scale of the gimbal's bar; beyond it the mark stays at the end.
-const GIMBAL_SCALE_DEG: f64 = 20.0;
+/// The scale of the gimbal's bar until the vehicle has said where its gimbal stops.
+const DEFAULT_SCALE_DEG: f64 = 20.0;
 /// Columns of the bar; odd, so that zero has one.
 const BAR_COLUMNS: usize = 21;
 
@@ -48,23 +48,35 @@ pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
     let commanded = angle(|deflection| deflection.commanded_rad);
     let measured = angle(|deflection| deflection.measured_rad);
     let role = gimbal.map_or(Role::Label, |gimbal| age_mark(&gimbal, now).1);
+    let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
+    let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
+    let value = |sample: Option<Sample<f64>>| sample.map(|sample| sample.value);
     vec![
         row(theme, "command o", commanded, 2, "deg", now),
         row(theme, "actual  #", measured, 2, "deg", now),
         Line::styled(
-            format!(" {}", bar(commanded.map(|angle| angle.value), measured.map(|angle| angle.value))),
+            format!(" {}", bar(value(commanded), value(measured), limit.unwrap_or(DEFAULT_SCALE_DEG))),
             theme.style(role),
         ),
-        Line::styled(format!(" {:<10}0{:>10}", -GIMBAL_SCALE_DEG, "+20 deg"), theme.style(Role::Label)),
+        Line::styled(scale(limit), theme.style(Role::Label)),
     ]
 }
 
-fn bar(commanded_deg: Option<f64>, measured_deg: Option<f64>) -> String {
+/// What the ends of the bar stand for; without numbers while that is unknown.
+fn scale(limit_deg: Option<f64>) -> String {
+    let (left, right) = limit_deg.map(shortest).map_or_else(
+        || ("-".to_owned(), "+".to_owned()),
+        |limit| (format!("-{limit}"), format!("+{limit} deg")),
+    );
+    format!(" {left:<10}0{right:>10}")
+}
+
+/// Beyond the scale a mark stays at the end.
+fn bar(commanded_deg: Option<f64>, measured_deg: Option<f64>, scale_deg: f64) -> String {
     let mut cells = ['-'; BAR_COLUMNS];
     cells[BAR_COLUMNS / 2] = '|';
     let cell = |deg: f64| {
-        let share =
-            (deg.clamp(-GIMBAL_SCALE_DEG, GIMBAL_SCALE_DEG) + GIMBAL_SCALE_DEG) / (2.0 * GIMBAL_SCALE_DEG);
+        let share = (deg.clamp(-scale_deg, scale_deg) + scale_deg) / (2.0 * scale_deg);
         ((share * (BAR_COLUMNS - 1) as f64).round() as usize).min(BAR_COLUMNS - 1)
     };
     for (angle, mark) in [(commanded_deg, 'o'), (measured_deg, '#')] {
@@ -81,8 +93,15 @@ mod tests {
 
     #[test]
     fn the_bar_marks_command_and_measurement() {
-        assert_eq!(bar(None, None), "----------|----------");
-        assert_eq!(bar(Some(-20.0), Some(0.0)), "o---------#----------");
-        assert_eq!(bar(Some(90.0), Some(f64::NAN)), "----------|---------o");
+        assert_eq!(bar(None, None, 20.0), "----------|----------");
+        assert_eq!(bar(Some(-20.0), Some(0.0), 20.0), "o---------#----------");
+        assert_eq!(bar(Some(90.0), Some(f64::NAN), 20.0), "----------|---------o");
+        assert_eq!(bar(Some(-5.0), Some(2.5), 5.0), "o---------|----#-----");
+    }
+
+    #[test]
+    fn the_scale_has_the_vehicles_numbers_or_none() {
+        assert_eq!(scale(Some(f64::from(0.261_799_4_f32).to_degrees())), " -15       0   +15 deg");
+        assert_eq!(scale(None), " -         0         +");
     }
 }

@@ -51,7 +51,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     lines.extend(controller::rows(model, theme, now).into_iter().take(2));
     lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
     lines.extend(actuators::fin_rows(model, theme, now));
-    lines.push(happenings::link(model, theme, now));
+    lines.push(happenings::link(model, theme, now, usize::from(area.width)));
     let room = rows.saturating_sub(lines.len());
     lines.extend(happenings::events(model, theme, usize::from(area.width), room));
     draw_lines(frame, area, &lines);
@@ -59,7 +59,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let line = top::abort(model, theme, now);
-    if model.abort_pressed_at.is_some() {
+    if model.abort_chord.is_begun(now) {
         return line;
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {

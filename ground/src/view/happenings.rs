@@ -73,8 +73,9 @@ fn wrap(text: &str, columns: usize) -> Vec<String> {
     lines
 }
 
-/// What the link carries, and how the log does; the least important last.
-pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+/// What the link carries, and how the log does, in a line of this width. What would be cut is left out:
+/// half a number is a wrong one.
+pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     if let Some(why) = &model.link.trouble {
         return Line::styled(format!(" LINK DOWN {why}"), theme.style(Role::Alarm));
     }
@@ -85,18 +86,29 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     };
     let loss_role = if figures.loss > 0.05 { Role::Caution } else { Role::Plain };
     let rejected = model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable;
-    let plain = |text: String| Span::styled(text, theme.style(Role::Plain));
+    let span = |text: String, role: Role| Span::styled(text, theme.style(role));
+    let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
     let mut spans = vec![
-        plain(format!(" rx {:.0} B/s {:.0}/s", figures.rx_bytes_s, figures.rx_frames_s)),
-        Span::styled(format!("  loss {:.1} %", figures.loss * 100.0), theme.style(loss_role)),
-        plain(format!("  rtt {round_trip}  ")),
+        span(
+            format!(" rx {:.0}{capacity} B/s {:.0}/s", figures.rx_bytes_s, figures.rx_frames_s),
+            Role::Plain,
+        ),
+        span(format!("  loss {:.1} %", figures.loss * 100.0), loss_role),
+        Span::raw("  "),
         log(model, theme),
     ];
-    if rejected > 0 || model.link.send_drops > 0 {
-        let text = format!("  rejected {rejected}  unsent {}", model.link.send_drops);
-        spans.push(Span::styled(text, theme.style(Role::Caution)));
+    let mut used: usize = spans.iter().map(Span::width).sum();
+    let refused = (rejected > 0 || model.link.send_drops > 0)
+        .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), Role::Caution));
+    let round_trip = span(format!("  rtt {round_trip}"), Role::Plain);
+    let sent = span(format!("  tx {:.0} B/s", figures.tx_bytes_s), Role::Plain);
+    for more in refused.into_iter().chain([round_trip, sent]) {
+        used += more.width();
+        if used > columns {
+            break;
+        }
+        spans.push(more);
     }
-    spans.push(plain(format!("  tx {:.0} B/s", figures.tx_bytes_s)));
     Line::from(spans)
 }
 

@@ -29,6 +29,17 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A setting without needless digits: `20`, `0.1`, `82.5`. Three decimals hide that it came as an `f32`.
+pub fn shortest(value: f64) -> String {
+    let text = fixed(value, 3);
+    match text.split_once('.') {
+        Some((_, decimals)) if decimals.bytes().all(|digit| digit.is_ascii_digit()) => {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        }
+        _ => text,
+    }
+}
+
 /// The mark and the role of a value of this age.
 pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, Role) {
     if sample.is_stale(now) { (STALE_MARK, Role::Stale) } else { (" ", Role::Plain) }
@@ -82,5 +93,14 @@ mod tests {
         }
         assert_eq!(fixed(-0.001, 2), "0.00");
         assert_eq!(fixed(-0.01, 2), "-0.01");
+    }
+
+    #[test]
+    fn settings_have_no_needless_digits() {
+        let cases = [(20.0, "20"), (f64::from(0.1_f32), "0.1"), (82.5, "82.5"), (0.0, "0"), (f64::NAN, "--")];
+        for (value, expected) in cases {
+            assert_eq!(shortest(value), expected);
+        }
+        assert_eq!(shortest(1e9), "1.0e9");
     }
 }

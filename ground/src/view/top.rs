@@ -8,7 +8,6 @@ use super::number::{age_mark, seconds};
 use super::theme::{Role, Theme};
 use crate::model::Model;
 use crate::model::command::{Acknowledged, CommandKind, Track};
-use crate::model::dialog::ABORT_TIME_LIMIT;
 use crate::model::link::LinkState;
 use crate::model::words;
 
@@ -70,8 +69,7 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// What an abort would do now, or what became of the one that was asked for.
 pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let effect = abort_effect(model, now);
-    let chord_open = model.abort_pressed_at.is_some_and(|at| now.saturating_sub(at) <= ABORT_TIME_LIMIT);
-    if chord_open {
+    if model.abort_chord.is_begun(now) {
         return Line::styled(format!(" Ctrl-X AGAIN TO ABORT: {effect}"), theme.style(Role::Alarm));
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {

@@ -12,7 +12,7 @@ use crate::model::Model;
 /// The panel's title and rows: the verdict once there is one, the prediction before.
 pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     if let Some(verdict) = model.vehicle.verdict {
-        let mut rows = limit_rows(&verdict.value.touchdown, theme, " ", Role::Plain);
+        let mut rows = limit_rows(model, &verdict.value.touchdown, theme, " ", Role::Plain);
         let (word, role) = verdict_word(verdict.value.landed);
         rows.push(Line::styled(word, theme.style(role)));
         return ("Verdict", rows);
@@ -21,7 +21,7 @@ pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<L
         return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(Role::Label))]);
     };
     let (mark, role) = age_mark(&prediction, now);
-    let mut rows = limit_rows(&prediction.value.touchdown, theme, mark, role);
+    let mut rows = limit_rows(model, &prediction.value.touchdown, theme, mark, role);
     rows.push(Line::from(vec![
         Span::styled("in      ", theme.style(Role::Label)),
         Span::styled(format!("{mark}{:>7}", fixed(prediction.value.time_to_go_s, 2)), theme.style(role)),
@@ -44,8 +44,14 @@ fn decimals(value: f64) -> usize {
     if value.abs() < 100.0 { 3 } else { 1 }
 }
 
-fn limit_rows(touchdown: &Touchdown, theme: Theme, mark: &'static str, role: Role) -> Vec<Line<'static>> {
-    let rows = touchdown.rows();
+fn limit_rows(
+    model: &Model,
+    touchdown: &Touchdown,
+    theme: Theme,
+    mark: &'static str,
+    role: Role,
+) -> Vec<Line<'static>> {
+    let rows = touchdown.rows(model.vehicle.limits.as_ref());
     let line = |row: &crate::limits::LimitRow| {
         let (word, word_role) = if row.kept { ("ok", Role::Good) } else { ("NO", Role::Alarm) };
         Line::from(vec![

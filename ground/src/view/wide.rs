@@ -86,7 +86,7 @@ fn draw_left(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
         let inside = titled("Gimbal", theme, frame, gimbal);
         draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
     }
-    frame.render_widget(happenings::link(model, theme, now), link);
+    frame.render_widget(happenings::link(model, theme, now, usize::from(link.width)), link);
     let inside = titled("Events", theme, frame, events);
     draw_lines(
         frame,

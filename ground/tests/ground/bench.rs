@@ -12,8 +12,8 @@ use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
     MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase,
-    TdSolverStatus,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel,
+    TdInterlock, TdLimit, TdPhase, TdSolverStatus,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -77,6 +77,29 @@ impl Bench {
     pub(crate) fn keys(&mut self, keys: &[Key]) {
         for key in keys {
             self.key(*key);
+        }
+    }
+
+    /// Ctrl-X twice, by an unhurried finger, and the proof that it is not held.
+    pub(crate) fn abort_chord(&mut self) {
+        self.key(Key::CtrlX);
+        self.run(0.4);
+        self.key(Key::CtrlX);
+        self.run(0.2);
+    }
+
+    /// A key held on a terminal that tells no repeats: pressed, again after the keyboard's delay, then on
+    /// and on. A tick every 10 ms, as the run loop may bring them.
+    pub(crate) fn hold(&mut self, key: Key, delay_ms: u64, period_ms: u64, seconds: u64) {
+        for elapsed_ms in (0..seconds * 1_000).step_by(1) {
+            let repeats = elapsed_ms >= delay_ms && (elapsed_ms - delay_ms).is_multiple_of(period_ms);
+            if elapsed_ms == 0 || repeats {
+                self.key(key);
+            }
+            if elapsed_ms.is_multiple_of(10) {
+                self.msg(Msg::Tick);
+            }
+            self.now += Duration::from_millis(1);
         }
     }
 
@@ -234,6 +257,20 @@ impl Bench {
         }));
     }
 
+    /// What counts as a landing for this vehicle.
+    pub(crate) fn limits(&mut self) {
+        self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+            x_m: 20.0,
+            altitude_min_m: 0.0,
+            altitude_max_m: 0.2,
+            pitch_error_rad: 5.0_f32.to_radians(),
+            u_m_s: 0.4,
+            w_m_s: 0.1,
+            q_rad_s: 2.0_f32.to_radians(),
+            gimbal_limit_rad: 20.0_f32.to_radians(),
+        }));
+    }
+
     pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             time_boot_ms: self.boot_ms(),
@@ -248,17 +285,23 @@ impl Bench {
         }));
     }
 
-    /// Takes every command sent since the last call.
+    /// Takes everything done since the last call; of that, the commands sent.
     pub(crate) fn take_commands(&mut self) -> Vec<COMMAND_LONG_DATA> {
-        let actions = std::mem::take(&mut self.actions);
-        let command = |action| match action {
-            Action::Send(message) => match *message {
-                MavMessage::COMMAND_LONG(command) => Some(command),
+        let commands = self.commands();
+        self.actions.clear();
+        commands
+    }
+
+    /// The commands sent since the last taking.
+    pub(crate) fn commands(&self) -> Vec<COMMAND_LONG_DATA> {
+        let command = |action: &Action| match action {
+            Action::Send(message) => match &**message {
+                MavMessage::COMMAND_LONG(command) => Some(command.clone()),
                 _ => None,
             },
             _ => None,
         };
-        actions.into_iter().filter_map(command).collect()
+        self.actions.iter().filter_map(command).collect()
     }
 
     pub(crate) fn wants_to_quit(&self) -> bool {
@@ -284,6 +327,7 @@ impl Bench {
 pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
     Settings {
         link_name: "udpin:127.0.0.1:14550".to_owned(),
+        link_capacity_bytes_s: None,
         log_path: Some("flight.mcap".to_owned()),
         auto,
         interactive,

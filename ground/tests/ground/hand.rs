@@ -2,7 +2,8 @@
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
 use ground::key::Key;
-use ground::model::dialog::{ABORT_TIME_LIMIT, ARM_TIME_LIMIT, Dialog};
+use ground::model::chord::ABORT_TIME_LIMIT;
+use ground::model::dialog::{ARM_TIME_LIMIT, Dialog};
 use protocol::dialect::{MavCmd, TdPhase};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -92,7 +93,10 @@ fn abort_works_from_every_dialog_and_closes_it() {
         bench.key(Key::CtrlX);
         assert!(!bench.take_commands().iter().any(is_abort), "one press is not enough");
         assert!(bench.screen(80, 24).contains("AGAIN TO ABORT"));
+        bench.run(0.4);
         bench.key(Key::CtrlX);
+        assert!(!bench.take_commands().iter().any(is_abort), "it may be the first repeat of a held key");
+        bench.run(0.2);
         assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
         assert_eq!(bench.model.dialog, Dialog::Closed);
     }
@@ -112,7 +116,7 @@ fn half_an_abort_chord_expires_and_another_key_breaks_it() {
 #[test]
 fn an_abort_is_repeated_until_acknowledged_and_its_attempts_are_shown() {
     let mut bench = Bench::crewed();
-    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.abort_chord();
     bench.speaks = false;
     bench.run(10.0);
     let aborts: Vec<_> = bench.take_commands().into_iter().filter(is_abort).collect();
@@ -127,7 +131,7 @@ fn an_abort_is_repeated_until_acknowledged_and_its_attempts_are_shown() {
 #[test]
 fn not_now_is_no_answer_to_an_abort() {
     let mut bench = Bench::crewed();
-    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.abort_chord();
     bench.take_commands();
     bench.answer(ABORT, TEMPORARILY_REJECTED);
     bench.run(1.0);
@@ -141,7 +145,7 @@ fn an_abort_ends_a_start_that_is_still_being_resent() {
     bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
     bench.run(1.0);
     bench.keys(&[Key::Char('S'), Key::Enter]);
-    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.abort_chord();
     bench.take_commands();
     bench.run(5.0);
     assert!(bench.take_commands().iter().all(is_abort));
@@ -235,10 +239,35 @@ fn a_letter_too_many_closes_the_offer_to_arm() {
 #[test]
 fn the_wait_after_an_abort_on_the_pad_is_shown_at_every_size() {
     let mut bench = Bench::crewed();
-    bench.keys(&[Key::CtrlX, Key::CtrlX]);
+    bench.abort_chord();
     bench.answer(ABORT, ACCEPTED);
     bench.pad_wait_s = 57;
     bench.run(0.1);
     assert!(bench.screen(80, 24).contains("STAY OFF THE PAD for 57 s"));
     assert!(bench.screen(20, 5).contains("STAY OFF THE PAD"));
+}
+
+/// The first repeat of a held key comes when a second press would; the ones after it tell.
+#[test]
+fn a_held_ctrl_x_does_not_abort_and_one_more_press_does() {
+    for delay_ms in [250, 400, 500, 600] {
+        let mut bench = Bench::crewed();
+        bench.speaks = false;
+        bench.hold(Key::CtrlX, delay_ms, 33, 5);
+        bench.run(0.5);
+        assert!(!bench.take_commands().iter().any(is_abort), "first repeat after {delay_ms} ms");
+        assert!(bench.screen(80, 24).contains("AGAIN TO ABORT"));
+        bench.key(Key::CtrlX);
+        bench.run(0.2);
+        assert!(bench.take_commands().iter().any(is_abort), "released and pressed again");
+    }
+}
+
+#[test]
+fn nothing_takes_back_a_complete_abort_chord() {
+    let mut bench = Bench::crewed();
+    bench.key(Key::CtrlX);
+    bench.run(0.4);
+    bench.keys(&[Key::CtrlX, Key::Escape]);
+    assert!(bench.take_commands().iter().any(is_abort));
 }

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::dialog::{ABORT_TIME_LIMIT, ARM_TIME_LIMIT};
+use ground::model::chord::ABORT_TIME_LIMIT;
+use ground::model::dialog::ARM_TIME_LIMIT;
 use proptest::prelude::*;
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
@@ -89,7 +90,7 @@ proptest! {
         // A half chord among the keys is over.
         bench.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.2);
         bench.take_commands();
-        bench.keys(&[Key::CtrlX, Key::CtrlX]);
+        bench.abort_chord();
         prop_assert!(bench.take_commands().iter().any(is_abort));
     }
 }

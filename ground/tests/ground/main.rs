@@ -1,6 +1,8 @@
 //! The ground station from outside: its keys, its radio, its screens, the program itself.
 
+mod auto;
 mod bench;
+mod disarm;
 mod hand;
 mod ladder;
 mod program;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use protocol::log::reader::LogReader;
+use protocol::log::reader::{LogItem, LogReader};
 
 fn ground(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ground"))
@@ -77,7 +77,21 @@ fn the_demonstration_lands_with_code_0_and_names_its_log() {
     }
     let log = text.lines().find_map(|line| line.strip_prefix("log: ")).unwrap();
     let mut reader = LogReader::new(std::fs::File::open(directory.path().join(log)).unwrap());
-    while reader.next_item().unwrap().is_some() {}
+    let (mut vehicle_ns, mut apart_ns, mut from_ground) = (0_u64, 0, 0);
+    while let Some(item) = reader.next_item().unwrap() {
+        let LogItem::Message { channel_id, log_time_ns, .. } = item else { continue };
+        let channel = reader.channel(channel_id).unwrap();
+        match channel.metadata.get("endpoint").map(String::as_str) {
+            Some("vehicle") => vehicle_ns = log_time_ns,
+            Some("ground") if vehicle_ns > 0 => {
+                from_ground += 1;
+                apart_ns = apart_ns.max(log_time_ns.abs_diff(vehicle_ns));
+            }
+            _ => {}
+        }
+    }
+    // At four times the speed, two clocks would be seconds apart before the landing.
+    assert!(from_ground > 10 && apart_ns < 1_500_000_000, "{from_ground} records, {apart_ns} ns apart");
     assert_eq!(reader.damage(), None);
     let both_sides = |topic: &str| {
         let mut ends: Vec<_> = reader

@@ -2,7 +2,9 @@
 
 use crate::bench::{Bench, MONO, is_abort, settings, typed};
 use ground::key::Key;
+use ground::update::Msg;
 use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdLimit, TdPhase};
+use protocol::frame::FramerCounters;
 use ratatui::style::Color;
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (40, 12), (20, 5)];
@@ -17,6 +19,7 @@ fn on_the_pad() -> Bench {
     let mut bench = Bench::crewed();
     bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
     bench.actuators(0);
+    bench.limits();
     bench.plan(TdLimit::empty());
     bench
 }
@@ -72,6 +75,36 @@ fn regress_pad_no_go() {
     snapshot("pad_no_go_arming", &bench);
 }
 
+/// Until the vehicle has said its limits the screen shows none.
+#[test]
+fn limits_are_shown_once_the_vehicle_has_said_them() {
+    let mut bench = Bench::crewed();
+    bench.actuators(0);
+    bench.plan(TdLimit::TD_LIMIT_AXIAL_SPEED);
+    let screen = bench.screen(80, 24);
+    assert!(
+        screen.contains("NO u      -0.050 -- m/s") && screen.contains(" -         0         +"),
+        "{screen}"
+    );
+    bench.limits();
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("NO u      -0.050 ±0.4 m/s") && screen.contains("+20 deg"), "{screen}");
+}
+
+/// A serial line's capacity stands beside its rate; a network's is unknown.
+#[test]
+fn the_links_capacity_is_shown_beside_its_rate() {
+    let mut settings = settings(false, true);
+    settings.link_capacity_bytes_s = Some(5_760);
+    let mut bench = Bench::new(settings);
+    bench.run(1.0);
+    bench.msg(Msg::Received { bytes: 1_600, framing: FramerCounters::default() });
+    assert!(bench.screen(80, 24).contains(" rx 1600/5760 B/s "), "{}", bench.screen(80, 24));
+    let mut bench = Bench::crewed();
+    bench.msg(Msg::Received { bytes: 1_600, framing: FramerCounters::default() });
+    assert!(bench.screen(80, 24).contains(" rx 1600 B/s "));
+}
+
 #[test]
 fn regress_countdown() {
     snapshot("countdown", &counting());
@@ -87,6 +120,7 @@ fn regress_abort_chord_and_abort() {
     let mut bench = powered();
     bench.key(Key::CtrlX);
     snapshot("abort_chord", &bench);
+    bench.run(0.4);
     bench.key(Key::CtrlX);
     bench.run(1.0);
     assert!(bench.take_commands().iter().any(is_abort));

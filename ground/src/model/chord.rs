@@ -1,0 +1,145 @@
+//! The abort chord: Ctrl-X pressed twice, told apart from Ctrl-X held.
+//!
+//! Many terminals send a held key as the same bytes over and over: once at the press, again after the
+//! keyboard's delay (a quarter of a second and more), then every few hundredths of a second. The first
+//! repeat looks exactly like a second press; what follows it does not. So the second press counts only
+//! once nothing has followed it for [`REPEATS_WITHIN`], and a hold, however long, is one press.
+
+use std::time::Duration;
+
+/// Time for the second press, counted from the first or from the end of its hold.
+pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
+/// Presses closer together than this are one key held: keyboards repeat every 20 to 100 ms, fingers
+/// press again later than that. Also how long a second press waits for its proof.
+pub const REPEATS_WITHIN: Duration = Duration::from_millis(120);
+
+/// How far the chord is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AbortChord {
+    /// Not begun.
+    #[default]
+    Open,
+    /// Pressed once, perhaps still held; when it was seen last.
+    Once(Duration),
+    /// Pressed again; when. It counts unless a repeat follows.
+    Twice(Duration),
+}
+
+impl AbortChord {
+    /// Whether the first press was seen and its time is not over.
+    pub fn is_begun(self, now: Duration) -> bool {
+        match self {
+            Self::Open => false,
+            Self::Once(at) => now.saturating_sub(at) <= ABORT_TIME_LIMIT,
+            Self::Twice(_) => true,
+        }
+    }
+
+    /// When a second press counts.
+    pub fn acts_at(self) -> Option<Duration> {
+        match self {
+            Self::Twice(at) => Some(at + REPEATS_WITHIN),
+            Self::Open | Self::Once(_) => None,
+        }
+    }
+
+    /// Ctrl-X was seen.
+    pub fn press(&mut self, now: Duration) {
+        *self = match *self {
+            Self::Once(at) if now.saturating_sub(at) >= REPEATS_WITHIN && self.is_begun(now) => {
+                Self::Twice(now)
+            }
+            // Not acted upon in time, because the ground was busy: nobody knows when this one was pressed.
+            Self::Twice(at) if now.saturating_sub(at) >= REPEATS_WITHIN => Self::Twice(now),
+            // The first, or one more of a held key.
+            Self::Open | Self::Once(_) | Self::Twice(_) => Self::Once(now),
+        };
+    }
+
+    /// Another key was pressed: a key that is held no longer repeats then. Returns whether the chord is
+    /// complete; it is over either way.
+    pub fn end(&mut self) -> bool {
+        matches!(std::mem::take(self), Self::Twice(_))
+    }
+
+    /// Time passes. Returns whether the chord is complete; then it is over.
+    pub fn pass(&mut self, now: Duration) -> bool {
+        if self.acts_at().is_some_and(|at| now >= at) {
+            return self.end();
+        }
+        if !self.is_begun(now) {
+            *self = Self::Open;
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Feeds presses at these times and lets time pass every 10 ms; how often the chord was complete.
+    fn aborts(presses_ms: &[u64]) -> usize {
+        let mut chord = AbortChord::default();
+        let end = presses_ms.last().copied().unwrap_or(0) + 3_000;
+        let mut count = 0;
+        for now in 0..end {
+            if presses_ms.contains(&now) {
+                chord.press(Duration::from_millis(now));
+            }
+            if now % 10 == 0 {
+                count += usize::from(chord.pass(Duration::from_millis(now)));
+            }
+        }
+        count
+    }
+
+    fn held(delay_ms: u64, period_ms: u64, repeats: u64) -> Vec<u64> {
+        std::iter::once(0).chain((0..repeats).map(|k| delay_ms + k * period_ms)).collect()
+    }
+
+    #[test]
+    fn a_held_key_never_aborts() {
+        for delay_ms in [250, 400, 500, 600, 1_000] {
+            assert_eq!(aborts(&held(delay_ms, 33, 200)), 0, "first repeat after {delay_ms} ms");
+        }
+    }
+
+    #[test]
+    fn two_presses_abort_once_from_hurried_to_cold_fingers() {
+        for pause_ms in [120, 150, 200, 350, 600, 1_000, 1_500, 2_000] {
+            assert_eq!(aborts(&[0, pause_ms]), 1, "{pause_ms} ms between");
+        }
+        assert_eq!(aborts(&[0, 2_100]), 0);
+        assert_eq!(aborts(&[0, 20]), 0, "a contact that bounces");
+    }
+
+    #[test]
+    fn a_hold_is_one_press_and_the_next_press_aborts() {
+        let mut presses = held(500, 33, 30);
+        let released = presses.last().copied().unwrap();
+        presses.push(released + 400);
+        assert_eq!(aborts(&presses), 1);
+    }
+
+    #[test]
+    fn hammering_aborts() {
+        assert!(aborts(&[0, 140, 280, 420, 560]) >= 1);
+        assert!(aborts(&[0, 100, 200, 300, 600]) >= 1, "too fast to tell from a hold, until the last");
+    }
+
+    proptest! {
+        #[test]
+        fn no_keyboard_held_aborts(
+            delay_ms in 150_u64..1_900,
+            gaps in prop::collection::vec(15_u64..119, 2..200),
+        ) {
+            let mut presses = vec![0, delay_ms];
+            for gap in gaps {
+                presses.push(presses.last().copied().unwrap_or(0) + gap);
+            }
+            prop_assert_eq!(aborts(&presses), 0);
+        }
+    }
+}
