@@ -48,6 +48,7 @@ impl Vehicle {
         let sample = self.frame / self.frames_per_sample;
         if self.controller_is_due(sample) {
             self.run_controller(sample, stopwatch);
+            self.complain_of_readiness();
         }
         // After the controller: the gate judges a plan from where the vehicle is now, not a rehearsal.
         if self.mode.phase == Phase::LandArmed {
@@ -67,6 +68,22 @@ impl Vehicle {
             }
             _ => true,
         }
+    }
+
+    /// Tells the crew on the pad what stands in the way of arming, when that changes.
+    fn complain_of_readiness(&mut self) {
+        if self.mode.phase != Phase::PadIdle {
+            return;
+        }
+        let checks = self.arming_checks();
+        let failing = checks.iter().find(|check| !check.passed);
+        let complaint = failing.map(|check| check.name);
+        if complaint != self.readiness_complaint
+            && let Some(reason) = failing.and_then(Check::refusal)
+        {
+            self.say(Severity::Warning, format!("not ready: {reason}"));
+        }
+        self.readiness_complaint = complaint;
     }
 
     /// Moves every actuator and brings it back.

@@ -116,6 +116,8 @@ pub struct Vehicle {
     self_test: SelfTest,
     /// Since when thrust has been felt without a break.
     thrust_felt_since_s: Option<f64>,
+    /// The arming check that was last complained of.
+    readiness_complaint: Option<&'static str>,
     /// The gate check that was last complained of.
     gate_complaint: Option<&'static str>,
     /// The command that the actuators get at the next sample.
@@ -171,6 +173,7 @@ impl Vehicle {
             thrust: ThrustEstimate::default(),
             self_test: SelfTest::NotBegun,
             thrust_felt_since_s: None,
+            readiness_complaint: None,
             gate_complaint: None,
             next_gimbal_rad: 0.0,
             gimbal_applied_rad: 0.0,

@@ -124,7 +124,12 @@ fn a_failed_check_refuses_arming_and_says_which() {
 #[test]
 fn a_landing_that_cannot_be_is_refused_on_the_pad_with_its_bound() {
     let mut vehicle = vehicle_of(&Profile::builtin("paper-as-printed").unwrap());
-    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    let mut events = run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    for _ in 0..300 {
+        events.extend(vehicle.advance_frame(&mut still()));
+    }
+    let said = |event: &&VehicleEvent| matches!(event, VehicleEvent::Text { text, .. } if text.contains("not landable: best touchdown speed 4.3 m/s"));
+    assert_eq!(events.iter().filter(said).count(), 1, "said unasked, and once");
     let reason = vehicle.request(Request::Arm).reason.unwrap();
     assert!(reason.contains("not landable: best touchdown speed 4.3 m/s"), "{reason}");
 }
