@@ -1,10 +1,14 @@
 //! Vehicle and ground as processes of their own, over UDP and over a serial line.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
+use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
 use e2e::{Ended, Program, Running, SerialLine, program};
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage};
+use protocol::frame::Encoder;
+use protocol::identity::{GROUND, VEHICLE};
 
 fn vehicle(folder: &Path, link: &str) -> Command {
     let mut command = program(Program::OnboardSim);
@@ -73,7 +77,42 @@ fn over_a_radio_s_serial_line_they_land_within_its_budget() {
     assert!(up_s < 500.0, "{up_s} B/s up");
 }
 
-/// The same over socat's pseudo-terminals, where socat is installed: it is what a crew tests its radio with.
+/// A line that has stopped taking what the vehicle says still carries an abort to it.
+#[test]
+fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = SerialLine::that_takes_nothing_from_near(57_600);
+    let mut flight =
+        Running::start(&mut vehicle(folder.path(), &format!("serial:{}:57600", line.near.display())));
+    let mut radio = std::fs::File::options().write(true).open(&line.far).unwrap();
+    let mut encoder = Encoder::new(GROUND);
+    let mut command = |command, param1| {
+        let message = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+            command,
+            param1,
+            target_system: VEHICLE.system_id,
+            target_component: VEHICLE.component_id,
+            ..COMMAND_LONG_DATA::default()
+        });
+        radio.write_all(encoder.encode(&message).as_bytes()).unwrap();
+    };
+    flight.wait_for_line("PAD_IDLE");
+    command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
+    flight.wait_for_line("PAD_ARMED");
+    command(MavCmd::MAV_CMD_MISSION_START, 0.0);
+    // By the end of the countdown the vehicle has sent more than a terminal's buffer holds.
+    flight.wait_for_line("to POWERED");
+    command(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0);
+    let before_burn_out = flight.wait_for_line("no cut-off exists");
+    assert!(before_burn_out.contains("ABORT"), "{before_burn_out}");
+    let ended = flight.wait();
+    assert_eq!(ended.code, Some(4), "{}", ended.output);
+    let at =
+        |words: &str| ended.output.find(words).unwrap_or_else(|| panic!("no {words} in {}", ended.output));
+    assert!(at("no cut-off exists") < at("burn-out"), "{}", ended.output);
+}
+
+/// A flight over socat's pseudo-terminals, where socat is installed: it is what a crew tests its radio with.
 #[test]
 fn over_a_socat_pair_they_land() {
     let folder = tempfile::tempdir().unwrap();

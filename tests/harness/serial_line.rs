@@ -35,6 +35,18 @@ impl SerialLine {
     /// # Panics
     /// The system has no pseudo-terminals.
     pub fn new(baud: u32) -> Self {
+        Self::joined(baud, true)
+    }
+
+    /// The same, but nothing sent from the near end is ever taken: a radio that has stopped.
+    ///
+    /// # Panics
+    /// The system has no pseudo-terminals.
+    pub fn that_takes_nothing_from_near(baud: u32) -> Self {
+        Self::joined(baud, false)
+    }
+
+    fn joined(baud: u32, takes_from_near: bool) -> Self {
         let [(near_line, near_end), (far_line, far_end)] = [raw_terminal(), raw_terminal()];
         let near = ttyname(&near_end).expect("a device name");
         let far = ttyname(&far_end).expect("a device name");
@@ -45,14 +57,15 @@ impl SerialLine {
             (clone(&near_line), clone(&far_line), Arc::clone(&carried[0])),
             (far_line, near_line, Arc::clone(&carried[1])),
         ];
-        let copies = ways.map(|(from, to, carried)| {
+        let copies = ways.into_iter().skip(usize::from(!takes_from_near)).map(|(from, to, carried)| {
             let cut = Arc::clone(&cut);
             std::thread::Builder::new()
                 .name("serial line".to_owned())
                 .spawn(move || copy_paced(from, to, baud, &carried, &cut))
                 .expect("a thread")
         });
-        Self { near, far, carried, cut, copies: copies.into(), _ends: [near_end, far_end] }
+        let copies = copies.collect();
+        Self { near, far, carried, cut, copies, _ends: [near_end, far_end] }
     }
 
     /// Bytes carried from near to far, and from far to near.
