@@ -21,16 +21,10 @@
 //! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
 
 mod bound;
-mod condense;
-mod convexify;
-mod guess;
-mod line_search;
-mod polish;
+pub mod interior;
 mod problem;
-mod qp;
+pub mod reference;
 mod rollout;
-mod sensitivity;
-mod sqp;
 
 pub use bound::best_touchdown_speed_m_s;
 pub use problem::Problem;
@@ -81,6 +75,12 @@ impl SolveStatus {
 /// Where to start from: the inputs and multipliers of an earlier solution, shifted to the present.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WarmStart {
+    /// The states, one more than inputs; empty if unknown.
+    pub states: Vec<PlanarState>,
+    /// Multiplier of the dynamics into each node, one more than inputs, the first unused; empty if unknown.
+    pub costates: Vec<[f64; 6]>,
+    /// Multipliers of each input's lower and upper limit; empty if unknown.
+    pub limit_multipliers: Vec<[f64; 2]>,
     /// Gimbal angle of each interval, rad.
     pub inputs_rad: Vec<f64>,
     /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
@@ -110,6 +110,10 @@ pub struct Solution {
     pub best_touchdown_speed_m_s: f64,
     /// The states, one more than inputs.
     pub states: Vec<PlanarState>,
+    /// Multiplier of the dynamics into each node, one more than inputs; the first is not used.
+    pub costates: Vec<[f64; 6]>,
+    /// Multipliers of each input's lower and upper limit.
+    pub limit_multipliers: Vec<[f64; 2]>,
     /// Gimbal angle of each interval, rad.
     pub inputs_rad: Vec<f64>,
     /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
@@ -126,11 +130,16 @@ impl Solution {
 
     /// This solution as a start for the same problem `steps` intervals later.
     pub fn shifted(&self, steps: usize) -> WarmStart {
-        let later = |values: &[f64]| values.get(steps..).unwrap_or_default().to_vec();
+        fn later<T: Clone>(values: &[T], steps: usize) -> Vec<T> {
+            values.get(steps..).unwrap_or_default().to_vec()
+        }
         WarmStart {
-            inputs_rad: later(&self.inputs_rad),
+            states: later(&self.states, steps),
+            costates: later(&self.costates, steps),
+            limit_multipliers: later(&self.limit_multipliers, steps),
+            inputs_rad: later(&self.inputs_rad, steps),
             end_multipliers: self.end_multipliers.clone(),
-            floor_multipliers: later(&self.floor_multipliers),
+            floor_multipliers: later(&self.floor_multipliers, steps),
         }
     }
 }
@@ -152,28 +161,10 @@ pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
         };
     }
     let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
-    let mut solution = match fitting {
-        Some(start) => sqp::solve_from(problem, start),
-        None => cold(problem),
-    };
+    let mut solution = Solution::default();
+    interior::Workspace::default().solve(problem, fitting, &mut solution);
     solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
     solution
-}
-
-fn cold(problem: &Problem) -> Solution {
-    let amplitude_rad = problem.solver.guess_amplitude_rad;
-    let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
-        let inputs_rad = guess::bent(problem, amplitude_rad);
-        sqp::solve_from(problem, &WarmStart { inputs_rad, ..WarmStart::default() })
-    });
-    let iterations = left.iterations + right.iterations;
-    let qp_iterations = left.qp_iterations + right.qp_iterations;
-    let price = |solution: &Solution| {
-        let priced = solution.cost + problem.solver.terminal_penalty * solution.condition_miss;
-        if priced.is_finite() { priced } else { f64::INFINITY }
-    };
-    let better = if price(&right) < price(&left) { right } else { left };
-    Solution { iterations, qp_iterations, ..better }
 }
 
 #[cfg(test)]

@@ -114,7 +114,14 @@ impl Problem {
     /// The conditions, in the order of their multipliers: those at the end, height first, then the floor at each
     /// node before it.
     pub fn conditions(&self) -> Vec<Condition> {
-        let mut conditions = self.end_conditions();
+        let mut conditions = Vec::new();
+        self.append_conditions(&mut conditions);
+        conditions
+    }
+
+    /// Appends the conditions; allocates only if the vector never held as many.
+    pub(super) fn append_conditions(&self, conditions: &mut Vec<Condition>) {
+        self.append_end_conditions(conditions);
         if let Some(offset) = self.altitude_min_m {
             conditions.extend((1..self.intervals()).map(|node| Condition {
                 node,
@@ -124,14 +131,21 @@ impl Problem {
                 equality: false,
             }));
         }
-        conditions
     }
 
-    /// The conditions at the end of the horizon; none without intervals.
-    pub(super) fn end_conditions(&self) -> Vec<Condition> {
+    /// Number of conditions at the end of the horizon.
+    pub(super) fn end_conditions_len(&self) -> usize {
+        if self.intervals() == 0 {
+            return 0;
+        }
+        3 + self.final_box.map_or(0, |limits| 2 + 6 * limits.settled_nodes.min(self.intervals()))
+    }
+
+    /// Appends the conditions at the end of the horizon; none without intervals.
+    fn append_end_conditions(&self, conditions: &mut Vec<Condition>) {
         let end = self.intervals();
         if end == 0 {
-            return Vec::new();
+            return;
         }
         let at_least = |node, component, lowest| Condition {
             node,
@@ -150,7 +164,7 @@ impl Problem {
         let between = |node, component, lowest, highest| {
             [at_least(node, component, lowest), at_most(node, component, highest)]
         };
-        let mut conditions = vec![Condition { equality: true, ..at_least(end, Z, 0.0) }];
+        conditions.push(Condition { equality: true, ..at_least(end, Z, 0.0) });
         conditions.extend(between(end, X, -self.x_final_m, self.x_final_m));
         if let Some(limits) = self.final_box {
             let tilt = limits.pitch_error_deg.to_radians();
@@ -163,7 +177,6 @@ impl Problem {
                 conditions.extend(between(node, Q, -rate, rate));
             }
         }
-        conditions
     }
 
     /// Deviation of a state from the target: upright, at rest, at the origin.

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{Condition, Problem};
-use super::rollout::Trajectory;
+use crate::nmpc::problem::{Condition, Problem};
+use crate::nmpc::rollout::Trajectory;
 use super::sensitivity::Interval;
 use crate::dynamics::INPUT_INDEX;
 
