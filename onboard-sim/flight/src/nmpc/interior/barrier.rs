@@ -25,6 +25,16 @@ impl Limits {
         Self { lower: barrier / (limit_rad + input_rad), upper: barrier / (limit_rad - input_rad) }
     }
 
+    /// Raises multipliers to the barrier and returns the input moved off the limits that have one.
+    pub(super) fn raise(&mut self, input_rad: f64, limit_rad: f64, barrier: f64) -> f64 {
+        let room = 0.5 * limit_rad;
+        let below = (limit_rad + input_rad).max((barrier / self.lower).min(room));
+        let above = (limit_rad - input_rad).max((barrier / self.upper).min(room));
+        self.lower = self.lower.max(barrier / below);
+        self.upper = self.upper.max(barrier / above);
+        if above > limit_rad - input_rad { limit_rad - above } else { below - limit_rad }
+    }
+
     /// Second and first derivative that the limits add to the input's part of the Newton system.
     #[inline]
     pub(super) fn terms(&self, input_rad: f64, limit_rad: f64, barrier: f64) -> (f64, f64) {
@@ -44,17 +54,21 @@ impl Limits {
 }
 
 /// Slacks and multiplier of a condition.
+///
+/// The multiplier is kept as its distances `a = y + l` and `b = M - y`, so that it stays exact when it is next to an
+/// end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Elastic {
-    pub(super) multiplier: f64,
+    a: f64,
+    b: f64,
     /// `s`.
     pub(super) above: f64,
     /// `e`.
     pub(super) below: f64,
-    /// The multiplier's least value, negated: 0, or the price of an equality.
-    pub(super) least: f64,
-    /// The multiplier's largest value.
-    pub(super) price: f64,
+    /// `l`, the multiplier's least value, negated: 0, or the price of an equality.
+    least: f64,
+    /// `M`, the multiplier's largest value.
+    price: f64,
 }
 
 /// Change of an [`Elastic`].
@@ -70,38 +84,67 @@ impl Elastic {
     pub(super) fn central(c: f64, equality: bool, price: f64, barrier: f64) -> Self {
         let least = if equality { price } else { 0.0 };
         let width = price + least;
-        // c = mu / a - mu / (width - a) for a = y + least; the smaller root of a quadratic, by the side c is on.
-        let size = c.abs();
-        let root = (size * width * size * width + 4.0 * barrier * barrier).sqrt();
-        let a = 2.0 * barrier * width / (size * width + 2.0 * barrier + root);
-        let (a, b) = if c >= 0.0 { (a, width - a) } else { (width - a, a) };
-        let mut elastic =
-            Self { multiplier: a - least, above: barrier / a, below: barrier / b, least, price };
-        elastic.fit(c);
-        elastic
+        // c = mu / a - mu / (width - a); the smaller root of a quadratic, for the side c is on.
+        let size = c.abs() * width;
+        let root = (size * size + 4.0 * barrier * barrier).sqrt();
+        let near = 2.0 * barrier * width / (size + 2.0 * barrier + root);
+        let (a, b) = if c >= 0.0 { (near, width - near) } else { (width - near, near) };
+        Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
     }
 
     /// The elastic of a condition at value `c` with a multiplier from an earlier solution.
     pub(super) fn warm(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+        /// Least distance of a multiplier from the ends of its range, relative to its largest value.
         const INSIDE: f64 = 1e-9;
         let least = if equality { price } else { 0.0 };
-        let margin = INSIDE * price;
-        let multiplier = multiplier.clamp(margin - least, price - margin);
-        let above = barrier / (multiplier + least);
-        let below = barrier / (price - multiplier);
-        let mut elastic = Self { multiplier, above, below, least, price };
-        elastic.fit(c);
-        elastic
+        let a = (multiplier + least).max(INSIDE * price);
+        let b = (price - multiplier).max(INSIDE * price);
+        Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
     }
 
-    /// Makes `s - e` equal to the condition's value, by growing one of them.
+    /// With `s - e` equal to the condition's value `c`: the smaller of the two is kept.
     #[inline]
-    pub(super) fn fit(&mut self, c: f64) {
-        if self.above - self.below < c {
+    pub(super) fn fitted(mut self, c: f64) -> Self {
+        if c >= 0.0 {
             self.above = c + self.below;
         } else {
             self.below = self.above - c;
         }
+        self
+    }
+
+    /// With slacks and multiplier raised to the barrier, for a condition at value `c`.
+    pub(super) fn raised(&self, c: f64, barrier: f64) -> Self {
+        /// Slacks up to this are not worth changing a multiplier for, m, rad, m/s or rad/s.
+        const SLACK: f64 = 1e-3;
+        let width = self.price + self.least;
+        let least = (barrier / c.abs().max(SLACK)).min(0.5 * width);
+        let mut raised = *self;
+        if self.a < least {
+            (raised.a, raised.b) = (least, width - least);
+        } else if self.b < least {
+            (raised.a, raised.b) = (width - least, least);
+        }
+        raised.above = barrier / raised.a;
+        raised.below = barrier / raised.b;
+        if raised.above - raised.below < c {
+            raised.above = c + raised.below;
+        } else {
+            raised.below = raised.above - c;
+        }
+        raised
+    }
+
+    /// `y`.
+    #[inline]
+    pub(super) fn multiplier(&self) -> f64 {
+        if self.a < self.b { self.a - self.least } else { self.price - self.b }
+    }
+
+    /// Distances of the multiplier from its least and its largest value.
+    #[inline]
+    pub(super) fn room(&self) -> (f64, f64) {
+        (self.a, self.b)
     }
 
     /// What the price is paid for.
@@ -110,37 +153,46 @@ impl Elastic {
         if self.least > 0.0 { self.above + self.below } else { self.below }
     }
 
-    /// Room of the multiplier above its least and below its largest value.
+    /// What the price is paid for, of a change.
     #[inline]
-    fn room(&self) -> (f64, f64) {
-        (self.multiplier + self.least, self.price - self.multiplier)
+    pub(super) fn broken_by(&self, step: &ElasticStep) -> f64 {
+        if self.least > 0.0 { step.above + step.below } else { step.below }
     }
 
-    /// `D`, and the multiplier after a step that leaves the condition's value as it is.
+    /// `D`, and the multiplier's change by a step that leaves the condition's value as it is.
     #[inline]
     pub(super) fn terms(&self, barrier: f64) -> (f64, f64) {
-        let (a, b) = self.room();
-        let softness = self.above / a + self.below / b;
-        let target = barrier / a - barrier / b;
-        (softness, self.multiplier - (self.above - self.below - target) / softness)
+        let softness = self.above / self.a + self.below / self.b;
+        let target = barrier / self.a - barrier / self.b;
+        (softness, -(self.above - self.below - target) / softness)
     }
 
-    /// The slacks' Newton step when the multiplier goes to `multiplier`.
+    /// The slacks' Newton step when the multiplier changes by `change`.
     #[inline]
-    pub(super) fn step(&self, barrier: f64, multiplier: f64) -> ElasticStep {
-        let (a, b) = self.room();
-        let change = multiplier - self.multiplier;
+    pub(super) fn step(&self, barrier: f64, change: f64) -> ElasticStep {
         ElasticStep {
             multiplier: change,
-            above: (barrier - self.above * change) / a - self.above,
-            below: (barrier + self.below * change) / b - self.below,
+            above: (barrier - self.above * change) / self.a - self.above,
+            below: (barrier + self.below * change) / self.b - self.below,
         }
+    }
+
+    /// After fractions of a step that changes the condition's value to `c`.
+    #[inline]
+    pub(super) fn moved(&self, step: &ElasticStep, primal: f64, dual: f64, c: f64) -> Self {
+        Self {
+            a: self.a + dual * step.multiplier,
+            b: self.b - dual * step.multiplier,
+            above: self.above + primal * step.above,
+            below: self.below + primal * step.below,
+            ..*self
+        }
+        .fitted(c)
     }
 
     /// Largest product of a slack and its multiplier, less the barrier.
     #[inline]
     pub(super) fn complementarity(&self, barrier: f64) -> f64 {
-        let (a, b) = self.room();
-        (self.above * a - barrier).abs().max((self.below * b - barrier).abs())
+        (self.above * self.a - barrier).abs().max((self.below * self.b - barrier).abs())
     }
 }

@@ -4,7 +4,6 @@ use super::barrier::{Elastic, Limits};
 use super::interval::{Block, Constants, Points, blocks_for, evaluate};
 use super::lanes::LANES;
 use crate::nmpc::Problem;
-use crate::nmpc::problem::Condition;
 
 /// A point of the primal-dual space.
 #[derive(Debug, Clone, Default)]
@@ -111,13 +110,6 @@ impl Iterate {
                 problem.thrust_n[k],
             );
             self.states[k + 1] = next;
-        }
-    }
-
-    /// Sets every elastic's slacks to its condition at this iterate.
-    pub(super) fn fit_elastics(&mut self, conditions: &[Condition]) {
-        for (elastic, condition) in self.elastics.iter_mut().zip(conditions) {
-            elastic.fit(condition.value(&self.states));
         }
     }
 }

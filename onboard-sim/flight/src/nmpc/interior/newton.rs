@@ -2,12 +2,9 @@
 
 use super::barrier::{ElasticStep, Limits};
 use super::iterate::Iterate;
-use super::riccati::{Column, Sweep};
+use super::riccati::Sweep;
 use crate::nmpc::Problem;
 use crate::nmpc::problem::Condition;
-
-/// Curvature across the end height that is kept in the value function; the rest is in the column.
-const END_STIFFNESS: f64 = 1e4;
 
 /// A Newton step.
 #[derive(Debug, Clone, Default)]
@@ -15,7 +12,6 @@ pub(super) struct Newton {
     pub(super) sweep: Sweep,
     limits: Vec<Limits>,
     elastics: Vec<ElasticStep>,
-    end: Column,
 }
 
 /// The longest fractions of a step that keep slacks and multipliers positive.
@@ -54,24 +50,17 @@ impl Newton {
             let (curvature, slope) = iterate.limits[k].terms(*input, limit, barrier);
             sweep.input_terms[k] = (input_weight + curvature, input_weight * input + slope);
         }
-        // The first condition is the end height; see `Column`.
-        let (softness, multiplier) = iterate.elastics[0].terms(barrier);
-        let offset = -softness * multiplier;
-        let stiffness = END_STIFFNESS.min(0.5 / softness);
-        self.end = Column { offset, softness: softness / (1.0 - stiffness * softness) };
-        let last = iterate.inputs_rad.len();
-        sweep.weights[last][conditions[0].component] += stiffness;
-        sweep.slopes[last][conditions[0].component] += stiffness * offset;
-        for (condition, elastic) in conditions.iter().zip(&iterate.elastics).skip(1) {
-            let (softness, multiplier) = elastic.terms(barrier);
+        for (condition, elastic) in conditions.iter().zip(&iterate.elastics) {
+            let (softness, change) = elastic.terms(barrier);
+            let multiplier = elastic.multiplier() + change;
             sweep.weights[condition.node][condition.component] += 1.0 / softness;
             sweep.slopes[condition.node][condition.component] -= condition.sign * multiplier;
         }
     }
 
     /// Factorises; whether the inertia is right.
-    pub(super) fn factorise(&mut self, problem: &Problem, iterate: &Iterate, damping: f64) -> bool {
-        self.sweep.backward(iterate, problem.step_s, self.end, damping)
+    pub(super) fn factorise(&mut self, problem: &Problem, iterate: &Iterate, share: f64) -> bool {
+        self.sweep.backward(iterate, problem.step_s, share)
     }
 
     /// Solves for the step of every variable.
@@ -90,12 +79,9 @@ impl Newton {
         for (index, condition) in conditions.iter().enumerate() {
             let elastic = &iterate.elastics[index];
             let (softness, unmoved) = elastic.terms(barrier);
-            let multiplier = if index == 0 {
-                self.sweep.eta * self.end.softness / softness
-            } else {
-                unmoved - condition.sign * self.sweep.states[condition.node][condition.component] / softness
-            };
-            self.elastics[index] = elastic.step(barrier, multiplier);
+            let moved = condition.sign * self.sweep.states[condition.node][condition.component];
+            let change = unmoved - moved / softness;
+            self.elastics[index] = elastic.step(barrier, change);
         }
     }
 
@@ -119,8 +105,9 @@ impl Newton {
         for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
             shorten(&mut primal, elastic.above, step.above);
             shorten(&mut primal, elastic.below, step.below);
-            shorten(&mut dual, elastic.multiplier + elastic.least, step.multiplier);
-            shorten(&mut dual, elastic.price - elastic.multiplier, -step.multiplier);
+            let (a, b) = elastic.room();
+            shorten(&mut dual, a, step.multiplier);
+            shorten(&mut dual, b, -step.multiplier);
         }
         Fractions { primal, dual }
     }
@@ -145,8 +132,8 @@ impl Newton {
             slope += (input_weight * input + barrier * (1.0 / (limit - input) - 1.0 / (limit + input))) * step;
         }
         for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
-            let broken = if elastic.least > 0.0 { step.above + step.below } else { step.below };
-            slope += price * broken - barrier * (step.above / elastic.above + step.below / elastic.below);
+            slope += price * elastic.broken_by(step)
+                - barrier * (step.above / elastic.above + step.below / elastic.below);
         }
         slope
     }
@@ -185,12 +172,8 @@ impl Newton {
             };
         }
         for (index, step) in self.elastics.iter().enumerate() {
-            let mut elastic = iterate.elastics[index];
-            elastic.multiplier += dual * step.multiplier;
-            elastic.above += primal * step.above;
-            elastic.below += primal * step.below;
-            elastic.fit(conditions[index].value(&trial.states));
-            trial.elastics[index] = elastic;
+            let value = conditions[index].value(&trial.states);
+            trial.elastics[index] = iterate.elastics[index].moved(step, primal, dual, value);
         }
     }
 }

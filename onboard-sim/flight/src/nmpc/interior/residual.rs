@@ -35,7 +35,7 @@ impl Residual {
             *push = core::array::from_fn(|i| weights[i] * deviation[i]);
         }
         for (condition, elastic) in conditions.iter().zip(&iterate.elastics) {
-            pushes[condition.node][condition.component] -= condition.sign * elastic.multiplier;
+            pushes[condition.node][condition.component] -= condition.sign * elastic.multiplier();
             complementarity = complementarity.max(elastic.complementarity(barrier));
         }
         let (mut stationarity, mut defect) = (0.0_f64, 0.0_f64);

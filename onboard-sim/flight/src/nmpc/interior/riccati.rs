@@ -5,9 +5,9 @@
 //! subject to  dx_{k+1} = A_k dx_k + b_k dd_k + r_k,   dx_0 = 0
 //! ```
 //!
-//! The value function of the stages from `k` on is `dx' P dx / 2 + p' dx`. The end height's multiplier `eta` is one
-//! more column: the value function has the further terms `eta (v' dx + omega) + eta^2 Omega / 2`, and at the root
-//! `eta = -omega / Omega`. So the condition is met exactly and its curvature is asked for across it only.
+//! The value function of the stages from `k` on is `dx' P dx / 2 + p' dx`. Conditions are in it as stiff as their
+//! barrier makes them: `P` then loses digits across them, but the curvature that counts, along them, is asked for
+//! only there. The costates come from their own recursion, which does not involve `P`.
 //!
 //! With one input the system has the right inertia exactly if `b' P b` plus the input's own curvature, one scalar a
 //! stage, is positive throughout.
@@ -28,12 +28,11 @@ const D: usize = 4;
 /// Least curvature by an input that counts as positive, relative to the input's own terms.
 const LEAST_CURVATURE: f64 = 1e-11;
 
-/// How the input answers at a stage: `dd = -(offset + eta * column + gain' dx)`.
+/// How the input answers at a stage: `dd = -(offset + gain' dx)`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Feedback {
     gain: [f64; 6],
     offset: f64,
-    column: f64,
 }
 
 /// One interval's derivatives, out of its block.
@@ -82,15 +81,6 @@ impl Interval {
     }
 }
 
-/// The end height's condition as one more column.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Column {
-    /// Value of the condition after a step that leaves it as it is, with its slacks' share.
-    pub(super) offset: f64,
-    /// How much the condition yields to its multiplier.
-    pub(super) softness: f64,
-}
-
 /// The Newton step and what it is made from.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sweep {
@@ -107,8 +97,7 @@ pub(super) struct Sweep {
     pub(super) inputs: Vec<f64>,
     /// The costates after the step.
     pub(super) costates: Vec<[f64; 6]>,
-    /// The end height's multiplier in the column.
-    pub(super) eta: f64,
+    share: f64,
 }
 
 impl Sweep {
@@ -124,16 +113,14 @@ impl Sweep {
     }
 
     /// The backward sweep with `damping` added to every input's curvature; whether the inertia is right.
-    pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, end: Column, damping: f64) -> bool {
+    pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, share: f64) -> bool {
+        self.share = share;
         let count = self.inputs.len();
         let mut p = [[0.0; 6]; 6];
         for (i, weight) in self.weights[count].iter().enumerate() {
             p[i][i] = *weight;
         }
         let mut slope = self.slopes[count];
-        let mut column = [0.0; 6];
-        column[Z] = -1.0;
-        let (mut omega, mut omega_curvature) = (-end.offset, -end.softness);
 
         for k in (0..count).rev() {
             let block = &iterate.blocks[k / LANES];
@@ -161,17 +148,14 @@ impl Sweep {
                     g[i] += p[j][i] * residual[j];
                 }
             }
-            omega += (column[X] * residual[X] + column[Z] * residual[Z])
-                + (column[T] * residual[T] + column[U] * residual[U])
-                + (column[W] * residual[W] + column[Q] * residual[Q]);
 
             let by_input = interval.pull(&m[D], step_s);
             let pulled = interval.pull(&g, step_s);
-            let pulled_column = interval.pull(&column, step_s);
-            let h = |i: usize, j: usize| block.curvature[pair(i, j)].0[lane];
+            let h = |i: usize, j: usize| share * block.curvature[pair(i, j)].0[lane];
             let (own_curvature, own_slope) = self.input_terms[k];
-            let curvature = by_input[D] + h(D, D) + own_curvature + damping;
+            let curvature = by_input[D] + h(D, D) + own_curvature;
             if !(curvature > LEAST_CURVATURE * (1.0 + own_curvature)) {
+                if super::solver::TRACE.load(std::sync::atomic::Ordering::Relaxed) { println!("      fail k {k} of {count} curvature {curvature:.3e} by_input {:.3e} h {:.3e} own {own_curvature:.3e} share {share}", by_input[D], h(D,D)); }
                 return false;
             }
             let inverse = 1.0 / curvature;
@@ -185,12 +169,8 @@ impl Sweep {
             ];
             let gain = cross.map(|entry| entry * inverse);
             let offset = (own_slope + pulled[D]) * inverse;
-            let column_offset = pulled_column[D] * inverse;
-            self.feedbacks[k] = Feedback { gain, offset, column: column_offset };
+            self.feedbacks[k] = Feedback { gain, offset };
             if k == 0 {
-                // Nothing before: only the end height's multiplier is left to be found.
-                omega -= pulled_column[D] * offset;
-                omega_curvature -= pulled_column[D] * column_offset;
                 break;
             }
 
@@ -219,17 +199,12 @@ impl Sweep {
                 next[i][i] += weights[i];
             }
             p = next;
-            omega -= pulled_column[D] * offset;
-            omega_curvature -= pulled_column[D] * column_offset;
             let g = [g[X], g[Z], pulled[0], pulled[1], pulled[2], pulled[3]];
-            let v = [column[X], column[Z], pulled_column[0], pulled_column[1], pulled_column[2], pulled_column[3]];
             for i in 0..6 {
                 slope[i] = slopes[i] + g[i] - cross[i] * offset;
-                column[i] = v[i] - cross[i] * column_offset;
             }
         }
-        self.eta = -omega / omega_curvature;
-        self.eta.is_finite()
+        true
     }
 
     /// The forward sweep: states, inputs, and then the costates, backwards again.
@@ -238,11 +213,11 @@ impl Sweep {
         let mut dx = [0.0; 6];
         self.states[0] = dx;
         for k in 0..count {
-            let Feedback { gain, offset, column } = self.feedbacks[k];
+            let Feedback { gain, offset } = self.feedbacks[k];
             let answer = (gain[X] * dx[X] + gain[Z] * dx[Z])
                 + (gain[T] * dx[T] + gain[U] * dx[U])
                 + (gain[W] * dx[W] + gain[Q] * dx[Q]);
-            let dd = -(offset + self.eta * column + answer);
+            let dd = -(offset + answer);
             let interval = Interval::of(&iterate.blocks[k / LANES], k % LANES, step_s);
             let moved = interval.push(&dx, dd, step_s);
             let residual = iterate.defect(k);
@@ -252,7 +227,6 @@ impl Sweep {
         }
 
         let mut costate: [f64; 6] = core::array::from_fn(|i| self.slopes[count][i] + self.weights[count][i] * dx[i]);
-        costate[Z] -= self.eta;
         self.costates[count] = costate;
         for k in (1..count).rev() {
             let block = &iterate.blocks[k / LANES];
@@ -262,7 +236,7 @@ impl Sweep {
             let dx = &self.states[k];
             let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
             let bent: [f64; 4] = core::array::from_fn(|i| {
-                let h = |j: usize| block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane];
+                let h = |j: usize| self.share * block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane];
                 (h(0) * moved[0] + h(1) * moved[1]) + (h(2) * moved[2] + h(3) * moved[3]) + h(4) * moved[4]
             });
             let before = [

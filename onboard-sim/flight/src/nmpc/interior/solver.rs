@@ -41,6 +41,8 @@ const DAMPING_GROWTH: f64 = 8.0;
 const DAMPING_DECAY: f64 = 1.0 / 3.0;
 const LARGEST_DAMPING: f64 = 1e10;
 
+pub(super) fn tune(name: &str, value: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(value) }
+
 /// How a branch ended.
 #[derive(Debug, Clone, Copy)]
 struct Outcome {
@@ -81,11 +83,11 @@ impl Workspace {
         }
         let amplitude_rad = problem.solver.guess_amplitude_rad;
         self.start_cold(problem, amplitude_rad);
-        let left = self.descend(problem, COLD_BARRIER, false);
+        let left = self.descend(problem, tune("MU0", COLD_BARRIER), false);
         let left_price = self.price(problem, left);
         core::mem::swap(&mut self.current, &mut self.other);
         self.start_cold(problem, -amplitude_rad);
-        let right = self.descend(problem, COLD_BARRIER, false);
+        let right = self.descend(problem, tune("MU0", COLD_BARRIER), false);
         let mut outcome = right;
         if left_price <= self.price(problem, right) {
             core::mem::swap(&mut self.current, &mut self.other);
@@ -112,11 +114,11 @@ impl Workspace {
         guess::straight(problem, amplitude_rad, &mut current.states);
         current.inputs_rad.fill(0.0);
         current.costates.fill([0.0; 6]);
-        current.limits.fill(Limits::central(0.0, problem.gimbal_limit_rad, COLD_BARRIER));
+        current.limits.fill(Limits::central(0.0, problem.gimbal_limit_rad, tune("MU0", COLD_BARRIER)));
         let price = problem.solver.terminal_penalty;
         for (elastic, condition) in current.elastics.iter_mut().zip(&self.conditions) {
             let value = condition.value(&current.states);
-            *elastic = Elastic::central(value, condition.equality, price, COLD_BARRIER);
+            *elastic = Elastic::central(value, condition.equality, price, tune("MU0", COLD_BARRIER));
         }
     }
 
@@ -163,7 +165,7 @@ impl Workspace {
         let tolerance = problem.solver.kkt_tolerance;
         let mut barrier = first_barrier;
         let mut damping = 0.0;
-        let (mut iterations, mut sweeps) = (0, 0);
+        let (mut iterations, mut sweeps, mut raises) = (0, 0, 0);
         let mut residual;
         if check_first {
             self.current.evaluate::<false>(&constants, &problem.thrust_n);
@@ -186,54 +188,68 @@ impl Workspace {
                 break SolveStatus::IterationLimit;
             }
             while barrier > LAST_BARRIER
-                && self.residual(problem, barrier).largest() <= BARRIER_TOLERANCE * barrier
+                && self.residual(problem, barrier).largest() <= tune("KT",BARRIER_TOLERANCE) * barrier
             {
-                barrier = (BARRIER_FACTOR * barrier).min(barrier.powf(BARRIER_EXPONENT)).max(LAST_BARRIER);
+                barrier = (tune("KF",BARRIER_FACTOR) * barrier).min(barrier.powf(tune("KE",BARRIER_EXPONENT))).max(LAST_BARRIER);
                 self.filter.clear();
             }
             iterations += 1;
             self.newton.assemble(problem, &self.conditions, &self.current, barrier);
-            damping *= DAMPING_DECAY;
-            if damping < FIRST_DAMPING * 1e-2 {
-                damping = 0.0;
-            }
-            let mut attempt = 0.0;
-            let solved = loop {
+            let mut share = 1.0;
+            let shares: Vec<f64> = std::env::var("SHARES").map_or(vec![1.0,0.0], |v| v.split(',').map(|x| x.parse().unwrap()).collect());
+            let mut solved=false;
+            for x in shares {
                 sweeps += 1;
-                if self.newton.factorise(problem, &self.current, attempt) {
-                    break true;
-                }
-                attempt = if attempt == 0.0 { damping.max(FIRST_DAMPING) } else { attempt * DAMPING_GROWTH };
-                if attempt > LARGEST_DAMPING {
-                    break false;
-                }
-            };
-            if attempt > 0.0 {
-                damping = attempt;
+                share = x;
+                if self.newton.factorise(problem, &self.current, share) { solved=true; break; }
             }
+            damping = share;
             if !solved {
                 break SolveStatus::SubproblemFailed;
             }
             self.newton.solve(problem, &self.conditions, &self.current, barrier);
             if TRACE.load(std::sync::atomic::Ordering::Relaxed) {
                 println!(
-                    "{iterations:3} mu {barrier:.1e} cost {:.4} inf {:.2e} stat {:.2e} compl {:.2e} damp {attempt:.1e} step {:.2e} y {:.3}",
+                    "{iterations:3} mu {barrier:.1e} cost {:.4} inf {:.2e} stat {:.2e} compl {:.2e} damp {damping:.1e} step {:.2e} y {:.3}",
                     self.current.cost(problem), self.current.infeasibility(), residual.stationarity, residual.complementarity,
-                    self.newton.largest_input_step(), self.current.elastics[0].multiplier,
+                    self.newton.largest_input_step(), self.current.elastics[0].multiplier(),
                 );
             }
-            if !self.advance(problem, &constants, barrier) {
-                break SolveStatus::Stalled;
+            let keep = KEPT.min(barrier).max(tune("KEEP", 1e-3));
+            let fractions = self.newton.fractions(problem, &self.current, keep);
+            let jammed = fractions.primal.min(fractions.dual) < tune("JAM", 0.1);
+            if barrier < tune("RAISE", 1e-3) && raises == 0 && jammed
+                || !self.advance(problem, &constants, barrier, fractions)
+            {
+                if raises >= 4 {
+                    break SolveStatus::Stalled;
+                }
+                raises += 1;
+                barrier = self.raise(problem, &constants, barrier);
             }
         };
         Outcome { status, iterations, sweeps, residual }
     }
 
+    /// Starts again from the current states with a larger barrier: too many limits and conditions change sides.
+    fn raise(&mut self, problem: &Problem, constants: &Constants, barrier: f64) -> f64 {
+        let barrier = tune("RAISE", 1e-3).max(barrier * tune("RAISEF", 100.0));
+        let limit = problem.gimbal_limit_rad;
+        let current = &mut self.current;
+        for (input, limits) in current.inputs_rad.iter_mut().zip(&mut current.limits) {
+            *input = limits.raise(*input, limit, barrier);
+        }
+        for (elastic, condition) in current.elastics.iter_mut().zip(&self.conditions) {
+            *elastic = elastic.raised(condition.value(&current.states), barrier);
+        }
+        current.evaluate::<true>(constants, &problem.thrust_n);
+        self.filter = Filter::starting_at(self.current.infeasibility());
+        barrier
+    }
+
     /// Line search along the step; whether a point was accepted.
-    fn advance(&mut self, problem: &Problem, constants: &Constants, barrier: f64) -> bool {
-        let keep = KEPT.min(barrier);
-        let keep = keep.max(KEPT.min(1e-2));
-        let Fractions { mut primal, dual } = self.newton.fractions(problem, &self.current, keep);
+    fn advance(&mut self, problem: &Problem, constants: &Constants, barrier: f64, fractions: Fractions) -> bool {
+        let Fractions { mut primal, dual } = fractions;
         let slope = self.newton.slope(problem, &self.current, barrier);
         let now = Measures {
             infeasibility: self.current.infeasibility(),
@@ -288,8 +304,8 @@ impl Workspace {
         replace(&mut solution.costates, current.costates.iter().copied());
         replace(&mut solution.limit_multipliers, current.limits.iter().map(|z| [z.lower, z.upper]));
         let (end, floor) = current.elastics.split_at(ends);
-        replace(&mut solution.end_multipliers, end.iter().map(|elastic| elastic.multiplier));
-        replace(&mut solution.floor_multipliers, floor.iter().map(|elastic| elastic.multiplier));
+        replace(&mut solution.end_multipliers, end.iter().map(Elastic::multiplier));
+        replace(&mut solution.floor_multipliers, floor.iter().map(Elastic::multiplier));
     }
 }
 
