@@ -1,5 +1,5 @@
-use flight::nmpc::{Problem, SolveStatus, reference, Solution, WarmStart};
-fn solve(p:&Problem,w:Option<&WarmStart>)->Solution{ let mut s=Solution::default(); flight::nmpc::interior::Workspace::default().solve(p,w,&mut s); s}
+use flight::nmpc::{Problem, SolveStatus, reference};
+use flight::nmpc::solve;
 use flight::profile::Profile;
 use flight::dynamics::{PlanarState,PlanarModel};
 struct R(u64);
@@ -11,7 +11,6 @@ fn main(){
     let mut profile = Profile::builtin("paper-calibrated").unwrap();
     if !has("box") { profile.nmpc.limits.final_box=None; }
     if has("floor") { profile.nmpc.limits.altitude_min_m=Some(0.0); }
-    if has("trace") { flight::nmpc::interior::TRACE.store(true, std::sync::atomic::Ordering::Relaxed); }
     let scale: f64 = args.iter().find_map(|a| a.strip_prefix("s=").and_then(|v| v.parse().ok())).unwrap_or(1.0);
     let n = profile.start.planar_state();
     let starts=[n, PlanarState{theta_rad:60f64.to_radians(),..n},PlanarState{theta_rad:120f64.to_radians(),..n},PlanarState{w_m_s:-1.,..n},PlanarState{w_m_s:1.,..n},PlanarState{q_rad_s:-5f64.to_radians(),..n},PlanarState{q_rad_s:5f64.to_radians(),..n}];

@@ -5,7 +5,6 @@ fn main(){
     let args: Vec<String> = std::env::args().collect();
     let mut profile = Profile::builtin("paper-calibrated").unwrap();
     if !args.iter().any(|a| a=="box") { profile.nmpc.limits.final_box=None; }
-    if args.iter().any(|a| a=="trace") { flight::nmpc::interior::TRACE.store(true, std::sync::atomic::Ordering::Relaxed); }
     let n = profile.start.planar_state();
     let starts=[n, PlanarState{theta_rad:60f64.to_radians(),..n},PlanarState{theta_rad:120f64.to_radians(),..n},PlanarState{w_m_s:-1.,..n},PlanarState{w_m_s:1.,..n},PlanarState{q_rad_s:-5f64.to_radians(),..n},PlanarState{q_rad_s:5f64.to_radians(),..n}];
     let only: Option<usize> = args.get(1).and_then(|a| a.parse().ok());

@@ -21,12 +21,13 @@
 //! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
 
 mod bound;
-pub mod interior;
+mod interior;
 mod problem;
 pub mod reference;
 mod rollout;
 
 pub use bound::best_touchdown_speed_m_s;
+pub use interior::Workspace;
 pub use problem::Problem;
 pub use rollout::Trajectory;
 
@@ -130,17 +131,36 @@ impl Solution {
 
     /// This solution as a start for the same problem `steps` intervals later.
     pub fn shifted(&self, steps: usize) -> WarmStart {
-        fn later<T: Clone>(values: &[T], steps: usize) -> Vec<T> {
-            values.get(steps..).unwrap_or_default().to_vec()
+        let mut warm = WarmStart::default();
+        self.shift_into(steps, &mut warm);
+        warm
+    }
+
+    /// [`shifted`](Self::shifted) without allocating, if the warm start has been as long before.
+    pub fn shift_into(&self, steps: usize, warm: &mut WarmStart) {
+        fn refill<T: Copy>(values: &mut Vec<T>, from: &[T], steps: usize) {
+            values.clear();
+            values.extend_from_slice(from.get(steps..).unwrap_or_default());
         }
-        WarmStart {
-            states: later(&self.states, steps),
-            costates: later(&self.costates, steps),
-            limit_multipliers: later(&self.limit_multipliers, steps),
-            inputs_rad: later(&self.inputs_rad, steps),
-            end_multipliers: self.end_multipliers.clone(),
-            floor_multipliers: later(&self.floor_multipliers, steps),
-        }
+        refill(&mut warm.states, &self.states, steps);
+        refill(&mut warm.costates, &self.costates, steps);
+        refill(&mut warm.limit_multipliers, &self.limit_multipliers, steps);
+        refill(&mut warm.inputs_rad, &self.inputs_rad, steps);
+        refill(&mut warm.end_multipliers, &self.end_multipliers, 0);
+        refill(&mut warm.floor_multipliers, &self.floor_multipliers, steps);
+    }
+
+    /// Back to nothing solved, keeping the room.
+    fn clear(&mut self) {
+        let Self { states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, .. } =
+            core::mem::take(self);
+        *self = Self { states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, ..Self::default() };
+        self.states.clear();
+        self.costates.clear();
+        self.limit_multipliers.clear();
+        self.inputs_rad.clear();
+        self.end_multipliers.clear();
+        self.floor_multipliers.clear();
     }
 }
 
@@ -149,22 +169,34 @@ impl Solution {
 /// With a warm start whose length fits, from there; otherwise from two bent guesses, keeping the better result:
 /// the problem has mirrored and multi-swing local minima, and the straight path between them is a saddle.
 pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
+    let mut solution = Solution::default();
+    solve_into(problem, warm, &mut Workspace::default(), &mut solution);
+    solution
+}
+
+/// [`solve`] without allocating, if workspace and solution have been used for as long a problem before.
+pub fn solve_into(
+    problem: &Problem,
+    warm: Option<&WarmStart>,
+    workspace: &mut Workspace,
+    solution: &mut Solution,
+) {
+    solution.clear();
     if !problem.is_finite() {
-        return Solution { status: SolveStatus::BadInput, ..Solution::default() };
+        solution.status = SolveStatus::BadInput;
+        return;
     }
     let best_touchdown_speed_m_s = best_touchdown_speed_m_s(problem);
     if best_touchdown_speed_m_s > problem.touchdown_speed_max_m_s {
-        return Solution {
-            status: SolveStatus::NotLandable,
-            best_touchdown_speed_m_s,
-            ..Solution::default()
-        };
+        solution.status = SolveStatus::NotLandable;
+    } else if problem.intervals() == 0 {
+        solution.status = SolveStatus::Converged;
+        solution.states.push(problem.initial);
+    } else {
+        let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
+        workspace.solve(problem, fitting, solution);
     }
-    let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
-    let mut solution = Solution::default();
-    interior::Workspace::default().solve(problem, fitting, &mut solution);
     solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
-    solution
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use nalgebra::DVector;
 use proptest::prelude::*;
 
-use super::condense::Linearised;
+use super::reference::Linearised;
 use super::*;
 use crate::dynamics::ModelKind;
 use crate::profile::Profile;

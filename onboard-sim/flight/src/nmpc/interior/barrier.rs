@@ -190,9 +190,9 @@ impl Elastic {
         .fitted(c)
     }
 
-    /// Largest product of a slack and its multiplier, less the barrier.
+    /// Products of the slacks and their multipliers.
     #[inline]
-    pub(super) fn complementarity(&self, barrier: f64) -> f64 {
-        (self.above * self.a - barrier).abs().max((self.below * self.b - barrier).abs())
+    pub(super) fn products(&self) -> [f64; 2] {
+        [self.above * self.a, self.below * self.b]
     }
 }

@@ -27,6 +27,12 @@ pub(super) struct Measures {
     pub(super) objective: f64,
 }
 
+impl Measures {
+    pub(super) fn is_finite(&self) -> bool {
+        self.infeasibility.is_finite() && self.objective.is_finite()
+    }
+}
+
 /// Measures that a trial point must not be worse than in both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Filter {
@@ -61,7 +67,7 @@ impl Filter {
     /// Whether a trial point at `fraction` of a step is progress over `now`; if it is not a descent of the objective,
     /// `now` enters the filter. `slope` is the objective's along the whole step.
     pub(super) fn accepts(&mut self, now: Measures, trial: Measures, slope: f64, fraction: f64) -> bool {
-        if !(trial.infeasibility.is_finite() && trial.objective.is_finite()) {
+        if !trial.is_finite() {
             return false;
         }
         let rounding = ROUNDING * now.objective.abs();

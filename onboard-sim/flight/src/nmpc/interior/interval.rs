@@ -1,26 +1,25 @@
-//! One interval's RK4 step with its adjoint, tangent and adjoint-weighted curvature, for several nodes at once.
+//! One interval's RK4 step and its adjoint, for several nodes at once.
 //!
 //! Notation as in the step itself: `X_1..X_4` the stage states, `k_i = f(X_i, delta)`, `f` the planar equations of
 //! [`crate::dynamics`]. What the equations make simple is used:
 //!
 //! * Nothing depends on `x` and `z`: they are integrals, and no direction of differentiation.
 //! * `q'` depends on `delta` alone, so `q` and `theta` of every stage are known in closed form, and of the tangents
-//!   only those of `u` and `w` are propagated.
+//!   only those of `u` and `w` are propagated (`tangent`).
 //!
-//! The directions of differentiation are (theta, u, w, q, delta). The second derivative of `lambda . step` is the sum
-//! over the stages of (tangent)^T (second derivative of the slope weighted by its adjoint) (tangent): the step is a
-//! composition in which only `f` is nonlinear.
+//! The directions of differentiation are (theta, u, w, q, delta).
 
 use super::lanes::{LANES, Lanes};
+use super::tangent::differentiate;
 use crate::dynamics::{ModelKind, PlanarModel};
 
 /// Directions of differentiation: theta, u, w, q, delta.
 pub(super) const DIRECTIONS: usize = 5;
-const TH: usize = 0;
-const U: usize = 1;
-const W: usize = 2;
-const Q: usize = 3;
-const D: usize = 4;
+pub(super) const TH: usize = 0;
+pub(super) const U: usize = 1;
+pub(super) const W: usize = 2;
+pub(super) const Q: usize = 3;
+pub(super) const D: usize = 4;
 
 /// Number of entries of a symmetric matrix over the directions.
 pub(super) const PAIRS: usize = 15;
@@ -37,13 +36,13 @@ const REST_SPEED_M_S: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Constants {
     pub(super) step_s: f64,
-    inverse_mass: f64,
-    arm_per_inertia: f64,
-    drag_per_m: f64,
-    gravity_m_s2: f64,
+    pub(super) inverse_mass: f64,
+    pub(super) arm_per_inertia: f64,
+    pub(super) drag_per_m: f64,
+    pub(super) gravity_m_s2: f64,
     /// Sign of `w sin(theta)` in the horizontal velocity; -1 in the printed equations.
-    lateral: f64,
-    printed: bool,
+    pub(super) lateral: f64,
+    pub(super) printed: bool,
 }
 
 impl Constants {
@@ -101,43 +100,64 @@ impl Block {
     };
 }
 
-/// What the derivatives need of a stage.
+/// What the thrust does over the whole interval.
 #[derive(Clone, Copy)]
-struct Stage {
-    sin: Lanes,
-    cos: Lanes,
-    u: Lanes,
-    w: Lanes,
-    q: Lanes,
-    x_dot: Lanes,
-    z_dot: Lanes,
-    /// Derivative of the drag's acceleration by u and w.
-    drag_u: Lanes,
-    drag_w: Lanes,
-    /// u and w over the speed.
-    along: Lanes,
-    across: Lanes,
+pub(super) struct Thrust {
+    /// Acceleration along the nose axis and along the second body axis, m/s^2; each is the other's derivative by the
+    /// gimbal angle, up to the sign.
+    pub(super) push: Lanes,
+    pub(super) side: Lanes,
+    /// Pitch acceleration, rad/s^2, and its derivative by the gimbal angle.
+    pub(super) turn_acc: Lanes,
+    pub(super) turn_acc_d: Lanes,
 }
 
-const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+impl Thrust {
+    #[inline(always)]
+    fn of(c: &Constants, points: &Points) -> Self {
+        let (sin, cos) = points.gimbal.sin_cos();
+        let acceleration = points.thrust * c.inverse_mass;
+        let torque = points.thrust * c.arm_per_inertia;
+        Self {
+            push: acceleration * cos,
+            side: -(acceleration * sin),
+            turn_acc: -(torque * sin),
+            turn_acc_d: -(torque * cos),
+        }
+    }
+}
+
+/// What the derivatives need of a stage.
+#[derive(Clone, Copy)]
+pub(super) struct Stage {
+    pub(super) sin: Lanes,
+    pub(super) cos: Lanes,
+    pub(super) u: Lanes,
+    pub(super) w: Lanes,
+    pub(super) q: Lanes,
+    pub(super) x_dot: Lanes,
+    pub(super) z_dot: Lanes,
+    /// Derivative of the drag's acceleration by u and w.
+    pub(super) drag_u: Lanes,
+    pub(super) drag_w: Lanes,
+    /// u and w over the speed.
+    pub(super) along: Lanes,
+    pub(super) across: Lanes,
+}
+
+pub(super) const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 /// How far along the step a stage lies, by which q and delta move its pitch and pitch rate.
-const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 /// Share of half a squared step by which the pitch acceleration moves a stage's pitch.
-const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
+pub(super) const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
 
 /// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`.
 #[inline(always)]
-#[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
 pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, block: &mut Block) {
     let h = c.step_s;
     let [x0, z0, th0, u0, w0, q0] = points.state;
-    let (sin_d, cos_d) = points.gimbal.sin_cos();
-    let thrust_acc = points.thrust * c.inverse_mass;
-    let push = thrust_acc * cos_d;
-    let side = -(thrust_acc * sin_d);
-    let torque = points.thrust * c.arm_per_inertia;
-    let turn_acc = -(torque * sin_d);
-    let turn_acc_d = -(torque * cos_d);
+    let gimbal = Thrust::of(c, points);
+    let Thrust { push, side, turn_acc, turn_acc_d } = gimbal;
 
     // The four stages.
     let mut stages = [Stage {
@@ -232,139 +252,9 @@ pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, 
         slope_adjoints[i] = [kx, kz, ku, kw, kq];
     }
     block.pulled = pulled;
-    if !DERIVATIVES {
-        return;
+    if DERIVATIVES {
+        differentiate(c, &gimbal, &stages, &slope_adjoints, block);
     }
-
-    // Tangents of u and w from stage to stage, of x, z, u and w over the step, and the curvature.
-    let mut tu = [Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO, Lanes::ZERO];
-    let mut tw = [Lanes::ZERO, Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO];
-    let mut sums = [[Lanes::ZERO; DIRECTIONS]; 4];
-    let mut hessian = [Lanes::ZERO; PAIRS];
-    for i in 0..4 {
-        let s = &stages[i];
-        let [kx, kz, ku, kw, kq] = slope_adjoints[i];
-        // Tangents of this stage's pitch by q and delta, and of its pitch rate by delta.
-        let (tq, qd) = (AHEAD[i] * h, turn_acc_d * (AHEAD[i] * h));
-        let td = turn_acc_d * (0.5 * h * h * TURNED[i]);
-
-        // Curvature of the slope by (theta, u, w, q), weighted.
-        let tt = (ku * s.sin - kw * s.cos) * c.gravity_m_s2 - kx * s.x_dot - kz * s.z_dot;
-        let t_u = kz * s.cos - kx * s.sin;
-        let t_w = (kx * s.cos + kz * s.sin) * c.lateral;
-        let (uu, uw, ww);
-        if c.printed {
-            uu = ku * (2.0 * c.drag_per_m);
-            ww = uu;
-            uw = Lanes::ZERO;
-        } else {
-            let scale = ku * -c.drag_per_m;
-            let (aa, bb) = (s.along * s.along, s.across * s.across);
-            uu = scale * s.along * (Lanes::splat(3.0) - aa);
-            ww = scale * s.along * (Lanes::splat(1.0) - bb);
-            uw = scale * s.across * (Lanes::splat(1.0) - aa);
-        }
-        let (u_q, w_q) = (kw, -ku);
-        if i == 0 {
-            hessian[pair(TH, TH)] += tt;
-            hessian[pair(TH, U)] += t_u;
-            hessian[pair(TH, W)] += t_w;
-            hessian[pair(U, U)] += uu;
-            hessian[pair(U, W)] += uw;
-            hessian[pair(W, W)] += ww;
-            hessian[pair(U, Q)] += u_q;
-            hessian[pair(W, Q)] += w_q;
-        } else {
-            // Columns of (curvature) (tangent).
-            let mut ct = [Lanes::ZERO; DIRECTIONS];
-            let mut cu = [Lanes::ZERO; DIRECTIONS];
-            let mut cw = [Lanes::ZERO; DIRECTIONS];
-            let mut cq = [Lanes::ZERO; DIRECTIONS];
-            for j in 0..DIRECTIONS {
-                ct[j] = t_u * tu[j] + t_w * tw[j];
-                cu[j] = uu * tu[j] + uw * tw[j];
-                cw[j] = uw * tu[j] + ww * tw[j];
-                cq[j] = u_q * tu[j] + w_q * tw[j];
-            }
-            ct[TH] += tt;
-            cu[TH] += t_u;
-            cw[TH] += t_w;
-            ct[Q] += tt * tq;
-            cu[Q] += t_u * tq + u_q;
-            cw[Q] += t_w * tq + w_q;
-            ct[D] += tt * td;
-            cu[D] += t_u * td + u_q * qd;
-            cw[D] += t_w * td + w_q * qd;
-            for row in 0..DIRECTIONS {
-                for column in row..DIRECTIONS {
-                    hessian[pair(row, column)] += tu[row] * cu[column] + tw[row] * cw[column];
-                }
-            }
-            for column in 0..DIRECTIONS {
-                hessian[pair(TH, column)] += ct[column];
-            }
-            hessian[pair(Q, Q)] += ct[Q] * tq + cq[Q];
-            hessian[pair(Q, D)] += ct[D] * tq + cq[D];
-            hessian[pair(D, D)] += ct[D] * td + cq[D] * qd;
-        }
-        hessian[pair(D, D)] += kw * -side - ku * push - kq * turn_acc;
-
-        // Tangents of the slope.
-        let ut = s.cos * -c.gravity_m_s2;
-        let wt = s.sin * -c.gravity_m_s2;
-        let (ru, rw) = (s.drag_u, s.drag_w - s.q);
-        let mut du = [Lanes::ZERO; DIRECTIONS];
-        let mut dw = [Lanes::ZERO; DIRECTIONS];
-        let mut dx = [Lanes::ZERO; DIRECTIONS];
-        let mut dz = [Lanes::ZERO; DIRECTIONS];
-        let (ls, lc) = (s.sin * c.lateral, s.cos * c.lateral);
-        if i == 0 {
-            du = [ut, ru, rw, -s.w, side];
-            dw = [wt, s.q, Lanes::ZERO, s.u, -push];
-            dx = [-s.z_dot, s.cos, ls, Lanes::ZERO, Lanes::ZERO];
-            dz = [s.x_dot, s.sin, -lc, Lanes::ZERO, Lanes::ZERO];
-        } else {
-            for j in 0..DIRECTIONS {
-                du[j] = ru * tu[j] + rw * tw[j];
-                dw[j] = s.q * tu[j];
-                dx[j] = s.cos * tu[j] + ls * tw[j];
-                dz[j] = s.sin * tu[j] - lc * tw[j];
-            }
-            du[TH] += ut;
-            dw[TH] += wt;
-            dx[TH] -= s.z_dot;
-            dz[TH] += s.x_dot;
-            du[Q] += ut * tq - s.w;
-            dw[Q] += wt * tq + s.u;
-            dx[Q] -= s.z_dot * tq;
-            dz[Q] += s.x_dot * tq;
-            du[D] += ut * td - s.w * qd + side;
-            dw[D] += wt * td + s.u * qd - push;
-            dx[D] -= s.z_dot * td;
-            dz[D] += s.x_dot * td;
-        }
-        let weight = WEIGHTS[i] * h;
-        for j in 0..DIRECTIONS {
-            sums[0][j] += dx[j] * weight;
-            sums[1][j] += dz[j] * weight;
-            sums[2][j] += du[j] * weight;
-            sums[3][j] += dw[j] * weight;
-        }
-        if i < 3 {
-            let along = AHEAD[i + 1] * h;
-            for j in 0..DIRECTIONS {
-                tu[j] = du[j] * along;
-                tw[j] = dw[j] * along;
-            }
-            tu[U] += Lanes::splat(1.0);
-            tw[W] += Lanes::splat(1.0);
-        }
-    }
-    sums[2][U] += Lanes::splat(1.0);
-    sums[3][W] += Lanes::splat(1.0);
-    block.tangent = sums;
-    block.turn = turn_acc_d * h;
-    block.curvature = hessian;
 }
 
 /// Number of blocks that hold `intervals`.

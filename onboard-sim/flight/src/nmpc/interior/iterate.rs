@@ -4,6 +4,7 @@ use super::barrier::{Elastic, Limits};
 use super::interval::{Block, Constants, Points, blocks_for, evaluate};
 use super::lanes::LANES;
 use crate::nmpc::Problem;
+use crate::nmpc::problem::Condition;
 
 /// A point of the primal-dual space.
 #[derive(Debug, Clone, Default)]
@@ -77,6 +78,12 @@ impl Iterate {
         let state_part: f64 = squares.iter().zip(&problem.state_weights).map(|(sum, weight)| sum * weight).sum();
         let input_part: f64 = self.inputs_rad.iter().map(|input| input * input).sum();
         0.5 * problem.step_s * (state_part + problem.input_weight * input_part)
+    }
+
+    /// Cost plus the price of every broken condition.
+    pub(super) fn price(&self, problem: &Problem, conditions: &[Condition]) -> f64 {
+        let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
+        self.cost(problem) + problem.solver.terminal_penalty * broken
     }
 
     /// The objective of the barrier problem: cost, elastics at their price and logarithms of every slack.

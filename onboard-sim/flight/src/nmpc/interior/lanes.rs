@@ -6,8 +6,14 @@
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// Nodes evaluated together.
-pub(super) const LANES: usize = 4;
+/// Nodes evaluated together: as many as fill a vector register of the machine compiled for.
+pub(super) const LANES: usize = if cfg!(target_feature = "avx512f") {
+    8
+} else if cfg!(target_feature = "avx") {
+    4
+} else {
+    2
+};
 
 /// One number for each of [`LANES`] nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]

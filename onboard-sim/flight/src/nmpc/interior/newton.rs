@@ -58,7 +58,7 @@ impl Newton {
         }
     }
 
-    /// Factorises; whether the inertia is right.
+    /// Factorises, with a share of the dynamics' curvature; whether the inertia is right.
     pub(super) fn factorise(&mut self, problem: &Problem, iterate: &Iterate, share: f64) -> bool {
         self.sweep.backward(iterate, problem.step_s, share)
     }

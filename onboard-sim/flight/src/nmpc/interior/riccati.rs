@@ -97,6 +97,7 @@ pub(super) struct Sweep {
     pub(super) inputs: Vec<f64>,
     /// The costates after the step.
     pub(super) costates: Vec<[f64; 6]>,
+    /// Share of the dynamics' curvature that is in the step.
     share: f64,
 }
 
@@ -112,7 +113,7 @@ impl Sweep {
         self.costates.resize(intervals + 1, [0.0; 6]);
     }
 
-    /// The backward sweep with `damping` added to every input's curvature; whether the inertia is right.
+    /// The backward sweep with a share of the dynamics' curvature; whether the inertia is right.
     pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, share: f64) -> bool {
         self.share = share;
         let count = self.inputs.len();
@@ -155,7 +156,6 @@ impl Sweep {
             let (own_curvature, own_slope) = self.input_terms[k];
             let curvature = by_input[D] + h(D, D) + own_curvature;
             if !(curvature > LEAST_CURVATURE * (1.0 + own_curvature)) {
-                if super::solver::TRACE.load(std::sync::atomic::Ordering::Relaxed) { println!("      fail k {k} of {count} curvature {curvature:.3e} by_input {:.3e} h {:.3e} own {own_curvature:.3e} share {share}", by_input[D], h(D,D)); }
                 return false;
             }
             let inverse = 1.0 / curvature;

@@ -1,49 +1,53 @@
 //! The main loop.
 
-use super::barrier::{Elastic, Limits};
 use super::filter::{Filter, Measures};
-use super::guess;
 use super::interval::Constants;
 use super::iterate::Iterate;
 use super::newton::{Fractions, Newton};
 use super::residual::Residual;
+use super::start;
 use crate::dynamics::PlanarState;
 use crate::nmpc::problem::Condition;
 use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart};
 
-pub static TRACE: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
-
-/// Barrier of a cold solve's first iteration.
-const COLD_BARRIER: f64 = 1.0;
+/// Barrier of a cold solve's first iteration: of the order of the conditions' price, so that nothing is active yet.
+const COLD_BARRIER: f64 = 1e3;
 
 /// Barrier of a warm solve, and the last of every solve.
-const LAST_BARRIER: f64 = 1e-9;
+const LAST_BARRIER: f64 = 1e-8;
+
+/// Barrier to which a solve whose limits and conditions change sides is raised at least, and by at least which factor.
+const RAISED_BARRIER: f64 = 1e-2;
+const RAISING_FACTOR: f64 = 100.0;
+
+/// Most times that the barrier is raised.
+const RAISES: u32 = 4;
+
+/// A step that can be followed less far than this, in primal or dual, is jammed between limits.
+const JAMMED: f64 = 0.1;
 
 /// A barrier problem is solved when its residual is at most this many barriers.
-const BARRIER_TOLERANCE: f64 = 10.0;
+const BARRIER_TOLERANCE: f64 = 30.0;
 
 /// Factor and exponent by which the barrier falls, whichever is faster.
 const BARRIER_FACTOR: f64 = 0.2;
-const BARRIER_EXPONENT: f64 = 1.5;
+const BARRIER_EXPONENT: f64 = 1.8;
 
-/// Least share of a slack or multiplier that a step leaves.
-const KEPT: f64 = 0.01;
+/// Share of a slack or multiplier that a step leaves: the barrier, between these.
+const KEPT_LEAST: f64 = 1e-3;
+const KEPT_MOST: f64 = 1e-2;
 
-/// Shortest fraction of a step that is tried.
+/// Shares of the dynamics' curvature that are tried until the inertia is right; without it, the Hessian is that of
+/// Gauss and Newton and always is.
+const CURVATURE_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
+
+/// Shortest fraction of a step that is tried, of what the slacks allow.
 const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 
 /// A step of the inputs this small (rad) is taken unasked: the objective's rounding is larger than what it could win.
 const TINY_STEP_RAD: f64 = 1e-7;
 
-/// Damping of the inputs' curvature: first try, growth, decay from one iteration to the next, and where to give up.
-const FIRST_DAMPING: f64 = 1.0;
-const DAMPING_GROWTH: f64 = 8.0;
-const DAMPING_DECAY: f64 = 1.0 / 3.0;
-const LARGEST_DAMPING: f64 = 1e10;
-
-pub(super) fn tune(name: &str, value: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(value) }
-
-/// How a branch ended.
+/// How a solve from one start ended.
 #[derive(Debug, Clone, Copy)]
 struct Outcome {
     status: SolveStatus,
@@ -52,7 +56,8 @@ struct Outcome {
     residual: Residual,
 }
 
-/// Room for a solve, kept from one to the next so that none allocates.
+/// Room for a solve, kept from one to the next so that the next does not allocate. It holds nothing that a solve
+/// depends on.
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     conditions: Vec<Condition>,
@@ -60,13 +65,33 @@ pub struct Workspace {
     trial: Iterate,
     other: Iterate,
     newton: Newton,
-    scratch: Vec<[f64; 6]>,
     filter: Filter,
+    scratch: Vec<[f64; 6]>,
 }
 
 impl Workspace {
-    /// Solves a problem with at least one interval, and writes everything but the bound into `solution`.
-    pub fn solve(&mut self, problem: &Problem, warm: Option<&WarmStart>, solution: &mut Solution) {
+    /// Solves a problem with at least one interval into `solution`, all but its bound of the touchdown speed.
+    pub(crate) fn solve(&mut self, problem: &Problem, warm: Option<&WarmStart>, solution: &mut Solution) {
+        self.resize(problem);
+        let cap = problem.solver.max_iterations;
+        let Some(warm) = warm else {
+            let outcome = self.cold(problem, cap);
+            self.report(problem, outcome, solution);
+            return;
+        };
+        start::warm(problem, &self.conditions, warm, LAST_BARRIER, &mut self.current);
+        let mut outcome = self.descend(problem, LAST_BARRIER, true, cap);
+        let left = cap - outcome.iterations;
+        if matches!(outcome.status, SolveStatus::Stalled | SolveStatus::SubproblemFailed) && left > 0 {
+            let (iterations, sweeps) = (outcome.iterations, outcome.sweeps);
+            outcome = self.cold(problem, left);
+            outcome.iterations += iterations;
+            outcome.sweeps += sweeps;
+        }
+        self.report(problem, outcome, solution);
+    }
+
+    fn resize(&mut self, problem: &Problem) {
         self.conditions.clear();
         problem.append_conditions(&mut self.conditions);
         let (intervals, conditions) = (problem.intervals(), self.conditions.len());
@@ -75,249 +100,167 @@ impl Workspace {
         }
         self.newton.resize(intervals, conditions);
         self.scratch.resize(intervals + 1, [0.0; 6]);
-        if let Some(warm) = warm {
-            self.start_warm(problem, warm);
-            let outcome = self.descend(problem, LAST_BARRIER, true);
-            self.report(problem, outcome, solution);
-            return;
-        }
+    }
+
+    /// Solves from both bent guesses, at most `cap` iterations each; the better result ends as `current`.
+    fn cold(&mut self, problem: &Problem, cap: usize) -> Outcome {
         let amplitude_rad = problem.solver.guess_amplitude_rad;
-        self.start_cold(problem, amplitude_rad);
-        let left = self.descend(problem, tune("MU0", COLD_BARRIER), false);
-        let left_price = self.price(problem, left);
-        core::mem::swap(&mut self.current, &mut self.other);
-        self.start_cold(problem, -amplitude_rad);
-        let right = self.descend(problem, tune("MU0", COLD_BARRIER), false);
-        let mut outcome = right;
-        if left_price <= self.price(problem, right) {
+        let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
             core::mem::swap(&mut self.current, &mut self.other);
-            outcome = left;
-        }
-        outcome.iterations = left.iterations + right.iterations;
-        outcome.sweeps = left.sweeps + right.sweeps;
-        self.report(problem, outcome, solution);
-    }
-
-    /// Cost plus the price of everything broken, of a path without defects.
-    fn price(&mut self, problem: &Problem, outcome: Outcome) -> f64 {
-        if outcome.status != SolveStatus::Converged {
-            self.current.roll_out(problem);
-        }
-        let broken: f64 =
-            self.conditions.iter().map(|row| row.violation(row.value(&self.current.states))).sum();
-        let price = self.current.cost(problem) + problem.solver.terminal_penalty * broken;
-        if price.is_finite() { price } else { f64::INFINITY }
-    }
-
-    fn start_cold(&mut self, problem: &Problem, amplitude_rad: f64) {
-        let current = &mut self.current;
-        guess::straight(problem, amplitude_rad, &mut current.states);
-        current.inputs_rad.fill(0.0);
-        current.costates.fill([0.0; 6]);
-        current.limits.fill(Limits::central(0.0, problem.gimbal_limit_rad, tune("MU0", COLD_BARRIER)));
-        let price = problem.solver.terminal_penalty;
-        for (elastic, condition) in current.elastics.iter_mut().zip(&self.conditions) {
-            let value = condition.value(&current.states);
-            *elastic = Elastic::central(value, condition.equality, price, tune("MU0", COLD_BARRIER));
-        }
-    }
-
-    fn start_warm(&mut self, problem: &Problem, warm: &WarmStart) {
-        let limit = problem.gimbal_limit_rad;
-        let price = problem.solver.terminal_penalty;
-        let current = &mut self.current;
-        let count = problem.intervals();
-        current.states[0] = problem.initial.to_array();
-        for (input, start) in current.inputs_rad.iter_mut().zip(&warm.inputs_rad) {
-            *input = if start.is_finite() { inside(*start, limit) } else { 0.0 };
-        }
-        let complete = warm.states.len() == count + 1
-            && warm.costates.len() == count + 1
-            && warm.limit_multipliers.len() == count;
-        if complete {
-            for (state, start) in current.states.iter_mut().zip(&warm.states).skip(1) {
-                *state = start.to_array();
+            start::cold(problem, &self.conditions, amplitude_rad, COLD_BARRIER, &mut self.current);
+            let outcome = self.descend(problem, COLD_BARRIER, false, cap);
+            if outcome.status != SolveStatus::Converged {
+                self.current.roll_out(problem);
             }
-            current.costates.copy_from_slice(&warm.costates);
-            for (limits, start) in current.limits.iter_mut().zip(&warm.limit_multipliers) {
-                *limits = Limits { lower: start[0], upper: start[1] };
-            }
-        } else {
-            current.roll_out(problem);
-            current.costates.fill([0.0; 6]);
-            for (limits, input) in current.limits.iter_mut().zip(&current.inputs_rad) {
-                *limits = Limits::central(*input, limit, LAST_BARRIER);
-            }
+            let price = self.current.price(problem, &self.conditions);
+            (outcome, if price.is_finite() { price } else { f64::INFINITY })
+        });
+        let mut better = right.0;
+        if left.1 <= right.1 {
+            core::mem::swap(&mut self.current, &mut self.other);
+            better = left.0;
         }
-        let multipliers = warm.end_multipliers.iter().chain(&warm.floor_multipliers);
-        let known = multipliers.copied().filter(|value| value.is_finite()).chain(core::iter::repeat(0.0));
-        for ((elastic, condition), multiplier) in
-            current.elastics.iter_mut().zip(&self.conditions).zip(known)
-        {
-            let value = condition.value(&current.states);
-            *elastic = Elastic::warm(value, multiplier, condition.equality, price, LAST_BARRIER);
-        }
+        better.iterations = left.0.iterations + right.0.iterations;
+        better.sweeps = left.0.sweeps + right.0.sweeps;
+        better
     }
 
-    /// Newton iterations from `current`, which ends as the solution.
-    fn descend(&mut self, problem: &Problem, first_barrier: f64, check_first: bool) -> Outcome {
+    /// Newton iterations from `current`, which ends as the last iterate; with `check_first`, without derivatives for
+    /// a start that is optimal already.
+    fn descend(
+        &mut self,
+        problem: &Problem,
+        first_barrier: f64,
+        check_first: bool,
+        cap: usize,
+    ) -> Outcome {
         let constants = Constants::of(&problem.model, problem.step_s);
         let tolerance = problem.solver.kkt_tolerance;
         let mut barrier = first_barrier;
-        let mut damping = 0.0;
         let (mut iterations, mut sweeps, mut raises) = (0, 0, 0);
-        let mut residual;
         if check_first {
             self.current.evaluate::<false>(&constants, &problem.thrust_n);
-            residual = self.residual(problem, 0.0);
-            if residual.largest() <= tolerance {
+            let residual = self.residual(problem);
+            if residual.largest(0.0) <= tolerance {
                 return Outcome { status: SolveStatus::Converged, iterations, sweeps, residual };
             }
         }
         self.current.evaluate::<true>(&constants, &problem.thrust_n);
-        self.filter = Filter::starting_at(self.current.infeasibility());
+        let mut residual = self.residual(problem);
+        self.filter = Filter::starting_at(residual.infeasibility);
         let status = loop {
-            residual = self.residual(problem, 0.0);
-            if !residual.largest().is_finite() {
+            if !residual.largest(0.0).is_finite() {
                 break SolveStatus::BadInput;
             }
-            if residual.largest() <= tolerance && barrier <= LAST_BARRIER {
+            if residual.largest(0.0) <= tolerance {
                 break SolveStatus::Converged;
             }
-            if iterations >= problem.solver.max_iterations {
+            if iterations >= cap {
                 break SolveStatus::IterationLimit;
             }
-            while barrier > LAST_BARRIER
-                && self.residual(problem, barrier).largest() <= tune("KT",BARRIER_TOLERANCE) * barrier
-            {
-                barrier = (tune("KF",BARRIER_FACTOR) * barrier).min(barrier.powf(tune("KE",BARRIER_EXPONENT))).max(LAST_BARRIER);
+            iterations += 1;
+
+            while barrier > LAST_BARRIER && residual.largest(barrier) <= BARRIER_TOLERANCE * barrier {
+                let faster = libm::pow(barrier, BARRIER_EXPONENT);
+                barrier = (BARRIER_FACTOR * barrier).min(faster).max(LAST_BARRIER);
                 self.filter.clear();
             }
-            iterations += 1;
             self.newton.assemble(problem, &self.conditions, &self.current, barrier);
-            let mut share = 1.0;
-            let shares: Vec<f64> = std::env::var("SHARES").map_or(vec![1.0,0.0], |v| v.split(',').map(|x| x.parse().unwrap()).collect());
-            let mut solved=false;
-            for x in shares {
+            let solved = CURVATURE_SHARES.into_iter().any(|share| {
                 sweeps += 1;
-                share = x;
-                if self.newton.factorise(problem, &self.current, share) { solved=true; break; }
-            }
-            damping = share;
+                self.newton.factorise(problem, &self.current, share)
+            });
             if !solved {
                 break SolveStatus::SubproblemFailed;
             }
             self.newton.solve(problem, &self.conditions, &self.current, barrier);
-            if TRACE.load(std::sync::atomic::Ordering::Relaxed) {
-                println!(
-                    "{iterations:3} mu {barrier:.1e} cost {:.4} inf {:.2e} stat {:.2e} compl {:.2e} damp {damping:.1e} step {:.2e} y {:.3}",
-                    self.current.cost(problem), self.current.infeasibility(), residual.stationarity, residual.complementarity,
-                    self.newton.largest_input_step(), self.current.elastics[0].multiplier(),
-                );
-            }
-            let keep = KEPT.min(barrier).max(tune("KEEP", 1e-3));
-            let fractions = self.newton.fractions(problem, &self.current, keep);
-            let jammed = fractions.primal.min(fractions.dual) < tune("JAM", 0.1);
-            if barrier < tune("RAISE", 1e-3) && raises == 0 && jammed
-                || !self.advance(problem, &constants, barrier, fractions)
-            {
-                if raises >= 4 {
+
+            let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
+            let fractions = self.newton.fractions(problem, &self.current, kept);
+            let jammed =
+                raises == 0 && barrier < RAISED_BARRIER && fractions.primal.min(fractions.dual) < JAMMED;
+            if jammed || !self.advance(problem, &constants, barrier, fractions, residual.infeasibility) {
+                if raises >= RAISES {
                     break SolveStatus::Stalled;
                 }
                 raises += 1;
-                barrier = self.raise(problem, &constants, barrier);
+                barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
+                start::raise(problem, &self.conditions, barrier, &mut self.current);
+                self.current.evaluate::<true>(&constants, &problem.thrust_n);
+                residual = self.residual(problem);
+                self.filter = Filter::starting_at(residual.infeasibility);
+            } else {
+                residual = self.residual(problem);
             }
         };
         Outcome { status, iterations, sweeps, residual }
     }
 
-    /// Starts again from the current states with a larger barrier: too many limits and conditions change sides.
-    fn raise(&mut self, problem: &Problem, constants: &Constants, barrier: f64) -> f64 {
-        let barrier = tune("RAISE", 1e-3).max(barrier * tune("RAISEF", 100.0));
-        let limit = problem.gimbal_limit_rad;
-        let current = &mut self.current;
-        for (input, limits) in current.inputs_rad.iter_mut().zip(&mut current.limits) {
-            *input = limits.raise(*input, limit, barrier);
-        }
-        for (elastic, condition) in current.elastics.iter_mut().zip(&self.conditions) {
-            *elastic = elastic.raised(condition.value(&current.states), barrier);
-        }
-        current.evaluate::<true>(constants, &problem.thrust_n);
-        self.filter = Filter::starting_at(self.current.infeasibility());
-        barrier
-    }
-
-    /// Line search along the step; whether a point was accepted.
-    fn advance(&mut self, problem: &Problem, constants: &Constants, barrier: f64, fractions: Fractions) -> bool {
-        let Fractions { mut primal, dual } = fractions;
+    /// Line search along the step from `current`; whether a point was accepted, which then is `current`.
+    fn advance(
+        &mut self,
+        problem: &Problem,
+        constants: &Constants,
+        barrier: f64,
+        fractions: Fractions,
+        infeasibility: f64,
+    ) -> bool {
         let slope = self.newton.slope(problem, &self.current, barrier);
-        let now = Measures {
-            infeasibility: self.current.infeasibility(),
-            objective: self.current.barrier_objective(problem, barrier),
-        };
+        let objective = self.current.barrier_objective(problem, barrier);
+        let now = Measures { infeasibility, objective };
         let tiny = self.newton.largest_input_step() <= TINY_STEP_RAD;
-        if TRACE.load(std::sync::atomic::Ordering::Relaxed) {
-            println!("      primal {primal:.3} dual {dual:.3} slope {slope:.3e}");
-        }
-        loop {
-            self.newton.take(&self.conditions, &self.current, Fractions { primal, dual }, &mut self.trial);
+        let mut share = 1.0;
+        while share >= SHORTEST_STEP {
+            let tried = Fractions { primal: share * fractions.primal, dual: fractions.dual };
+            self.newton.take(&self.conditions, &self.current, tried, &mut self.trial);
             self.trial.evaluate::<true>(constants, &problem.thrust_n);
             let trial = Measures {
                 infeasibility: self.trial.infeasibility(),
                 objective: self.trial.barrier_objective(problem, barrier),
             };
-            let unasked = tiny && trial.infeasibility.is_finite() && trial.objective.is_finite();
-            if unasked || self.filter.accepts(now, trial, slope, primal) {
+            if self.filter.accepts(now, trial, slope, tried.primal) || tiny && trial.is_finite() {
                 core::mem::swap(&mut self.current, &mut self.trial);
                 return true;
             }
-            primal *= 0.5;
-            if primal < SHORTEST_STEP {
-                return false;
-            }
+            share *= 0.5;
         }
+        false
     }
 
-    fn residual(&mut self, problem: &Problem, barrier: f64) -> Residual {
-        Residual::of(problem, &self.conditions, &self.current, barrier, &mut self.scratch)
+    fn residual(&mut self, problem: &Problem) -> Residual {
+        Residual::of(problem, &self.conditions, &self.current, &mut self.scratch)
     }
 
+    /// Writes `current` out; what did not converge as the path its inputs lead to.
     fn report(&mut self, problem: &Problem, outcome: Outcome, solution: &mut Solution) {
         let current = &mut self.current;
         if outcome.status != SolveStatus::Converged {
             current.roll_out(problem);
         }
-        let ends = problem.end_conditions_len();
-        solution.status = outcome.status;
-        solution.iterations = outcome.iterations;
-        solution.qp_iterations = outcome.sweeps;
-        solution.cost = current.cost(problem);
-        solution.kkt_stationarity = outcome.residual.stationarity;
-        solution.kkt_feasibility = outcome.residual.defect.max(outcome.residual.complementarity);
+        let Outcome { status, iterations, sweeps, residual } = outcome;
+        solution.clear();
+        solution.iterations = iterations;
+        solution.qp_iterations = sweeps;
+        let cost = current.cost(problem);
+        if !cost.is_finite() {
+            solution.status = SolveStatus::BadInput;
+            return;
+        }
+        solution.status = status;
+        solution.cost = cost;
+        solution.kkt_stationarity = residual.stationarity;
+        solution.kkt_feasibility = residual.defect.max(residual.complementarity(0.0));
         solution.condition_miss = self
             .conditions
             .iter()
             .map(|row| row.violation(row.value(&current.states)))
             .fold(0.0, f64::max);
-        replace(&mut solution.states, current.states.iter().map(|state| PlanarState::from_array(*state)));
-        replace(&mut solution.inputs_rad, current.inputs_rad.iter().copied());
-        replace(&mut solution.costates, current.costates.iter().copied());
-        replace(&mut solution.limit_multipliers, current.limits.iter().map(|z| [z.lower, z.upper]));
-        let (end, floor) = current.elastics.split_at(ends);
-        replace(&mut solution.end_multipliers, end.iter().map(Elastic::multiplier));
-        replace(&mut solution.floor_multipliers, floor.iter().map(Elastic::multiplier));
+        solution.states.extend(current.states.iter().map(|state| PlanarState::from_array(*state)));
+        solution.inputs_rad.extend(&current.inputs_rad);
+        solution.costates.extend(&current.costates);
+        solution.limit_multipliers.extend(current.limits.iter().map(|limits| [limits.lower, limits.upper]));
+        let (end, floor) = current.elastics.split_at(problem.end_conditions_len());
+        solution.end_multipliers.extend(end.iter().map(|elastic| elastic.multiplier()));
+        solution.floor_multipliers.extend(floor.iter().map(|elastic| elastic.multiplier()));
     }
-}
-
-/// Refills a vector; allocates only if it never held as much.
-fn replace<T>(values: &mut Vec<T>, with: impl Iterator<Item = T>) {
-    values.clear();
-    values.extend(with);
-}
-
-/// An input strictly within its limits.
-fn inside(input_rad: f64, limit_rad: f64) -> f64 {
-    const HAIR: f64 = 1e-12;
-    let largest = limit_rad * (1.0 - HAIR);
-    input_rad.clamp(-largest, largest)
 }
