@@ -1,21 +1,14 @@
 //! The landing optimal-control problem and its solver.
 //!
 //! [`solve`] takes a [`Problem`] and perhaps a [`WarmStart`] and returns a [`Solution`], always: how it went is
-//! [`SolveStatus`], data like the rest.
+//! [`SolveStatus`], data like the rest. [`solve_into`] is the same without allocation.
 //!
-//! The method is sequential quadratic programming with exact second derivatives. The states are not variables:
-//! they are rolled out from the inputs, so every iterate is a flyable path and the best one so far can be flown at
-//! any time. One iteration:
-//!
-//! 1. `rollout`: states and cost of the inputs, RK4, one step an interval.
-//! 2. `sensitivity`: tangents of every interval, and adjoint-weighted second derivatives over its RK4 stages.
-//! 3. `condense`: both condensed onto the inputs: gradient, Hessian, one row an end or path condition.
-//! 4. `convexify`: the Hessian made positive definite without changing the Newton step, where that is possible.
-//! 5. `polish`: the quadratic subproblem, conditions elastic, solved exactly from the last active set; where that
-//!    set is too far off, `qp` finds it with Clarabel.
-//! 6. `line_search` on cost plus exact penalty, with a second-order correction.
-//!
-//! `sqp` is the loop around them, with the optimality residual.
+//! * `problem`: the problem and its conditions, as data.
+//! * `bound`: what cannot be landed, and why.
+//! * `interior`: the solver, a stage-structured interior-point method with exact Hessians; its page has the
+//!   formulation, the steps and the references.
+//! * [`reference`]: a condensed sequential quadratic programme on Clarabel, for tests and comparisons.
+//! * `rollout`: states and cost of given inputs.
 //!
 //! Gauss-Newton Hessians are not an option: the multiplier of the end height is large and the curvature of the
 //! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
@@ -73,7 +66,7 @@ impl SolveStatus {
     }
 }
 
-/// Where to start from: the inputs and multipliers of an earlier solution, shifted to the present.
+/// Where to start from: an earlier solution, shifted to the present. Inputs alone will do; they are then rolled out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WarmStart {
     /// The states, one more than inputs; empty if unknown.
@@ -97,13 +90,13 @@ pub struct Solution {
     pub status: SolveStatus,
     /// Newton iterations, over all starting points tried.
     pub iterations: usize,
-    /// Iterations of the quadratic subproblems, in all.
+    /// Linear systems factorised, over all iterations; of the reference solver, iterations of its subproblems.
     pub qp_iterations: u32,
     /// Running cost (Eq. 28 of the landing paper), without penalties.
     pub cost: f64,
-    /// Largest component of the Lagrangian's gradient by the inputs that no input limit explains.
+    /// Largest component of the Lagrangian's gradient by states and inputs.
     pub kkt_stationarity: f64,
-    /// Largest condition residual that no multiplier at its price explains, m, rad, m/s or rad/s.
+    /// Largest defect of the dynamics (m, rad, m/s or rad/s) or product of a slack and its multiplier (cost).
     pub kkt_feasibility: f64,
     /// How far the path misses its conditions, at worst, m, rad, m/s or rad/s.
     pub condition_miss: f64,

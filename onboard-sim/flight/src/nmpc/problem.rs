@@ -86,15 +86,11 @@ impl Problem {
         thrust_scale: f64,
     ) -> Self {
         let nmpc = &profile.nmpc;
-        let step_s = nmpc.sample_time_s;
-        let thrust_n = (0..intervals)
-            .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s))
-            .collect();
-        Self {
+        let mut problem = Self {
             model: PlanarModel::from_profile(profile),
             initial,
-            step_s,
-            thrust_n,
+            step_s: nmpc.sample_time_s,
+            thrust_n: Vec::new(),
             state_weights: nmpc.weights.state_diagonal(),
             input_weight: nmpc.weights.delta,
             gimbal_limit_rad: nmpc.limits.gimbal_rad(),
@@ -103,7 +99,29 @@ impl Problem {
             altitude_min_m: nmpc.limits.altitude_min_m,
             touchdown_speed_max_m_s: profile.touchdown_limits.u_m_s,
             solver: nmpc.solver,
-        }
+        };
+        problem.pose(profile, initial, starts_s, intervals, thrust_scale);
+        problem
+    }
+
+    /// [`from_profile`](Self::from_profile) in place, for a problem of the same profile; allocates only if it never
+    /// had as many intervals.
+    pub fn pose(
+        &mut self,
+        profile: &Profile,
+        initial: PlanarState,
+        starts_s: f64,
+        intervals: usize,
+        thrust_scale: f64,
+    ) {
+        let step_s = self.step_s;
+        self.initial = initial;
+        self.solver = profile.nmpc.solver;
+        self.thrust_n.clear();
+        self.thrust_n.extend(
+            (0..intervals)
+                .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s)),
+        );
     }
 
     /// Number of intervals.

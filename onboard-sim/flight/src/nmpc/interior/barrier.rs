@@ -12,6 +12,12 @@
 //! linear, so `c = s - e` holds at every iterate once it holds at the first. Eliminating slacks and multiplier from
 //! the Newton system leaves a diagonal term `1 / D`, `D = s / (y + l) + e / (M - y)`, on the condition's component.
 
+/// Slacks up to this are not worth changing a multiplier for, m, rad, m/s or rad/s.
+const SLACK: f64 = 1e-3;
+
+/// A multiplier this close to its price, relative to it, stands there.
+const AT_PRICE: f64 = 1e-9;
+
 /// Multipliers of an input's lower and upper limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Limits {
@@ -94,11 +100,12 @@ impl Elastic {
 
     /// The elastic of a condition at value `c` with a multiplier from an earlier solution.
     pub(super) fn warm(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
-        /// Least distance of a multiplier from the ends of its range, relative to its largest value.
-        const INSIDE: f64 = 1e-9;
+        /// Share of its place on the central path that a multiplier is kept from the ends of its range.
+        const KEPT: f64 = 0.1;
         let least = if equality { price } else { 0.0 };
-        let a = (multiplier + least).max(INSIDE * price);
-        let b = (price - multiplier).max(INSIDE * price);
+        let nearest = KEPT * barrier / c.abs().max(SLACK);
+        let a = (multiplier + least).max(nearest);
+        let b = (price - multiplier).max(nearest);
         Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
     }
 
@@ -115,8 +122,6 @@ impl Elastic {
 
     /// With slacks and multiplier raised to the barrier, for a condition at value `c`.
     pub(super) fn raised(&self, c: f64, barrier: f64) -> Self {
-        /// Slacks up to this are not worth changing a multiplier for, m, rad, m/s or rad/s.
-        const SLACK: f64 = 1e-3;
         let width = self.price + self.least;
         let least = (barrier / c.abs().max(SLACK)).min(0.5 * width);
         let mut raised = *self;
@@ -139,6 +144,17 @@ impl Elastic {
     #[inline]
     pub(super) fn multiplier(&self) -> f64 {
         if self.a < self.b { self.a - self.least } else { self.price - self.b }
+    }
+
+    /// `y`, at its price where a broken condition has brought it there.
+    pub(super) fn settled_multiplier(&self) -> f64 {
+        if self.b <= AT_PRICE * self.price {
+            self.price
+        } else if self.least > 0.0 && self.a <= AT_PRICE * self.price {
+            -self.least
+        } else {
+            self.multiplier()
+        }
     }
 
     /// Distances of the multiplier from its least and its largest value.

@@ -1,5 +1,6 @@
 //! The main loop.
 
+use super::barrier::Elastic;
 use super::filter::{Filter, Measures};
 use super::interval::Constants;
 use super::iterate::Iterate;
@@ -260,7 +261,7 @@ impl Workspace {
         solution.costates.extend(&current.costates);
         solution.limit_multipliers.extend(current.limits.iter().map(|limits| [limits.lower, limits.upper]));
         let (end, floor) = current.elastics.split_at(problem.end_conditions_len());
-        solution.end_multipliers.extend(end.iter().map(|elastic| elastic.multiplier()));
-        solution.floor_multipliers.extend(floor.iter().map(|elastic| elastic.multiplier()));
+        solution.end_multipliers.extend(end.iter().map(Elastic::settled_multiplier));
+        solution.floor_multipliers.extend(floor.iter().map(Elastic::settled_multiplier));
     }
 }

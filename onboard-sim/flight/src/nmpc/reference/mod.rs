@@ -1,4 +1,18 @@
-//! The reference solver: condensed sequential quadratic programming.
+//! The reference solver: slow, generic, independent of the fast one in all but the equations of motion.
+//!
+//! Sequential quadratic programming with exact second derivatives. The states are not variables: they are rolled out
+//! from the inputs, so every iterate is a flyable path. One iteration:
+//!
+//! 1. `rollout`: states and cost of the inputs, RK4, one step an interval.
+//! 2. `sensitivity`: tangents of every interval, and adjoint-weighted second derivatives over its RK4 stages.
+//! 3. `condense`: both condensed onto the inputs: gradient, Hessian, one row an end or path condition.
+//! 4. `convexify`: the Hessian made positive definite without changing the Newton step, where that is possible.
+//! 5. `polish`: the quadratic subproblem, conditions elastic, solved exactly from the last active set; where that
+//!    set is too far off, `qp` finds it with Clarabel.
+//! 6. `line_search` on cost plus exact penalty, with a second-order correction.
+//!
+//! `sqp` is the loop around them, with the optimality residual. It allocates, and takes tens of milliseconds where
+//! the other takes tenths of one.
 
 mod condense;
 mod convexify;
@@ -34,3 +48,6 @@ fn cold(problem: &Problem) -> Solution {
     let better = if price(&right) < price(&left) { right } else { left };
     Solution { iterations, qp_iterations, ..better }
 }
+
+#[cfg(test)]
+mod tests;
