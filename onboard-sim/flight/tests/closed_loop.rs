@@ -126,7 +126,8 @@ fn fly(scenario: &Scenario) -> Flight {
             if state.z_m <= 0.0 {
                 // At the instant of contact: its share of the step by the heights on either side, and once more
                 // between there and the end, because the path is curved.
-                let within = |share: f64| model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
+                let within =
+                    |share: f64| model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
                 let near = before.z_m / (before.z_m - state.z_m);
                 let left = within(near).z_m;
                 let share = near + (1.0 - near) * left / (left - state.z_m);

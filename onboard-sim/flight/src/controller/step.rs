@@ -171,8 +171,8 @@ impl Moment {
     /// Solves the problem in the room, from the flown plan shifted to this moment if it reaches this far.
     fn solve(&self, flown: Option<&FlownPlan>, room: &mut Room) {
         let Room { workspace, problem, warm, solution } = room;
-        let elapsed = flown
-            .and_then(|flown| Some((flown, self.first_interval.checked_sub(flown.first_interval)?)));
+        let elapsed =
+            flown.and_then(|flown| Some((flown, self.first_interval.checked_sub(flown.first_interval)?)));
         if let Some((flown, elapsed)) = elapsed {
             flown.solution.shift_into(elapsed, warm);
         }

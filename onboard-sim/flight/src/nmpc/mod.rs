@@ -145,9 +145,18 @@ impl Solution {
 
     /// Back to nothing solved, keeping the room.
     fn clear(&mut self) {
-        let Self { states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, .. } =
-            core::mem::take(self);
-        *self = Self { states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, ..Self::default() };
+        let Self {
+            states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, ..
+        } = core::mem::take(self);
+        *self = Self {
+            states,
+            costates,
+            limit_multipliers,
+            inputs_rad,
+            end_multipliers,
+            floor_multipliers,
+            ..Self::default()
+        };
         self.states.clear();
         self.costates.clear();
         self.limit_multipliers.clear();

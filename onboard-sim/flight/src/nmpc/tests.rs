@@ -200,7 +200,12 @@ fn val_reference_solver_agrees_that_the_solutions_are_optimal() {
                 .fold(0.0_f64, |most, (one, other)| most.max((one - other).abs()));
             assert_eq!(checked.status, SolveStatus::Converged, "{name}");
             assert!(checked.iterations <= 3, "{name}: {} iterations", checked.iterations);
-            assert!((solution.cost - checked.cost).abs() < 1e-4, "{name}: {} {}", solution.cost, checked.cost);
+            assert!(
+                (solution.cost - checked.cost).abs() < 1e-4,
+                "{name}: {} {}",
+                solution.cost,
+                checked.cost
+            );
             assert!(moved < 1e-5, "{name}: {moved} rad");
         }
     }

@@ -47,7 +47,13 @@ pub(super) struct Filter {
 
 impl Default for Filter {
     fn default() -> Self {
-        Self { entries: [Measures::default(); CAPACITY], used: 0, oldest: 0, ceiling: f64::INFINITY, small: 0.0 }
+        Self {
+            entries: [Measures::default(); CAPACITY],
+            used: 0,
+            oldest: 0,
+            ceiling: f64::INFINITY,
+            small: 0.0,
+        }
     }
 }
 
@@ -80,8 +86,7 @@ impl Filter {
         }
         let descends = slope < 0.0
             && now.infeasibility <= self.small
-            && fraction * libm::pow(-slope, DESCENT_EXPONENT)
-                > libm::pow(now.infeasibility, DEFECT_EXPONENT);
+            && fraction * libm::pow(-slope, DESCENT_EXPONENT) > libm::pow(now.infeasibility, DEFECT_EXPONENT);
         if descends {
             return trial.objective <= now.objective + SUFFICIENT_DECREASE * fraction * slope + rounding;
         }

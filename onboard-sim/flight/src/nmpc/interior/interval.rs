@@ -8,6 +8,7 @@
 //!   only those of `u` and `w` are propagated (`tangent`).
 //!
 //! The directions of differentiation are (theta, u, w, q, delta).
+#![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
 use super::lanes::{LANES, Lanes};
 use super::tangent::differentiate;

@@ -75,7 +75,8 @@ impl Iterate {
                 *sum += value * value;
             }
         }
-        let state_part: f64 = squares.iter().zip(&problem.state_weights).map(|(sum, weight)| sum * weight).sum();
+        let state_part: f64 =
+            squares.iter().zip(&problem.state_weights).map(|(sum, weight)| sum * weight).sum();
         let input_part: f64 = self.inputs_rad.iter().map(|input| input * input).sum();
         0.5 * problem.step_s * (state_part + problem.input_weight * input_part)
     }
@@ -84,6 +85,11 @@ impl Iterate {
     pub(super) fn price(&self, problem: &Problem, conditions: &[Condition]) -> f64 {
         let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
         self.cost(problem) + problem.solver.terminal_penalty * broken
+    }
+
+    /// The largest violation of any condition, m, rad, m/s or rad/s.
+    pub(super) fn worst_violation(&self, conditions: &[Condition]) -> f64 {
+        conditions.iter().map(|row| row.violation(row.value(&self.states))).fold(0.0, f64::max)
     }
 
     /// The objective of the barrier problem: cost, elastics at their price and logarithms of every slack.

@@ -2,18 +2,13 @@
 //!
 //! Every lane sees the same IEEE operations in the same order on every machine, so the bits do not depend on how wide
 //! its vectors are.
+#![expect(clippy::inline_always, reason = "each is one vector instruction")]
 
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// Nodes evaluated together: as many as fill a vector register of the machine compiled for.
-pub(super) const LANES: usize = if cfg!(target_feature = "avx512f") {
-    8
-} else if cfg!(target_feature = "avx") {
-    4
-} else {
-    2
-};
+/// Nodes evaluated together: as many as the compiler's vectors hold.
+pub(super) const LANES: usize = if cfg!(target_feature = "avx") { 4 } else { 2 };
 
 /// One number for each of [`LANES`] nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,22 +54,22 @@ fn sin_cos(angle: f64) -> (f64, f64) {
     /// Adding it leaves the nearest integer in the lowest bits.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
     const QUARTER_TURN: [f64; 3] =
-        [1.570_796_326_734_125_614_17, 6.077_100_506_303_965_976_6e-11, 2.022_266_248_795_950_631_54e-21];
+        [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
     const SINE: [f64; 6] = [
-        -1.666_666_666_666_663_243_48e-1,
-        8.333_333_333_322_489_461_24e-3,
-        -1.984_126_982_985_794_931_34e-4,
-        2.755_731_370_707_006_767_89e-6,
-        -2.505_076_025_340_686_341_95e-8,
-        1.589_690_995_211_550_102_21e-10,
+        -1.666_666_666_666_663_2e-1,
+        8.333_333_333_322_49e-3,
+        -1.984_126_982_985_795e-4,
+        2.755_731_370_707_006_8e-6,
+        -2.505_076_025_340_686_3e-8,
+        1.589_690_995_211_55e-10,
     ];
     const COSINE: [f64; 6] = [
-        4.166_666_666_666_660_190_37e-2,
-        -1.388_888_888_887_410_957_49e-3,
-        2.480_158_728_947_672_941_78e-5,
-        -2.755_731_435_139_066_330_35e-7,
-        2.087_572_321_298_174_827_9e-9,
-        -1.135_964_755_778_819_482_65e-11,
+        4.166_666_666_666_66e-2,
+        -1.388_888_888_887_411e-3,
+        2.480_158_728_947_673e-5,
+        -2.755_731_435_139_066_3e-7,
+        2.087_572_321_298_175e-9,
+        -1.135_964_755_778_819_5e-11,
     ];
     let rounded = angle * core::f64::consts::FRAC_2_PI + ROUNDER;
     let turns = rounded - ROUNDER;
@@ -82,9 +77,10 @@ fn sin_cos(angle: f64) -> (f64, f64) {
     let r = ((angle - turns * QUARTER_TURN[0]) - turns * QUARTER_TURN[1]) - turns * QUARTER_TURN[2];
     let r2 = r * r;
     let r4 = r2 * r2;
-    let sine_tail = (SINE[0] + r2 * SINE[1]) + r4 * ((SINE[2] + r2 * SINE[3]) + r4 * (SINE[4] + r2 * SINE[5]));
-    let cosine_tail =
-        (COSINE[0] + r2 * COSINE[1]) + r4 * ((COSINE[2] + r2 * COSINE[3]) + r4 * (COSINE[4] + r2 * COSINE[5]));
+    let sine_tail =
+        (SINE[0] + r2 * SINE[1]) + r4 * ((SINE[2] + r2 * SINE[3]) + r4 * (SINE[4] + r2 * SINE[5]));
+    let cosine_tail = (COSINE[0] + r2 * COSINE[1])
+        + r4 * ((COSINE[2] + r2 * COSINE[3]) + r4 * (COSINE[4] + r2 * COSINE[5]));
     let sine = (r + r * r2 * sine_tail).to_bits();
     let cosine = (1.0 - (0.5 * r2 - r4 * cosine_tail)).to_bits();
     // An odd quadrant swaps the two.

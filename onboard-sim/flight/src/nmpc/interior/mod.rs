@@ -46,6 +46,7 @@ mod filter;
 mod interval;
 mod iterate;
 mod lanes;
+mod layers;
 mod newton;
 mod residual;
 mod riccati;
@@ -54,3 +55,6 @@ mod start;
 mod tangent;
 
 pub use solver::Workspace;
+
+#[cfg(test)]
+mod tests;

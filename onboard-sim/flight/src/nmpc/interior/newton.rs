@@ -129,7 +129,8 @@ impl Newton {
         }
         let input_weight = problem.step_s * problem.input_weight;
         for (input, step) in iterate.inputs_rad.iter().zip(&self.sweep.inputs) {
-            slope += (input_weight * input + barrier * (1.0 / (limit - input) - 1.0 / (limit + input))) * step;
+            slope +=
+                (input_weight * input + barrier * (1.0 / (limit - input) - 1.0 / (limit + input))) * step;
         }
         for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
             slope += price * elastic.broken_by(step)

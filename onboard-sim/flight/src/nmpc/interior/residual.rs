@@ -56,7 +56,7 @@ impl Residual {
         for (slope, push) in slopes.iter_mut().zip(&pushes[count]) {
             *slope = push.abs();
         }
-        for k in 0..count {
+        for (k, push) in pushes.iter().enumerate().take(count) {
             let (block, lane) = (&iterate.blocks[k / LANES], k % LANES);
             let gaps = iterate.defect(k);
             for i in 0..6 {
@@ -74,7 +74,7 @@ impl Residual {
                 let later = &iterate.costates[k + 1];
                 let before = [later[0], later[1], pulled(0), pulled(1), pulled(2), pulled(3)];
                 for i in 0..6 {
-                    slopes[i] = larger(slopes[i], (pushes[k][i] + before[i]).abs());
+                    slopes[i] = larger(slopes[i], (push[i] + before[i]).abs());
                 }
             }
         }
@@ -103,13 +103,13 @@ impl Residual {
 }
 
 /// The larger of two numbers, in one instruction.
-#[inline(always)]
+#[inline]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 /// The smaller of two numbers, in one instruction.
-#[inline(always)]
+#[inline]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }

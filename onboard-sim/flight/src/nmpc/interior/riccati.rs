@@ -11,6 +11,7 @@
 //!
 //! With one input the system has the right inertia exactly if `b' P b` plus the input's own curvature, one scalar a
 //! stage, is positive throughout.
+#![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
 use super::interval::{Block, DIRECTIONS, pair};
 use super::iterate::Iterate;
@@ -69,7 +70,9 @@ impl Interval {
     #[inline(always)]
     fn push(&self, dx: &[f64; 6], dd: f64, step_s: f64) -> [f64; 6] {
         let a = &self.tangent;
-        let row = |i: usize| (a[i][0] * dx[T] + a[i][1] * dx[U]) + (a[i][2] * dx[W] + a[i][3] * dx[Q]) + a[i][D] * dd;
+        let row = |i: usize| {
+            (a[i][0] * dx[T] + a[i][1] * dx[U]) + (a[i][2] * dx[W] + a[i][3] * dx[Q]) + a[i][D] * dd
+        };
         [
             dx[X] + row(0),
             dx[Z] + row(1),
@@ -155,7 +158,8 @@ impl Sweep {
             let h = |i: usize, j: usize| share * block.curvature[pair(i, j)].0[lane];
             let (own_curvature, own_slope) = self.input_terms[k];
             let curvature = by_input[D] + h(D, D) + own_curvature;
-            if !(curvature > LEAST_CURVATURE * (1.0 + own_curvature)) {
+            let positive = curvature > LEAST_CURVATURE * (1.0 + own_curvature);
+            if !positive {
                 return false;
             }
             let inverse = 1.0 / curvature;
@@ -207,6 +211,19 @@ impl Sweep {
         true
     }
 
+    /// What is left of the optimality of input `k` after the step; rounding, unless the sweeps are wrong.
+    #[cfg(test)]
+    pub(super) fn input_residual(&self, iterate: &Iterate, step_s: f64, k: usize) -> f64 {
+        let (block, lane) = (&iterate.blocks[k / LANES], k % LANES);
+        let dx = &self.states[k];
+        let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
+        let bent: f64 =
+            (0..DIRECTIONS).map(|j| self.share * block.curvature[pair(j, D)].0[lane] * moved[j]).sum();
+        let pulled = Interval::of(block, lane, step_s).pull(&self.costates[k + 1], step_s)[D];
+        let (curvature, slope) = self.input_terms[k];
+        curvature * self.inputs[k] + slope + bent + pulled
+    }
+
     /// The forward sweep: states, inputs, and then the costates, backwards again.
     pub(super) fn forward(&mut self, iterate: &Iterate, step_s: f64) {
         let count = self.inputs.len();
@@ -226,7 +243,8 @@ impl Sweep {
             self.states[k + 1] = dx;
         }
 
-        let mut costate: [f64; 6] = core::array::from_fn(|i| self.slopes[count][i] + self.weights[count][i] * dx[i]);
+        let mut costate: [f64; 6] =
+            core::array::from_fn(|i| self.slopes[count][i] + self.weights[count][i] * dx[i]);
         self.costates[count] = costate;
         for k in (1..count).rev() {
             let block = &iterate.blocks[k / LANES];
@@ -236,7 +254,9 @@ impl Sweep {
             let dx = &self.states[k];
             let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
             let bent: [f64; 4] = core::array::from_fn(|i| {
-                let h = |j: usize| self.share * block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane];
+                let h = |j: usize| {
+                    self.share * block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane]
+                };
                 (h(0) * moved[0] + h(1) * moved[1]) + (h(2) * moved[2] + h(3) * moved[3]) + h(4) * moved[4]
             });
             let before = [

@@ -15,10 +15,10 @@ use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart};
 const COLD_BARRIER: f64 = 1e3;
 
 /// Barrier of a warm solve, and the last of every solve.
-const LAST_BARRIER: f64 = 1e-8;
+pub(super) const LAST_BARRIER: f64 = 1e-8;
 
 /// Barrier to which a solve whose limits and conditions change sides is raised at least, and by at least which factor.
-const RAISED_BARRIER: f64 = 1e-2;
+pub(super) const RAISED_BARRIER: f64 = 1e-2;
 const RAISING_FACTOR: f64 = 100.0;
 
 /// Most times that the barrier is raised.
@@ -48,6 +48,13 @@ const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 /// A step of the inputs this small (rad) is taken unasked: the objective's rounding is larger than what it could win.
 const TINY_STEP_RAD: f64 = 1e-7;
 
+/// Bends of the cold guesses' pitch, in amplitudes; those after the first two are tried where these do not land.
+const BENDS: [f64; 4] = [1.0, -1.0, 3.3, -3.3];
+const NARROW_BENDS: usize = 2;
+
+/// Largest miss of a condition of a path that lands, m, rad, m/s or rad/s.
+const LANDING_MISS: f64 = 1e-3;
+
 /// How a solve from one start ended.
 #[derive(Debug, Clone, Copy)]
 struct Outcome {
@@ -55,17 +62,34 @@ struct Outcome {
     iterations: usize,
     sweeps: u32,
     residual: Residual,
+    /// The largest miss of a condition.
+    miss: f64,
+}
+
+impl Outcome {
+    /// Nothing finite was found.
+    const BAD: Self = Self {
+        status: SolveStatus::BadInput,
+        iterations: 0,
+        sweeps: 0,
+        residual: Residual::NONE,
+        miss: f64::INFINITY,
+    };
+
+    fn lands(&self) -> bool {
+        self.status == SolveStatus::Converged && self.miss <= LANDING_MISS
+    }
 }
 
 /// Room for a solve, kept from one to the next so that the next does not allocate. It holds nothing that a solve
 /// depends on.
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
-    conditions: Vec<Condition>,
-    current: Iterate,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) current: Iterate,
     trial: Iterate,
     other: Iterate,
-    newton: Newton,
+    pub(super) newton: Newton,
     filter: Filter,
     scratch: Vec<[f64; 6]>,
 }
@@ -92,7 +116,7 @@ impl Workspace {
         self.report(problem, outcome, solution);
     }
 
-    fn resize(&mut self, problem: &Problem) {
+    pub(super) fn resize(&mut self, problem: &Problem) {
         self.conditions.clear();
         problem.append_conditions(&mut self.conditions);
         let (intervals, conditions) = (problem.intervals(), self.conditions.len());
@@ -103,38 +127,37 @@ impl Workspace {
         self.scratch.resize(intervals + 1, [0.0; 6]);
     }
 
-    /// Solves from both bent guesses, at most `cap` iterations each; the better result ends as `current`.
+    /// Solves from bent guesses, at most `cap` iterations each; the best result ends as `current`.
     fn cold(&mut self, problem: &Problem, cap: usize) -> Outcome {
-        let amplitude_rad = problem.solver.guess_amplitude_rad;
-        let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
-            core::mem::swap(&mut self.current, &mut self.other);
+        let mut best: Option<(Outcome, f64)> = None;
+        let (mut iterations, mut sweeps) = (0, 0);
+        for (index, bend) in BENDS.into_iter().enumerate() {
+            if index == NARROW_BENDS && best.is_some_and(|(outcome, _)| outcome.lands()) {
+                break;
+            }
+            let amplitude_rad = bend * problem.solver.guess_amplitude_rad;
             start::cold(problem, &self.conditions, amplitude_rad, COLD_BARRIER, &mut self.current);
-            let outcome = self.descend(problem, COLD_BARRIER, false, cap);
+            let mut outcome = self.descend(problem, COLD_BARRIER, false, cap);
+            iterations += outcome.iterations;
+            sweeps += outcome.sweeps;
             if outcome.status != SolveStatus::Converged {
                 self.current.roll_out(problem);
             }
+            outcome.miss = self.current.worst_violation(&self.conditions);
             let price = self.current.price(problem, &self.conditions);
-            (outcome, if price.is_finite() { price } else { f64::INFINITY })
-        });
-        let mut better = right.0;
-        if left.1 <= right.1 {
-            core::mem::swap(&mut self.current, &mut self.other);
-            better = left.0;
+            if best.is_none_or(|(_, least)| price < least) && price.is_finite() {
+                best = Some((outcome, price));
+                core::mem::swap(&mut self.current, &mut self.other);
+            }
         }
-        better.iterations = left.0.iterations + right.0.iterations;
-        better.sweeps = left.0.sweeps + right.0.sweeps;
-        better
+        core::mem::swap(&mut self.current, &mut self.other);
+        let best = best.map_or(Outcome::BAD, |(outcome, _)| outcome);
+        Outcome { iterations, sweeps, ..best }
     }
 
     /// Newton iterations from `current`, which ends as the last iterate; with `check_first`, without derivatives for
     /// a start that is optimal already.
-    fn descend(
-        &mut self,
-        problem: &Problem,
-        first_barrier: f64,
-        check_first: bool,
-        cap: usize,
-    ) -> Outcome {
+    fn descend(&mut self, problem: &Problem, first_barrier: f64, check_first: bool, cap: usize) -> Outcome {
         let constants = Constants::of(&problem.model, problem.step_s);
         let tolerance = problem.solver.kkt_tolerance;
         let mut barrier = first_barrier;
@@ -143,7 +166,7 @@ impl Workspace {
             self.current.evaluate::<false>(&constants, &problem.thrust_n);
             let residual = self.residual(problem);
             if residual.largest(0.0) <= tolerance {
-                return Outcome { status: SolveStatus::Converged, iterations, sweeps, residual };
+                return Outcome { status: SolveStatus::Converged, residual, ..Outcome::BAD };
             }
         }
         self.current.evaluate::<true>(&constants, &problem.thrust_n);
@@ -194,7 +217,7 @@ impl Workspace {
                 residual = self.residual(problem);
             }
         };
-        Outcome { status, iterations, sweeps, residual }
+        Outcome { status, iterations, sweeps, residual, ..Outcome::BAD }
     }
 
     /// Line search along the step from `current`; whether a point was accepted, which then is `current`.
@@ -238,7 +261,7 @@ impl Workspace {
         if outcome.status != SolveStatus::Converged {
             current.roll_out(problem);
         }
-        let Outcome { status, iterations, sweeps, residual } = outcome;
+        let Outcome { status, iterations, sweeps, residual, .. } = outcome;
         solution.clear();
         solution.iterations = iterations;
         solution.qp_iterations = sweeps;
@@ -251,11 +274,7 @@ impl Workspace {
         solution.cost = cost;
         solution.kkt_stationarity = residual.stationarity;
         solution.kkt_feasibility = residual.defect.max(residual.complementarity(0.0));
-        solution.condition_miss = self
-            .conditions
-            .iter()
-            .map(|row| row.violation(row.value(&current.states)))
-            .fold(0.0, f64::max);
+        solution.condition_miss = current.worst_violation(&self.conditions);
         solution.states.extend(current.states.iter().map(|state| PlanarState::from_array(*state)));
         solution.inputs_rad.extend(&current.inputs_rad);
         solution.costates.extend(&current.costates);

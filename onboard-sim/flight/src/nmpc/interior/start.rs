@@ -57,7 +57,7 @@ pub(super) fn warm(
     let complete = warm.states.len() == count + 1
         && warm.costates.len() == count + 1
         && warm.limit_multipliers.len() == count
-        && warm.states.iter().all(|state| state.is_finite())
+        && warm.states.iter().all(crate::dynamics::PlanarState::is_finite)
         && warm.costates.iter().flatten().all(|value| value.is_finite())
         && warm.limit_multipliers.iter().flatten().all(|value| value.is_finite() && *value > 0.0);
     if complete {

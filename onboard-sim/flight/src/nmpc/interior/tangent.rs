@@ -2,6 +2,7 @@
 //!
 //! The second derivative of `lambda . step` is the sum over the stages of (tangent)^T (second derivative of the slope
 //! weighted by its adjoint) (tangent): the step is a composition in which only `f` is nonlinear.
+#![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
 use super::interval::{
     AHEAD, Block, Constants, D, DIRECTIONS, PAIRS, Q, Stage, TH, TURNED, Thrust, U, W, WEIGHTS, pair,
@@ -150,4 +151,3 @@ pub(super) fn differentiate(
     block.turn = turn_acc_d * h;
     block.curvature = hessian;
 }
-

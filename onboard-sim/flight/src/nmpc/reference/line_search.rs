@@ -3,8 +3,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::condense::Linearised;
-use crate::nmpc::problem::{Condition, Problem};
 use super::qp::QpSolution;
+use crate::nmpc::problem::{Condition, Problem};
 use crate::nmpc::rollout::Trajectory;
 
 /// Fraction of the predicted decrease a step must reach.

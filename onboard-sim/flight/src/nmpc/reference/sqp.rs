@@ -4,10 +4,10 @@ use super::condense::Linearised;
 use super::convexify::convexified;
 use super::line_search::{Iterate, line_search};
 use super::polish::{ActiveSet, Place, Role, polished};
-use crate::nmpc::problem::{Condition, Problem};
 use super::qp::{Qp, QpRow, QpSolution};
-use crate::nmpc::{Solution, SolveStatus, WarmStart};
 use crate::dynamics::PlanarState;
+use crate::nmpc::problem::{Condition, Problem};
+use crate::nmpc::{Solution, SolveStatus, WarmStart};
 
 /// Iterates whose worst merit a new one must beat: a full Newton step along a curved condition raises the penalty
 /// for a moment, and refusing it would cost many short steps.
