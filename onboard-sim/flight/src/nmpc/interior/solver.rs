@@ -38,8 +38,8 @@ const BARRIER_EXPONENT: f64 = 1.8;
 const KEPT_LEAST: f64 = 1e-3;
 const KEPT_MOST: f64 = 1e-2;
 
-/// Shares of the dynamics' curvature that are tried until the inertia is right; without it, the Hessian is that of
-/// Gauss and Newton and always is.
+/// Shares of the dynamics' curvature that are tried until the inertia is right, from the one before the last that was;
+/// without it, the Hessian is that of Gauss and Newton and always is.
 const CURVATURE_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
 
 /// Shortest fraction of a step that is tried, of what the slacks allow.
@@ -161,7 +161,7 @@ impl Workspace {
         let constants = Constants::of(&problem.model, problem.step_s);
         let tolerance = problem.solver.kkt_tolerance;
         let mut barrier = first_barrier;
-        let (mut iterations, mut sweeps, mut raises) = (0, 0, 0);
+        let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
         if check_first {
             self.current.evaluate::<false>(&constants, &problem.thrust_n);
             let residual = self.residual(problem);
@@ -190,13 +190,15 @@ impl Workspace {
                 self.filter.clear();
             }
             self.newton.assemble(problem, &self.conditions, &self.current, barrier);
-            let solved = CURVATURE_SHARES.into_iter().any(|share| {
+            let first = share.saturating_sub(1);
+            let right = (first..CURVATURE_SHARES.len()).find(|tried| {
                 sweeps += 1;
-                self.newton.factorise(problem, &self.current, share)
+                self.newton.factorise(problem, &self.current, CURVATURE_SHARES[*tried])
             });
-            if !solved {
+            let Some(right) = right else {
                 break SolveStatus::SubproblemFailed;
-            }
+            };
+            share = right;
             self.newton.solve(problem, &self.conditions, &self.current, barrier);
 
             let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
