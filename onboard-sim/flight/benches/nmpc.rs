@@ -1,7 +1,8 @@
-//! How long the landing controller takes: the parts, cold and warm solves, and every tick of a whole landing.
+//! How long the landing controller takes: its layers, cold and warm solves, and every tick of a whole landing.
 //!
-//! `cargo bench -p flight`. Besides divan's table, one closed-loop landing is flown many times and the wall time of
-//! each of its ticks printed as median, 99th percentile and worst.
+//! `cargo bench -p flight`. Besides divan's table, the interior-point method is timed against the reference solver on
+//! the landing paper's problem (each case the best of several, ratio of geometric means), and one closed-loop landing
+//! is flown many times and the wall time of each of its ticks printed as median, 99th percentile and worst.
 #![expect(clippy::expect_used, reason = "a bench without its built-in profile cannot run")]
 #![expect(clippy::print_stdout, reason = "the table is the result")]
 
@@ -10,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use flight::controller::{ControllerConfig, ControllerInput, ControllerOutput, ControllerState, step};
 use flight::dynamics::{PlanarModel, PlanarState};
-use flight::nmpc::{Problem, Solution, WarmStart, solve};
+use flight::nmpc::{Problem, Solution, SolveStatus, WarmStart, Workspace, reference, solve, solve_into};
 use flight::phase::Phase;
 use flight::profile::Profile;
 
@@ -25,6 +26,7 @@ fn problem() -> Problem {
 
 fn main() {
     divan::main();
+    against_the_reference();
     tick_times();
 }
 
@@ -46,34 +48,147 @@ fn stage_jacobian_and_hessian(bencher: divan::Bencher) {
     });
 }
 
+/// Dynamics, tangents and curvature of all 50 intervals.
+#[divan::bench]
+fn layer_intervals(bencher: divan::Bencher) {
+    let (problem, mut workspace) = loaded();
+    bencher.bench_local(|| workspace.evaluate_intervals(black_box(&problem)));
+}
+
+/// One Newton step over 50 evaluated intervals.
+#[divan::bench]
+fn layer_sweep(bencher: divan::Bencher) {
+    let (problem, mut workspace) = loaded();
+    workspace.evaluate_intervals(&problem);
+    bencher.bench_local(|| workspace.sweep(black_box(&problem)));
+}
+
+fn loaded() -> (Problem, Workspace) {
+    let (problem, mut workspace) = (problem(), Workspace::default());
+    workspace.load(&problem, &solve(&problem, None).shifted(0));
+    (problem, workspace)
+}
+
+/// Both guesses, into a used workspace.
 #[divan::bench]
 fn cold_solve(bencher: divan::Bencher) {
     let problem = problem();
-    bencher.bench(|| solve(black_box(&problem), None));
+    let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+    bencher.bench_local(|| solve_into(black_box(&problem), None, &mut workspace, &mut solution));
+}
+
+#[divan::bench(sample_count = 5)]
+fn cold_solve_reference(bencher: divan::Bencher) {
+    let problem = problem();
+    bencher.bench(|| reference::solve(black_box(&problem), None));
 }
 
 /// The plan is already optimal: one look at the optimality conditions.
 #[divan::bench]
 fn warm_solve_undisturbed(bencher: divan::Bencher) {
-    let (problem, warm) = after_one_sample(|_| ());
-    bencher.bench(|| solve(black_box(&problem), Some(black_box(&warm))));
+    let (problem, warm) = after(&problem(), 1, |_| ());
+    let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+    bencher.bench_local(|| solve_into(black_box(&problem), Some(&warm), &mut workspace, &mut solution));
 }
 
-/// The state was kicked by 2 cm/s and 0.5 deg/s.
 #[divan::bench]
 fn warm_solve_kicked(bencher: divan::Bencher) {
-    let (problem, warm) = after_one_sample(|state| {
-        state.w_m_s += 0.02;
-        state.q_rad_s += 0.5_f64.to_radians();
-    });
-    bencher.bench(|| solve(black_box(&problem), Some(black_box(&warm))));
+    let (problem, warm) = after(&problem(), 1, |state| kick(state, [1.0; 3]));
+    let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+    bencher.bench_local(|| solve_into(black_box(&problem), Some(&warm), &mut workspace, &mut solution));
 }
 
-fn after_one_sample(disturb: impl FnOnce(&mut PlanarState)) -> (Problem, WarmStart) {
-    let first: Solution = solve(&problem(), None);
-    let mut state = *first.states.get(1).expect("a solved path");
-    disturb(&mut state);
-    (Problem::from_profile(&profile(), state, 0.1, 49, 1.0), first.shifted(1))
+#[divan::bench(sample_count = 20)]
+fn warm_solve_kicked_reference(bencher: divan::Bencher) {
+    let (problem, warm) = after(&problem(), 1, |state| kick(state, [1.0; 3]));
+    bencher.bench(|| reference::solve(black_box(&problem), Some(black_box(&warm))));
+}
+
+/// The rest of a problem after some samples of its solution, with the state there changed.
+fn after(problem: &Problem, samples: usize, disturb: impl FnOnce(&mut PlanarState)) -> (Problem, WarmStart) {
+    let first: Solution = solve(problem, None);
+    let mut rest = problem.clone();
+    rest.initial = *first.states.get(samples).expect("a solved path");
+    disturb(&mut rest.initial);
+    rest.thrust_n.drain(..samples);
+    (rest, first.shifted(samples))
+}
+
+/// 2 cm/s and 0.5 deg/s, in directions given by their signs.
+fn kick(state: &mut PlanarState, [u, w, q]: [f64; 3]) {
+    state.u_m_s += 0.02 * u;
+    state.w_m_s += 0.02 * w;
+    state.q_rad_s += 0.5_f64.to_radians() * q;
+}
+
+/// Interior-point method against reference, interleaved, on the landing paper's own problem: the seven starts cold,
+/// kicked in four directions at eight instants, and undisturbed.
+fn against_the_reference() {
+    let mut profile = profile();
+    profile.nmpc.limits.final_box = None;
+    let nominal = profile.start.planar_state();
+    let pitched = |deg: f64| PlanarState { theta_rad: deg.to_radians(), ..nominal };
+    let sideways = |w_m_s| PlanarState { w_m_s, ..nominal };
+    let turning = |deg_s: f64| PlanarState { q_rad_s: deg_s.to_radians(), ..nominal };
+    let starts =
+        [nominal, pitched(60.0), pitched(120.0), sideways(-1.0), sideways(1.0), turning(-5.0), turning(5.0)];
+    let (mut cold, mut kicked, mut undisturbed) = (Vec::new(), Vec::new(), Vec::new());
+    for start in starts {
+        let problem = Problem::from_profile(&profile, start, 0.0, 50, 1.0);
+        cold.push((problem.clone(), None));
+        for samples in (1..49).step_by(6) {
+            for signs in [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]] {
+                let (rest, warm) = after(&problem, samples, |state| kick(state, signs));
+                if solve(&rest, Some(&warm)).status == SolveStatus::Converged {
+                    kicked.push((rest, Some(warm)));
+                }
+            }
+            let (rest, warm) = after(&problem, samples, |_| ());
+            undisturbed.push((rest, Some(warm)));
+        }
+    }
+    println!(
+        "\nsolves, us            {:>44} {:>30}",
+        "interior: geomean  median    p99     max", "reference: geomean   ratio"
+    );
+    for (name, cases, repeats) in [("cold", cold, 1), ("kicked", kicked, 1), ("undisturbed", undisturbed, 3)]
+    {
+        let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+        let (mut fast, mut slow, mut factorised) = (Vec::new(), Vec::new(), 0);
+        for (problem, warm) in &cases {
+            let of_several = |times: Vec<Duration>| times.into_iter().min().map_or(f64::NAN, micros);
+            let mut solve_fast =
+                || solve_into(black_box(problem), warm.as_ref(), &mut workspace, &mut solution);
+            fast.push(of_several((0..50).map(|_| time_of(&mut solve_fast).1).collect()));
+            slow.push(of_several(
+                (0..repeats)
+                    .map(|_| time_of(|| reference::solve(black_box(problem), warm.as_ref())).1)
+                    .collect(),
+            ));
+            factorised += solution.qp_iterations;
+        }
+        let geomean = |times: &[f64]| {
+            libm::exp(times.iter().map(|time| libm::log(*time)).sum::<f64>() / times.len() as f64)
+        };
+        let (ours, theirs) = (geomean(&fast), geomean(&slow));
+        fast.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            fast.get((share * (fast.len() - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN)
+        };
+        println!(
+            "{name:<12} {:>4} cases, {:>5.1} factorisations {ours:>8.1} {:>8.1} {:>8.1} {:>8.1} {theirs:>22.1} {:>8.1}",
+            cases.len(),
+            f64::from(factorised) / cases.len() as f64,
+            at(0.5),
+            at(0.99),
+            at(1.0),
+            theirs / ours,
+        );
+    }
+}
+
+fn micros(time: Duration) -> f64 {
+    1e6 * time.as_secs_f64()
 }
 
 /// Flies landings from slightly different starts and prints the times of their ticks.
@@ -142,9 +257,13 @@ fn fly(
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "a bench reads the clock; the crate under test does not")]
 fn timed(controller: &mut ControllerState, input: &ControllerInput) -> (ControllerOutput, Duration) {
+    time_of(|| step(controller, black_box(input)))
+}
+
+#[expect(clippy::disallowed_methods, reason = "a bench reads the clock; the crate under test does not")]
+fn time_of<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let before = Instant::now();
-    let output = step(controller, black_box(input));
-    (output, before.elapsed())
+    let result = work();
+    (result, before.elapsed())
 }

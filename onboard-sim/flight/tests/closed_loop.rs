@@ -124,9 +124,14 @@ fn fly(scenario: &Scenario) -> Flight {
             let before = state;
             state = model.rk4_step(&before, applied_rad, thrust_n, PLANT_STEP_S);
             if state.z_m <= 0.0 {
-                // At the instant of contact: its share of the step, by the heights on either side.
-                let share = before.z_m / (before.z_m - state.z_m);
-                let mut contact = model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
+                // At the instant of contact: its share of the step by the heights on either side, and once more
+                // between there and the end, because the path is curved.
+                let within =
+                    |share: f64| model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
+                let near = before.z_m / (before.z_m - state.z_m);
+                let left = within(near).z_m;
+                let share = near + (1.0 - near) * left / (left - state.z_m);
+                let mut contact = within(share);
                 assert!(contact.z_m.abs() < 1e-6, "{contact:?}");
                 contact.z_m = 0.0;
                 return Flight { contact_s: plant_s + share * PLANT_STEP_S, contact, outputs, digests };

@@ -16,7 +16,7 @@ pub use plan::Plan;
 pub use step::step;
 
 use crate::dynamics::{PlanarModel, PlanarState};
-use crate::nmpc::{Solution, SolveStatus};
+use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart, Workspace};
 use crate::phase::Phase;
 use crate::profile::Profile;
 use crate::stabiliser::Stabiliser;
@@ -59,12 +59,36 @@ pub struct ControllerState {
     config: ControllerConfig,
     /// The plan being flown or rehearsed, if any.
     flown: Option<FlownPlan>,
+    room: Room,
+}
+
+/// Room for a tick's work, so that a tick does not allocate. Nothing of it is remembered: all rooms are equal.
+#[derive(Debug, Clone)]
+struct Room {
+    workspace: Workspace,
+    problem: Problem,
+    warm: WarmStart,
+    solution: Solution,
+}
+
+impl PartialEq for Room {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl ControllerState {
     /// The state before the first tick.
     pub fn new(config: &ControllerConfig) -> Self {
-        Self { config: config.clone(), flown: None }
+        let problem =
+            Problem::from_profile(&config.profile, config.profile.start.planar_state(), 0.0, 0, 1.0);
+        let room = Room {
+            workspace: Workspace::default(),
+            problem,
+            warm: WarmStart::default(),
+            solution: Solution::default(),
+        };
+        Self { config: config.clone(), flown: None, room }
     }
 
     /// The configuration.
@@ -79,7 +103,8 @@ impl ControllerState {
         };
         let solution = &flown.solution;
         let states = solution.states.iter().flat_map(|state| state.to_array());
-        let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers);
+        let costates = solution.costates.iter().flatten().chain(solution.limit_multipliers.iter().flatten());
+        let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers).chain(costates);
         let numbers = solution.inputs_rad.iter().chain(multipliers).copied().chain(states);
         let words =
             [flown.first_interval as u64, u64::from(flown.usable), u64::from(solution.status.index())];
@@ -97,7 +122,7 @@ fn fnv(hash: u64, word: u64) -> u64 {
 }
 
 /// A plan and where in the landing it begins.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 struct FlownPlan {
     /// Samples between ignition and the plan's beginning.
     first_interval: usize,

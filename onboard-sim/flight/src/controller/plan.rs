@@ -50,6 +50,28 @@ impl Plan {
         plan
     }
 
+    /// A plan of no intervals yet, from a first state.
+    pub(super) fn starting(state: PlanarState, starts_in_s: f64, step_s: f64) -> Self {
+        let mut plan = Self::none();
+        plan.starts_in_s = starts_in_s;
+        plan.step_s = step_s;
+        if let Some(place) = plan.states.first_mut() {
+            *place = state;
+        }
+        plan
+    }
+
+    /// Adds an interval and the state after it, if there is room.
+    pub(super) fn push(&mut self, gimbal_rad: f64, state: PlanarState) {
+        if let (Some(input), Some(place)) =
+            (self.gimbal_rad.get_mut(self.len), self.states.get_mut(self.len + 1))
+        {
+            *input = gimbal_rad;
+            *place = state;
+            self.len += 1;
+        }
+    }
+
     /// The states in use; empty without a plan.
     pub fn used_states(&self) -> &[PlanarState] {
         if self.len == 0 { &[] } else { self.states.get(..=self.len).unwrap_or_default() }

@@ -2,10 +2,10 @@
 
 use super::{
     ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, FlownPlan,
-    MAX_HORIZON_STEPS, Plan, PredictedTouchdown, SolverReport,
+    MAX_HORIZON_STEPS, Plan, PredictedTouchdown, Room, SolverReport,
 };
 use crate::dynamics::PlanarState;
-use crate::nmpc::{Problem, Solution, SolveStatus, WarmStart, solve};
+use crate::nmpc::{Solution, SolveStatus, solve_into};
 use crate::phase::Phase;
 
 /// Largest miss of an end or path condition that still counts as a plan that lands, m, rad, m/s or rad/s.
@@ -78,16 +78,15 @@ fn fin_rad(config: &ControllerConfig, phase: Phase) -> f64 {
 
 /// Solves the landing from the profile's start state as if released now; the gimbal stays centred.
 fn rehearse(state: &mut ControllerState) -> Decision {
-    let config = &state.config;
+    let ControllerState { config, flown, room } = state;
     let start = config.profile.start.planar_state();
     let moment = Moment::of(config, 0.0);
     let thrust_n = config.profile.motor.mean_thrust_n(0.0, moment.sample_time_s);
     let predicted = config.model.rk4_step(&start, 0.0, thrust_n, moment.sample_time_s);
-    let problem = moment.problem(config, predicted, 1.0);
-    let warm = moment.warm_start(state.flown.as_ref());
-    let solution = solve(&problem, warm.as_ref());
-    let decision = planned(config, &moment, &solution);
-    state.flown = keep(&moment, solution);
+    moment.pose(config, predicted, 1.0, room);
+    moment.solve(flown.as_ref(), room);
+    let decision = planned(config, &moment, &room.solution);
+    keep(&moment, flown, &mut room.solution);
     Decision { gimbal_rad: 0.0, level: ControlLevel::Rehearsal, ..decision }
 }
 
@@ -104,21 +103,22 @@ fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
     if moment.intervals == 0 {
         return after_the_plan(state, input, &moment, predicted);
     }
-    let mut problem = moment.problem(&state.config, predicted, input.thrust_scale);
+    let ControllerState { config, flown, room } = state;
+    moment.pose(config, predicted, input.thrust_scale, room);
     if input.deadline_missed {
-        problem.solver.max_iterations = problem.solver.max_iterations_after_miss;
+        room.problem.solver.max_iterations = room.problem.solver.max_iterations_after_miss;
     }
-    let warm = moment.warm_start(state.flown.as_ref());
-    let solution = solve(&problem, warm.as_ref());
-    if is_usable(&solution) {
-        let decision = planned(&state.config, &moment, &solution);
-        state.flown = keep(&moment, solution);
+    moment.solve(flown.as_ref(), room);
+    if is_usable(&room.solution) {
+        let decision = planned(config, &moment, &room.solution);
+        keep(&moment, flown, &mut room.solution);
         return decision;
     }
-    let decision = fall_back(state, input, &moment, report_of(&solution));
+    let report = report_of(&room.solution);
+    let decision = fall_back(state, input, &moment, report);
     // What was found may still be where the next solve should start from, unless the previous plan is better.
-    if decision.level != ControlLevel::ShiftedPlan && !solution.inputs_rad.is_empty() {
-        state.flown = keep(&moment, solution);
+    if decision.level != ControlLevel::ShiftedPlan && !state.room.solution.inputs_rad.is_empty() {
+        keep(&moment, &mut state.flown, &mut state.room.solution);
     }
     decision
 }
@@ -163,16 +163,21 @@ impl Moment {
         }
     }
 
-    fn problem(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64) -> Problem {
-        Problem::from_profile(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale)
+    /// Writes the landing from the predicted state into the room.
+    fn pose(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64, room: &mut Room) {
+        room.problem.pose(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale);
     }
 
-    /// The flown plan shifted to this moment, if it reaches this far.
-    fn warm_start(&self, flown: Option<&FlownPlan>) -> Option<WarmStart> {
-        let flown = flown?;
-        let elapsed = self.first_interval.checked_sub(flown.first_interval)?;
-        let warm = flown.solution.shifted(elapsed);
-        (warm.inputs_rad.len() == self.intervals).then_some(warm)
+    /// Solves the problem in the room, from the flown plan shifted to this moment if it reaches this far.
+    fn solve(&self, flown: Option<&FlownPlan>, room: &mut Room) {
+        let Room { workspace, problem, warm, solution } = room;
+        let elapsed =
+            flown.and_then(|flown| Some((flown, self.first_interval.checked_sub(flown.first_interval)?)));
+        if let Some((flown, elapsed)) = elapsed {
+            flown.solution.shift_into(elapsed, warm);
+        }
+        let warm = (elapsed.is_some() && warm.inputs_rad.len() == self.intervals).then_some(&*warm);
+        solve_into(problem, warm, workspace, solution);
     }
 
     /// The flown plan's input for this moment, and the states from there on.
@@ -227,10 +232,16 @@ fn report_of(solution: &Solution) -> SolverReport {
     }
 }
 
-fn keep(moment: &Moment, solution: Solution) -> Option<FlownPlan> {
-    let usable = is_usable(&solution);
-    let first_interval = moment.first_interval;
-    (!solution.inputs_rad.is_empty()).then_some(FlownPlan { first_interval, usable, solution })
+/// Keeps a solution as the flown plan; what was kept before is left in its place.
+fn keep(moment: &Moment, flown: &mut Option<FlownPlan>, solution: &mut Solution) {
+    if solution.inputs_rad.is_empty() {
+        *flown = None;
+        return;
+    }
+    let flown = flown.get_or_insert_default();
+    flown.usable = is_usable(solution);
+    flown.first_interval = moment.first_interval;
+    core::mem::swap(&mut flown.solution, solution);
 }
 
 fn is_usable(solution: &Solution) -> bool {
@@ -287,31 +298,33 @@ fn stabilise(
     let config = &state.config;
     let limit_rad = config.profile.gimbal.limit_rad();
     let sample_time_s = moment.sample_time_s;
-    let mut states = vec![predicted];
-    let mut inputs_rad = Vec::with_capacity(moment.intervals);
+    let mut plan = Plan::starting(predicted, sample_time_s, sample_time_s);
+    let mut command_rad = 0.0;
     let mut ahead = predicted;
     for k in 0..moment.intervals.max(1) {
         let nominal_n =
             config.profile.motor.mean_thrust_n(moment.starts_s + k as f64 * sample_time_s, sample_time_s);
         let thrust_n = input.thrust_scale * nominal_n;
         let gimbal_rad = config.stabiliser.gimbal(&ahead, thrust_n, limit_rad);
-        inputs_rad.push(gimbal_rad);
+        if k == 0 {
+            command_rad = gimbal_rad;
+        }
         ahead = config.model.rk4_step(&ahead, gimbal_rad, thrust_n, sample_time_s);
         if !ahead.is_finite() {
             break;
         }
-        states.push(ahead);
+        plan.push(gimbal_rad, ahead);
         if ahead.z_m <= 0.0 {
             break;
         }
     }
     Decision {
-        gimbal_rad: inputs_rad.first().copied().unwrap_or(0.0),
+        gimbal_rad: command_rad,
         touchdown: PredictedTouchdown {
-            time_from_now_s: states.len() as f64 * sample_time_s,
-            state: states.last().copied().unwrap_or_default(),
+            time_from_now_s: (1 + plan.len) as f64 * sample_time_s,
+            state: plan.used_states().last().copied().unwrap_or(predicted),
         },
-        plan: Plan::through(&states, &inputs_rad, sample_time_s, sample_time_s),
+        plan,
         ..upright
     }
 }

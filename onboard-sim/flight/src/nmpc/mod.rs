@@ -1,38 +1,26 @@
 //! The landing optimal-control problem and its solver.
 //!
 //! [`solve`] takes a [`Problem`] and perhaps a [`WarmStart`] and returns a [`Solution`], always: how it went is
-//! [`SolveStatus`], data like the rest.
+//! [`SolveStatus`], data like the rest. [`solve_into`] is the same without allocation.
 //!
-//! The method is sequential quadratic programming with exact second derivatives. The states are not variables:
-//! they are rolled out from the inputs, so every iterate is a flyable path and the best one so far can be flown at
-//! any time. One iteration:
-//!
-//! 1. `rollout`: states and cost of the inputs, RK4, one step an interval.
-//! 2. `sensitivity`: tangents of every interval, and adjoint-weighted second derivatives over its RK4 stages.
-//! 3. `condense`: both condensed onto the inputs: gradient, Hessian, one row an end or path condition.
-//! 4. `convexify`: the Hessian made positive definite without changing the Newton step, where that is possible.
-//! 5. `polish`: the quadratic subproblem, conditions elastic, solved exactly from the last active set; where that
-//!    set is too far off, `qp` finds it with Clarabel.
-//! 6. `line_search` on cost plus exact penalty, with a second-order correction.
-//!
-//! `sqp` is the loop around them, with the optimality residual.
+//! * `problem`: the problem and its conditions, as data.
+//! * `bound`: what cannot be landed, and why.
+//! * `interior`: the solver, a stage-structured interior-point method with exact Hessians; its page has the
+//!   formulation, the steps and the references.
+//! * [`reference`]: a condensed sequential quadratic programme on Clarabel, for tests and comparisons.
+//! * `rollout`: states and cost of given inputs.
 //!
 //! Gauss-Newton Hessians are not an option: the multiplier of the end height is large and the curvature of the
 //! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
 
 mod bound;
-mod condense;
-mod convexify;
-mod guess;
-mod line_search;
-mod polish;
+mod interior;
 mod problem;
-mod qp;
+pub mod reference;
 mod rollout;
-mod sensitivity;
-mod sqp;
 
 pub use bound::best_touchdown_speed_m_s;
+pub use interior::Workspace;
 pub use problem::Problem;
 pub use rollout::Trajectory;
 
@@ -78,9 +66,15 @@ impl SolveStatus {
     }
 }
 
-/// Where to start from: the inputs and multipliers of an earlier solution, shifted to the present.
+/// Where to start from: an earlier solution, shifted to the present. Inputs alone will do; they are then rolled out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WarmStart {
+    /// The states, one more than inputs; empty if unknown.
+    pub states: Vec<PlanarState>,
+    /// Multiplier of the dynamics into each node, one more than inputs, the first unused; empty if unknown.
+    pub costates: Vec<[f64; 6]>,
+    /// Multipliers of each input's lower and upper limit; empty if unknown.
+    pub limit_multipliers: Vec<[f64; 2]>,
     /// Gimbal angle of each interval, rad.
     pub inputs_rad: Vec<f64>,
     /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
@@ -96,13 +90,13 @@ pub struct Solution {
     pub status: SolveStatus,
     /// Newton iterations, over all starting points tried.
     pub iterations: usize,
-    /// Iterations of the quadratic subproblems, in all.
+    /// Linear systems factorised, over all iterations; of the reference solver, iterations of its subproblems.
     pub qp_iterations: u32,
     /// Running cost (Eq. 28 of the landing paper), without penalties.
     pub cost: f64,
-    /// Largest component of the Lagrangian's gradient by the inputs that no input limit explains.
+    /// Largest component of the Lagrangian's gradient by states and inputs.
     pub kkt_stationarity: f64,
-    /// Largest condition residual that no multiplier at its price explains, m, rad, m/s or rad/s.
+    /// Largest defect of the dynamics (m, rad, m/s or rad/s) or product of a slack and its multiplier (cost).
     pub kkt_feasibility: f64,
     /// How far the path misses its conditions, at worst, m, rad, m/s or rad/s.
     pub condition_miss: f64,
@@ -110,6 +104,10 @@ pub struct Solution {
     pub best_touchdown_speed_m_s: f64,
     /// The states, one more than inputs.
     pub states: Vec<PlanarState>,
+    /// Multiplier of the dynamics into each node, one more than inputs; the first is not used.
+    pub costates: Vec<[f64; 6]>,
+    /// Multipliers of each input's lower and upper limit.
+    pub limit_multipliers: Vec<[f64; 2]>,
     /// Gimbal angle of each interval, rad.
     pub inputs_rad: Vec<f64>,
     /// Multiplier of each condition at the end, in the order of [`Problem::conditions`].
@@ -126,12 +124,45 @@ impl Solution {
 
     /// This solution as a start for the same problem `steps` intervals later.
     pub fn shifted(&self, steps: usize) -> WarmStart {
-        let later = |values: &[f64]| values.get(steps..).unwrap_or_default().to_vec();
-        WarmStart {
-            inputs_rad: later(&self.inputs_rad),
-            end_multipliers: self.end_multipliers.clone(),
-            floor_multipliers: later(&self.floor_multipliers),
+        let mut warm = WarmStart::default();
+        self.shift_into(steps, &mut warm);
+        warm
+    }
+
+    /// [`shifted`](Self::shifted) without allocating, if the warm start has been as long before.
+    pub fn shift_into(&self, steps: usize, warm: &mut WarmStart) {
+        fn refill<T: Copy>(values: &mut Vec<T>, from: &[T], steps: usize) {
+            values.clear();
+            values.extend_from_slice(from.get(steps..).unwrap_or_default());
         }
+        refill(&mut warm.states, &self.states, steps);
+        refill(&mut warm.costates, &self.costates, steps);
+        refill(&mut warm.limit_multipliers, &self.limit_multipliers, steps);
+        refill(&mut warm.inputs_rad, &self.inputs_rad, steps);
+        refill(&mut warm.end_multipliers, &self.end_multipliers, 0);
+        refill(&mut warm.floor_multipliers, &self.floor_multipliers, steps);
+    }
+
+    /// Back to nothing solved, keeping the room.
+    fn clear(&mut self) {
+        let Self {
+            states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers, ..
+        } = core::mem::take(self);
+        *self = Self {
+            states,
+            costates,
+            limit_multipliers,
+            inputs_rad,
+            end_multipliers,
+            floor_multipliers,
+            ..Self::default()
+        };
+        self.states.clear();
+        self.costates.clear();
+        self.limit_multipliers.clear();
+        self.inputs_rad.clear();
+        self.end_multipliers.clear();
+        self.floor_multipliers.clear();
     }
 }
 
@@ -140,40 +171,34 @@ impl Solution {
 /// With a warm start whose length fits, from there; otherwise from two bent guesses, keeping the better result:
 /// the problem has mirrored and multi-swing local minima, and the straight path between them is a saddle.
 pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
-    if !problem.is_finite() {
-        return Solution { status: SolveStatus::BadInput, ..Solution::default() };
-    }
-    let best_touchdown_speed_m_s = best_touchdown_speed_m_s(problem);
-    if best_touchdown_speed_m_s > problem.touchdown_speed_max_m_s {
-        return Solution {
-            status: SolveStatus::NotLandable,
-            best_touchdown_speed_m_s,
-            ..Solution::default()
-        };
-    }
-    let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
-    let mut solution = match fitting {
-        Some(start) => sqp::solve_from(problem, start),
-        None => cold(problem),
-    };
-    solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
+    let mut solution = Solution::default();
+    solve_into(problem, warm, &mut Workspace::default(), &mut solution);
     solution
 }
 
-fn cold(problem: &Problem) -> Solution {
-    let amplitude_rad = problem.solver.guess_amplitude_rad;
-    let [left, right] = [amplitude_rad, -amplitude_rad].map(|amplitude_rad| {
-        let inputs_rad = guess::bent(problem, amplitude_rad);
-        sqp::solve_from(problem, &WarmStart { inputs_rad, ..WarmStart::default() })
-    });
-    let iterations = left.iterations + right.iterations;
-    let qp_iterations = left.qp_iterations + right.qp_iterations;
-    let price = |solution: &Solution| {
-        let priced = solution.cost + problem.solver.terminal_penalty * solution.condition_miss;
-        if priced.is_finite() { priced } else { f64::INFINITY }
-    };
-    let better = if price(&right) < price(&left) { right } else { left };
-    Solution { iterations, qp_iterations, ..better }
+/// [`solve`] without allocating, if workspace and solution have been used for as long a problem before.
+pub fn solve_into(
+    problem: &Problem,
+    warm: Option<&WarmStart>,
+    workspace: &mut Workspace,
+    solution: &mut Solution,
+) {
+    solution.clear();
+    if !problem.is_finite() {
+        solution.status = SolveStatus::BadInput;
+        return;
+    }
+    let best_touchdown_speed_m_s = best_touchdown_speed_m_s(problem);
+    if best_touchdown_speed_m_s > problem.touchdown_speed_max_m_s {
+        solution.status = SolveStatus::NotLandable;
+    } else if problem.intervals() == 0 {
+        solution.status = SolveStatus::Converged;
+        solution.states.push(problem.initial);
+    } else {
+        let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
+        workspace.solve(problem, fitting, solution);
+    }
+    solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
 }
 
 #[cfg(test)]

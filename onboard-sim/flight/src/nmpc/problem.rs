@@ -86,15 +86,11 @@ impl Problem {
         thrust_scale: f64,
     ) -> Self {
         let nmpc = &profile.nmpc;
-        let step_s = nmpc.sample_time_s;
-        let thrust_n = (0..intervals)
-            .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s))
-            .collect();
-        Self {
+        let mut problem = Self {
             model: PlanarModel::from_profile(profile),
             initial,
-            step_s,
-            thrust_n,
+            step_s: nmpc.sample_time_s,
+            thrust_n: Vec::new(),
             state_weights: nmpc.weights.state_diagonal(),
             input_weight: nmpc.weights.delta,
             gimbal_limit_rad: nmpc.limits.gimbal_rad(),
@@ -103,7 +99,29 @@ impl Problem {
             altitude_min_m: nmpc.limits.altitude_min_m,
             touchdown_speed_max_m_s: profile.touchdown_limits.u_m_s,
             solver: nmpc.solver,
-        }
+        };
+        problem.pose(profile, initial, starts_s, intervals, thrust_scale);
+        problem
+    }
+
+    /// [`from_profile`](Self::from_profile) in place, for a problem of the same profile; allocates only if it never
+    /// had as many intervals.
+    pub fn pose(
+        &mut self,
+        profile: &Profile,
+        initial: PlanarState,
+        starts_s: f64,
+        intervals: usize,
+        thrust_scale: f64,
+    ) {
+        let step_s = self.step_s;
+        self.initial = initial;
+        self.solver = profile.nmpc.solver;
+        self.thrust_n.clear();
+        self.thrust_n.extend(
+            (0..intervals)
+                .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s)),
+        );
     }
 
     /// Number of intervals.
@@ -114,7 +132,14 @@ impl Problem {
     /// The conditions, in the order of their multipliers: those at the end, height first, then the floor at each
     /// node before it.
     pub fn conditions(&self) -> Vec<Condition> {
-        let mut conditions = self.end_conditions();
+        let mut conditions = Vec::new();
+        self.append_conditions(&mut conditions);
+        conditions
+    }
+
+    /// Appends the conditions; allocates only if the vector never held as many.
+    pub(super) fn append_conditions(&self, conditions: &mut Vec<Condition>) {
+        self.append_end_conditions(conditions);
         if let Some(offset) = self.altitude_min_m {
             conditions.extend((1..self.intervals()).map(|node| Condition {
                 node,
@@ -124,14 +149,21 @@ impl Problem {
                 equality: false,
             }));
         }
-        conditions
     }
 
-    /// The conditions at the end of the horizon; none without intervals.
-    pub(super) fn end_conditions(&self) -> Vec<Condition> {
+    /// Number of conditions at the end of the horizon.
+    pub(super) fn end_conditions_len(&self) -> usize {
+        if self.intervals() == 0 {
+            return 0;
+        }
+        3 + self.final_box.map_or(0, |limits| 2 + 6 * limits.settled_nodes.min(self.intervals()))
+    }
+
+    /// Appends the conditions at the end of the horizon; none without intervals.
+    fn append_end_conditions(&self, conditions: &mut Vec<Condition>) {
         let end = self.intervals();
         if end == 0 {
-            return Vec::new();
+            return;
         }
         let at_least = |node, component, lowest| Condition {
             node,
@@ -150,7 +182,7 @@ impl Problem {
         let between = |node, component, lowest, highest| {
             [at_least(node, component, lowest), at_most(node, component, highest)]
         };
-        let mut conditions = vec![Condition { equality: true, ..at_least(end, Z, 0.0) }];
+        conditions.push(Condition { equality: true, ..at_least(end, Z, 0.0) });
         conditions.extend(between(end, X, -self.x_final_m, self.x_final_m));
         if let Some(limits) = self.final_box {
             let tilt = limits.pitch_error_deg.to_radians();
@@ -163,7 +195,6 @@ impl Problem {
                 conditions.extend(between(node, Q, -rate, rate));
             }
         }
-        conditions
     }
 
     /// Deviation of a state from the target: upright, at rest, at the origin.

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{Condition, Problem};
-use super::rollout::Trajectory;
 use super::sensitivity::Interval;
 use crate::dynamics::INPUT_INDEX;
+use crate::nmpc::problem::{Condition, Problem};
+use crate::nmpc::rollout::Trajectory;
 
 /// A path linearised about its inputs.
 pub(super) struct Linearised {

@@ -4,10 +4,10 @@ use super::condense::Linearised;
 use super::convexify::convexified;
 use super::line_search::{Iterate, line_search};
 use super::polish::{ActiveSet, Place, Role, polished};
-use super::problem::{Condition, Problem};
 use super::qp::{Qp, QpRow, QpSolution};
-use super::{Solution, SolveStatus, WarmStart};
 use crate::dynamics::PlanarState;
+use crate::nmpc::problem::{Condition, Problem};
+use crate::nmpc::{Solution, SolveStatus, WarmStart};
 
 /// Iterates whose worst merit a new one must beat: a full Newton step along a curved condition raises the penalty
 /// for a moment, and refusing it would cost many short steps.
@@ -26,7 +26,7 @@ struct Residual {
 /// Solves from given inputs and multipliers; missing multipliers count as zero.
 pub(super) fn solve_from(problem: &Problem, warm: &WarmStart) -> Solution {
     let conditions = problem.conditions();
-    let ends = problem.end_conditions().len();
+    let ends = problem.end_conditions_len();
     let limit = problem.gimbal_limit_rad;
     let start = warm
         .inputs_rad

@@ -5,9 +5,9 @@
 //! `f` is nonlinear, so the second derivative of `adjoint . step` is the sum over the stages of (tangent of the
 //! stage)^T (second derivative of the adjoint-weighted `f`) (tangent of the stage).
 
-use super::Problem;
-use super::rollout::{STAGE_STEPS, STAGE_WEIGHTS, stages};
 use crate::dynamics::{INPUT_INDEX, StageHessian, StageJacobian};
+use crate::nmpc::Problem;
+use crate::nmpc::rollout::{STAGE_STEPS, STAGE_WEIGHTS, stages};
 
 /// The linearised interval.
 #[derive(Debug, Clone)]

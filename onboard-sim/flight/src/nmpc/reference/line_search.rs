@@ -3,9 +3,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::condense::Linearised;
-use super::problem::{Condition, Problem};
 use super::qp::QpSolution;
-use super::rollout::Trajectory;
+use crate::nmpc::problem::{Condition, Problem};
+use crate::nmpc::rollout::Trajectory;
 
 /// Fraction of the predicted decrease a step must reach.
 const SUFFICIENT_DECREASE: f64 = 1e-4;

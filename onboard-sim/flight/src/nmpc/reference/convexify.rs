@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use super::condense::Linearised;
-use super::problem::Condition;
+use crate::nmpc::problem::Condition;
 
 /// Curvature added across the conditions that hold, relative to the largest of the inputs.
 const STIFFNESSES: [f64; 2] = [1.0, 10.0];

@@ -2,7 +2,7 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use super::Problem;
+use crate::nmpc::Problem;
 use crate::stabiliser::Stabiliser;
 
 /// Inputs whose path follows the pitch `pi/2 + amplitude sin(m pi t / T)`: tilting one way and then the other,

@@ -1,0 +1,125 @@
+use proptest::prelude::*;
+
+use super::interval::{Block, Constants, DIRECTIONS, Points, evaluate, pair};
+use super::lanes::{LANES, Lanes};
+use super::*;
+use crate::dynamics::{ModelKind, PlanarModel, PlanarState};
+use crate::nmpc::{Problem, solve};
+use crate::profile::Profile;
+
+const STEP_S: f64 = 0.1;
+const THRUST_N: f64 = 33.3;
+const KINDS: [ModelKind; 2] = [ModelKind::Consistent, ModelKind::AsPrinted];
+
+/// State, gimbal angle and costate.
+type Point = ([f64; 6], f64, [f64; 6]);
+
+fn model(kind: ModelKind) -> PlanarModel {
+    let profile = Profile::builtin("paper-calibrated").unwrap();
+    PlanarModel { kind, ..PlanarModel::from_profile(&profile) }
+}
+
+/// The interval in every lane, the last lane's result.
+fn block(kind: ModelKind, (state, gimbal, costate): &Point) -> Block {
+    let points = Points {
+        state: state.map(Lanes::splat),
+        gimbal: Lanes::splat(*gimbal),
+        thrust: Lanes::splat(THRUST_N),
+        costate: costate.map(Lanes::splat),
+    };
+    let mut block = Block::EMPTY;
+    evaluate::<true>(&Constants::of(&model(kind), STEP_S), &points, &mut block);
+    block
+}
+
+/// A direction of differentiation's place among the states, or the gimbal angle.
+fn moved((state, gimbal, costate): &Point, direction: usize, by: f64) -> Point {
+    let (mut state, mut gimbal) = (*state, *gimbal);
+    match state.get_mut(direction + 2) {
+        Some(component) => *component += by,
+        None => gimbal += by,
+    }
+    (state, gimbal, *costate)
+}
+
+/// The model's own step, with its own sine and cosine.
+fn step(kind: ModelKind, (state, gimbal, _): &Point) -> [f64; 6] {
+    model(kind).rk4_step(&PlanarState::from_array(*state), *gimbal, THRUST_N, STEP_S).to_array()
+}
+
+fn point() -> impl Strategy<Value = Point> {
+    let state = (-20.0..20.0, 0.0..20.0, 0.5..2.6, -6.0..-1.0, -3.0..3.0, -1.0..1.0, -0.34..0.34);
+    (state, prop::array::uniform6(-50.0..50.0_f64))
+        .prop_map(|((x, z, theta, u, w, q, gimbal), costate)| ([x, z, theta, u, w, q], gimbal, costate))
+}
+
+proptest! {
+    #[test]
+    fn val_planar_model_step(point in point()) {
+        for kind in KINDS {
+            let block = block(kind, &point);
+            for (value, expected) in block.after.iter().zip(step(kind, &point)) {
+                let error = (value.0[LANES - 1] - expected).abs();
+                prop_assert!(error < 1e-13 * (1.0 + expected.abs()), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn val_finite_differences_tangent_and_adjoint(point in point()) {
+        const H: f64 = 1e-5;
+        for kind in KINDS {
+            let block = block(kind, &point);
+            for j in 0..DIRECTIONS {
+                let (ahead, behind) = (step(kind, &moved(&point, j, H)), step(kind, &moved(&point, j, -H)));
+                let column: [f64; 6] = core::array::from_fn(|i| (ahead[i] - behind[i]) / (2.0 * H));
+                for (row, state) in [0, 1, 3, 4].into_iter().enumerate() {
+                    let error = (block.tangent[row][j].0[0] - column[state]).abs();
+                    prop_assert!(error < 1e-8 * (1.0 + column[state].abs()), "[{row}][{j}] {error}");
+                }
+                let expected: f64 = column.iter().zip(&point.2).map(|(slope, weight)| slope * weight).sum();
+                prop_assert!((block.pulled[j].0[0] - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{j}");
+            }
+            let turn = (step(kind, &moved(&point, 4, H))[5] - step(kind, &moved(&point, 4, -H))[5]) / (2.0 * H);
+            prop_assert!((block.turn.0[0] - turn).abs() < 1e-8 * (1.0 + turn.abs()));
+        }
+    }
+
+    #[test]
+    fn val_finite_differences_curvature(point in point()) {
+        const H: f64 = 1e-5;
+        for kind in KINDS {
+            let curvature = block(kind, &point).curvature;
+            for column in 0..DIRECTIONS {
+                let ahead = block(kind, &moved(&point, column, H)).pulled;
+                let behind = block(kind, &moved(&point, column, -H)).pulled;
+                for row in 0..=column {
+                    let expected = (ahead[row].0[0] - behind[row].0[0]) / (2.0 * H);
+                    let error = (curvature[pair(row, column)].0[0] - expected).abs();
+                    prop_assert!(error < 1e-5 * (1.0 + expected.abs()), "[{row}][{column}] {error}");
+                }
+            }
+        }
+    }
+}
+
+/// States and costates satisfy their equations by construction of the sweeps; that the inputs satisfy theirs shows
+/// that the step solves the whole Newton system.
+#[test]
+fn the_sweeps_solve_the_newton_system() {
+    let profile = Profile::builtin("paper-calibrated").unwrap();
+    for (theta_deg, w_m_s) in [(90.0_f64, 0.0), (60.0, 1.0), (115.0, -2.0)] {
+        let nominal = profile.start.planar_state();
+        let start = PlanarState { theta_rad: theta_deg.to_radians(), w_m_s, ..nominal };
+        let problem = Problem::from_profile(&profile, start, 0.0, 50, 1.0);
+        let warm = solve(&Problem::from_profile(&profile, nominal, 0.0, 50, 1.0), None).shifted(0);
+        let mut workspace = Workspace::default();
+        workspace.load(&problem, &warm);
+        workspace.evaluate_intervals(&problem);
+        assert!(workspace.sweep(&problem));
+        for k in 0..50 {
+            let left = workspace.newton.sweep.input_residual(&workspace.current, problem.step_s, k);
+            assert!(left.abs() < 1e-6, "{k}: {left}");
+        }
+    }
+}
