@@ -7,7 +7,7 @@
 //! * `bound`: what cannot be landed, and why.
 //! * `interior`: the solver, a stage-structured interior-point method with exact Hessians; its page has the
 //!   formulation, the steps and the references.
-//! * [`reference`]: a condensed sequential quadratic programme on Clarabel, for tests and comparisons.
+//! * [`mod@reference`]: a condensed sequential quadratic programme on Clarabel, for tests and comparisons.
 //! * `rollout`: states and cost of given inputs.
 //!
 //! Gauss-Newton Hessians are not an option: the multiplier of the end height is large and the curvature of the

@@ -26,6 +26,9 @@ const Q: usize = 5;
 /// The input among the directions.
 const D: usize = 4;
 
+/// The directions, filled up to whole vectors.
+const WIDE: usize = DIRECTIONS + 1;
+
 /// Least curvature by an input that counts as positive, relative to the input's own terms.
 const LEAST_CURVATURE: f64 = 1e-11;
 
@@ -37,38 +40,65 @@ struct Feedback {
 }
 
 /// One interval's derivatives, out of its block.
+///
+/// The rows of `(A, b)` over the directions, filled up with a zero to whole vectors: x, z, u and w, then theta and q.
 struct Interval {
-    tangent: [[f64; DIRECTIONS]; 4],
-    theta_by_input: f64,
-    q_by_input: f64,
+    tangent: [[f64; WIDE]; 4],
+    theta: [f64; WIDE],
+    q: [f64; WIDE],
 }
 
 impl Interval {
     #[inline(always)]
     fn of(block: &Block, lane: usize, step_s: f64) -> Self {
         let turn = block.turn.0[lane];
+        let mut tangent = [[0.0; WIDE]; 4];
+        for (row, lanes) in tangent.iter_mut().zip(&block.tangent) {
+            for (entry, value) in row.iter_mut().zip(lanes) {
+                *entry = value.0[lane];
+            }
+        }
         Self {
-            tangent: core::array::from_fn(|i| core::array::from_fn(|j| block.tangent[i][j].0[lane])),
-            theta_by_input: 0.5 * step_s * turn,
-            q_by_input: turn,
+            tangent,
+            theta: [1.0, 0.0, 0.0, step_s, 0.5 * step_s * turn, 0.0],
+            q: [0.0, 0.0, 0.0, 1.0, turn, 0.0],
         }
     }
 
-    /// Each direction's column times a vector: `A' g` without its x and z, and `b' g`.
+    /// `(A, b)' g` without its x and z.
     #[inline(always)]
-    fn pull(&self, g: &[f64; 6], step_s: f64) -> [f64; DIRECTIONS] {
+    fn pull(&self, g: &[f64; 6]) -> [f64; WIDE] {
         let a = &self.tangent;
-        let mut pulled: [f64; DIRECTIONS] =
-            core::array::from_fn(|j| (a[0][j] * g[X] + a[1][j] * g[Z]) + (a[2][j] * g[U] + a[3][j] * g[W]));
-        pulled[0] += g[T];
-        pulled[3] += step_s * g[T] + g[Q];
-        pulled[D] += self.theta_by_input * g[T] + self.q_by_input * g[Q];
+        let mut pulled = [0.0; WIDE];
+        for j in 0..WIDE {
+            pulled[j] = (a[0][j] * g[X] + a[1][j] * g[Z])
+                + (a[2][j] * g[U] + a[3][j] * g[W])
+                + (self.theta[j] * g[T] + self.q[j] * g[Q]);
+        }
         pulled
+    }
+
+    /// `(A, b)' M` without its x and z, for the rows of an `M` over the directions.
+    #[inline(always)]
+    fn square(&self, m: &[[f64; WIDE]; 6]) -> [[f64; WIDE]; DIRECTIONS] {
+        let a = &self.tangent;
+        let mut square = [[0.0; WIDE]; DIRECTIONS];
+        for (i, row) in square.iter_mut().enumerate() {
+            for j in 0..WIDE {
+                row[j] = (a[0][i] * m[X][j] + a[1][i] * m[Z][j]) + (a[2][i] * m[U][j] + a[3][i] * m[W][j]);
+            }
+        }
+        for j in 0..WIDE {
+            square[0][j] += m[T][j];
+            square[3][j] += self.theta[3] * m[T][j] + m[Q][j];
+            square[D][j] += self.theta[D] * m[T][j] + self.q[D] * m[Q][j];
+        }
+        square
     }
 
     /// `A dx + b dd`.
     #[inline(always)]
-    fn push(&self, dx: &[f64; 6], dd: f64, step_s: f64) -> [f64; 6] {
+    fn push(&self, dx: &[f64; 6], dd: f64) -> [f64; 6] {
         let a = &self.tangent;
         let row = |i: usize| {
             (a[i][0] * dx[T] + a[i][1] * dx[U]) + (a[i][2] * dx[W] + a[i][3] * dx[Q]) + a[i][D] * dd
@@ -76,10 +106,10 @@ impl Interval {
         [
             dx[X] + row(0),
             dx[Z] + row(1),
-            dx[T] + step_s * dx[Q] + self.theta_by_input * dd,
+            dx[T] + self.theta[3] * dx[Q] + self.theta[D] * dd,
             row(2),
             row(3),
-            dx[Q] + self.q_by_input * dd,
+            dx[Q] + self.q[D] * dd,
         ]
     }
 }
@@ -131,20 +161,10 @@ impl Sweep {
             let lane = k % LANES;
             let interval = Interval::of(block, lane, step_s);
             let residual = iterate.defect(k);
-            let a = &interval.tangent;
-
-            // Columns of P A and P b, and P r + p.
-            let mut m = [[0.0; 6]; DIRECTIONS];
-            for j in 0..DIRECTIONS {
-                for i in 0..6 {
-                    m[j][i] =
-                        (p[X][i] * a[0][j] + p[Z][i] * a[1][j]) + (p[U][i] * a[2][j] + p[W][i] * a[3][j]);
-                }
-            }
-            for i in 0..6 {
-                m[0][i] += p[T][i];
-                m[3][i] += step_s * p[T][i] + p[Q][i];
-                m[D][i] += interval.theta_by_input * p[T][i] + interval.q_by_input * p[Q][i];
+            // P (A, b) by rows, P r + p, and (A, b)' P (A, b) by rows.
+            let mut m = [[0.0; WIDE]; 6];
+            for (product, row) in m.iter_mut().zip(&p) {
+                *product = interval.pull(row);
             }
             let mut g = slope;
             for j in 0..6 {
@@ -152,57 +172,57 @@ impl Sweep {
                     g[i] += p[j][i] * residual[j];
                 }
             }
-
-            let by_input = interval.pull(&m[D], step_s);
-            let pulled = interval.pull(&g, step_s);
+            let pulled = interval.pull(&g);
+            let across = interval.square(&m);
             let h = |i: usize, j: usize| share * block.curvature[pair(i, j)].0[lane];
             let (own_curvature, own_slope) = self.input_terms[k];
-            let curvature = by_input[D] + h(D, D) + own_curvature;
+            let curvature = across[D][D] + h(D, D) + own_curvature;
             let positive = curvature > LEAST_CURVATURE * (1.0 + own_curvature);
             if !positive {
                 return false;
             }
             let inverse = 1.0 / curvature;
             let cross = [
-                m[D][X],
-                m[D][Z],
-                by_input[0] + h(0, D),
-                by_input[1] + h(1, D),
-                by_input[2] + h(2, D),
-                by_input[3] + h(3, D),
+                m[X][D],
+                m[Z][D],
+                across[D][0] + h(0, D),
+                across[D][1] + h(1, D),
+                across[D][2] + h(2, D),
+                across[D][3] + h(3, D),
             ];
-            let gain = cross.map(|entry| entry * inverse);
+            let mut gain = cross;
+            for entry in &mut gain {
+                *entry *= inverse;
+            }
             let offset = (own_slope + pulled[D]) * inverse;
             self.feedbacks[k] = Feedback { gain, offset };
             if k == 0 {
                 break;
             }
 
-            let mut next = [[0.0; 6]; 6];
-            next[X][X] = p[X][X];
-            next[X][Z] = p[X][Z];
-            next[Z][Z] = p[Z][Z];
-            for j in 0..4 {
-                next[X][2 + j] = m[j][X];
-                next[Z][2 + j] = m[j][Z];
-                let across = interval.pull(&m[j], step_s);
-                for i in 0..=j {
-                    next[2 + i][2 + j] = across[i] + h(i, j);
+            let mut next = [
+                [p[X][X], p[X][Z], m[X][0], m[X][1], m[X][2], m[X][3]],
+                [p[Z][X], p[Z][Z], m[Z][0], m[Z][1], m[Z][2], m[Z][3]],
+                [m[X][0], m[Z][0], across[0][0], across[0][1], across[0][2], across[0][3]],
+                [m[X][1], m[Z][1], across[1][0], across[1][1], across[1][2], across[1][3]],
+                [m[X][2], m[Z][2], across[2][0], across[2][1], across[2][2], across[2][3]],
+                [m[X][3], m[Z][3], across[3][0], across[3][1], across[3][2], across[3][3]],
+            ];
+            for i in 0..4 {
+                for j in 0..4 {
+                    next[2 + i][2 + j] += if i <= j { h(i, j) } else { h(j, i) };
                 }
             }
             for i in 0..6 {
-                for j in i..6 {
-                    let entry = next[i][j] - gain[i] * cross[j];
-                    next[i][j] = entry;
-                    next[j][i] = entry;
+                for j in 0..6 {
+                    next[i][j] -= gain[i] * cross[j];
                 }
             }
-            let weights = &self.weights[k];
-            let slopes = &self.slopes[k];
-            for i in 0..6 {
-                next[i][i] += weights[i];
+            for (i, weight) in self.weights[k].iter().enumerate() {
+                next[i][i] += weight;
             }
             p = next;
+            let slopes = &self.slopes[k];
             let g = [g[X], g[Z], pulled[0], pulled[1], pulled[2], pulled[3]];
             for i in 0..6 {
                 slope[i] = slopes[i] + g[i] - cross[i] * offset;
@@ -219,7 +239,7 @@ impl Sweep {
         let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
         let bent: f64 =
             (0..DIRECTIONS).map(|j| self.share * block.curvature[pair(j, D)].0[lane] * moved[j]).sum();
-        let pulled = Interval::of(block, lane, step_s).pull(&self.costates[k + 1], step_s)[D];
+        let pulled = Interval::of(block, lane, step_s).pull(&self.costates[k + 1])[D];
         let (curvature, slope) = self.input_terms[k];
         curvature * self.inputs[k] + slope + bent + pulled
     }
@@ -236,7 +256,7 @@ impl Sweep {
                 + (gain[W] * dx[W] + gain[Q] * dx[Q]);
             let dd = -(offset + answer);
             let interval = Interval::of(&iterate.blocks[k / LANES], k % LANES, step_s);
-            let moved = interval.push(&dx, dd, step_s);
+            let moved = interval.push(&dx, dd);
             let residual = iterate.defect(k);
             dx = core::array::from_fn(|i| moved[i] + residual[i]);
             self.inputs[k] = dd;
@@ -250,15 +270,16 @@ impl Sweep {
             let block = &iterate.blocks[k / LANES];
             let lane = k % LANES;
             let interval = Interval::of(block, lane, step_s);
-            let pulled = interval.pull(&costate, step_s);
+            let pulled = interval.pull(&costate);
             let dx = &self.states[k];
             let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
-            let bent: [f64; 4] = core::array::from_fn(|i| {
-                let h = |j: usize| {
-                    self.share * block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane]
-                };
-                (h(0) * moved[0] + h(1) * moved[1]) + (h(2) * moved[2] + h(3) * moved[3]) + h(4) * moved[4]
-            });
+            let mut bent = [0.0; 4];
+            for (i, sum) in bent.iter_mut().enumerate() {
+                for (j, direction) in moved.iter().enumerate() {
+                    let h = block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[lane];
+                    *sum += self.share * h * direction;
+                }
+            }
             let before = [
                 costate[X],
                 costate[Z],
