@@ -17,9 +17,6 @@ const CRC_LEN: usize = 2;
 const SIGNATURE_LEN: usize = 13;
 const INCOMPAT_SIGNED: u8 = 0x01;
 
-/// The longest MAVLink 2 frame: header, 255 bytes of payload, CRC, signature.
-pub const MAX_FRAME_LEN: usize = HEADER_LEN + 255 + CRC_LEN + SIGNATURE_LEN;
-
 /// One whole frame whose CRC is right.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
