@@ -5,6 +5,7 @@
 //! * [`vehicle`]: the flight computer: phases, checks, controller ticks, around one plant. Pure.
 //! * [`commands`]: what the radio may ask for and how it is answered. Pure.
 //! * [`telemetry`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's budget. Pure.
+//! * [`landability`]: maps of where a landing exists.
 //! * [`paper`]: the landing paper's experiments, its numbers beside ours.
 //! * [`fly`]: the run loop: clock, links, log.
 #![warn(missing_docs)]
@@ -12,6 +13,7 @@
 pub mod commands;
 pub mod endpoint;
 pub mod fly;
+pub mod landability;
 pub mod paper;
 pub mod plant;
 pub mod scatter;

@@ -1,13 +1,15 @@
 //! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
 
-use std::io::Write as _;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand};
 use flight::profile::BUILTIN;
 use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, load_profile, log_header};
+use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
 use protocol::log::recorder::Recorder;
@@ -31,6 +33,8 @@ enum Command {
     /// Exit codes: 0 landed inside every limit; 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
     /// 5 stopped before its end.
     Fly(FlyArguments),
+    /// Map where a landing inside the touchdown limits exists, over two quantities.
+    Landability(LandabilityArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {
         /// As JSON.
@@ -43,6 +47,29 @@ enum Command {
         #[arg(long, value_name = "NAME")]
         show: Option<String>,
     },
+}
+
+#[derive(clap::Args)]
+struct LandabilityArguments {
+    /// Built-in profile or TOML file.
+    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
+    profile: String,
+    /// Columns: QUANTITY=FROM:TO:COUNT. Quantities: thrust-to-weight, height (m), speed (m/s), tilt (deg), rate
+    /// (deg/s), lateral-speed (m/s), thrust-scale.
+    #[arg(long, default_value = "thrust-to-weight=0.9:1.5:41", value_name = "AXIS")]
+    x: Axis,
+    /// Rows, in the same form.
+    #[arg(long, default_value = "height=5:35:31", value_name = "AXIS")]
+    y: Axis,
+    /// Write the cells as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the map as a picture.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Cells computed at the same time; the map does not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
 }
 
 #[derive(clap::Args)]
@@ -86,6 +113,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
+        Command::Landability(arguments) => map_landability(&arguments),
         Command::Paper { json } => repeat_paper(json),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => {
@@ -93,6 +121,46 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
             runtime.block_on(fly(arguments))
         }
     }
+}
+
+fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> {
+    let (profile, _) = load_profile(&arguments.profile)?;
+    let (x, y) = (arguments.x, arguments.y);
+    anyhow::ensure!(x.quantity != y.quantity, "both axes vary {}; choose two quantities", x.quantity.name());
+    let jobs =
+        arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
+    let count = x.count * y.count;
+    let shown = (count / 20).max(1);
+    let map = landability::map(&profile, x, y, jobs, &|done| {
+        if done.is_multiple_of(shown) || done == count {
+            // Talk goes to standard error; nobody may be listening.
+            let _ = write!(
+                std::io::stderr(),
+                "\r{done} of {count} cells{}",
+                if done == count { "\n" } else { "" }
+            );
+        }
+    });
+    map.write_table(&mut std::io::stdout().lock())?;
+    if let Some(path) = &arguments.csv {
+        write_file(path, |out| map.write_csv(out))?;
+    }
+    if let Some(path) = &arguments.svg {
+        write_file(path, |out| landability::write_svg(&map, &profile.name, out))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> anyhow::Result<()> {
+    let written = File::create(path).and_then(|file| {
+        let mut out = BufWriter::new(file);
+        write(&mut out)?;
+        out.flush()
+    });
+    written.with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {

@@ -1,0 +1,189 @@
+//! A quantity and the values of it that a map covers.
+
+use std::fmt;
+use std::str::FromStr;
+
+use flight::profile::Profile;
+
+/// What a map varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Nominal thrust over weight.
+    ThrustToWeight,
+    /// Height at ignition, m.
+    Height,
+    /// Speed of descent at ignition, m/s.
+    Speed,
+    /// Tilt from upright at ignition, degrees.
+    Tilt,
+    /// Pitch rate at ignition, degrees per second.
+    Rate,
+    /// Lateral speed at ignition, m/s.
+    LateralSpeed,
+    /// Thrust over nominal, known to the controller.
+    ThrustScale,
+}
+
+impl Quantity {
+    const ALL: [Self; 7] = [
+        Self::ThrustToWeight,
+        Self::Height,
+        Self::Speed,
+        Self::Tilt,
+        Self::Rate,
+        Self::LateralSpeed,
+        Self::ThrustScale,
+    ];
+
+    /// The name on a command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ThrustToWeight => "thrust-to-weight",
+            Self::Height => "height",
+            Self::Speed => "speed",
+            Self::Tilt => "tilt",
+            Self::Rate => "rate",
+            Self::LateralSpeed => "lateral-speed",
+            Self::ThrustScale => "thrust-scale",
+        }
+    }
+
+    /// The name in a table's heading, with its unit.
+    pub fn column(self) -> &'static str {
+        match self {
+            Self::ThrustToWeight => "thrust_to_weight",
+            Self::Height => "height_m",
+            Self::Speed => "speed_m_s",
+            Self::Tilt => "tilt_deg",
+            Self::Rate => "rate_deg_s",
+            Self::LateralSpeed => "lateral_speed_m_s",
+            Self::ThrustScale => "thrust_scale",
+        }
+    }
+
+    /// The name beside a picture's axis.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::ThrustToWeight => "thrust / weight",
+            Self::Height => "height, m",
+            Self::Speed => "speed, m/s",
+            Self::Tilt => "tilt, deg",
+            Self::Rate => "rate, deg/s",
+            Self::LateralSpeed => "lateral speed, m/s",
+            Self::ThrustScale => "thrust / nominal",
+        }
+    }
+
+    /// Puts a value into the problem.
+    pub(super) fn apply(self, value: f64, profile: &mut Profile, thrust_scale: &mut f64) {
+        match self {
+            Self::ThrustToWeight => {
+                profile.motor.thrust_n = value * profile.vehicle.mass_kg * profile.environment.gravity_m_s2;
+            }
+            Self::Height => profile.start.altitude_m = value,
+            Self::Speed => profile.start.u_m_s = -value,
+            Self::Tilt => profile.start.pitch_deg = 90.0 + value,
+            Self::Rate => profile.start.pitch_rate_deg_s = value,
+            Self::LateralSpeed => profile.start.w_m_s = value,
+            Self::ThrustScale => *thrust_scale = value,
+        }
+    }
+}
+
+/// A quantity over a range: `count` values, both ends among them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// What is varied.
+    pub quantity: Quantity,
+    /// Its first value.
+    pub from: f64,
+    /// Its last value.
+    pub to: f64,
+    /// How many values.
+    pub count: usize,
+}
+
+impl Axis {
+    /// The most values of one axis.
+    pub const MAX_COUNT: usize = 500;
+
+    /// The value at a place, counted from 0.
+    pub fn value(&self, place: usize) -> f64 {
+        let steps = self.count.saturating_sub(1).max(1);
+        self.from + (self.to - self.from) * place as f64 / steps as f64
+    }
+}
+
+/// Why an axis was not understood.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "axis `{given}`: {problem}; write QUANTITY=FROM:TO:COUNT with a quantity of {}",
+    Quantity::ALL.map(Quantity::name).join(", ")
+)]
+pub struct AxisError {
+    given: String,
+    problem: &'static str,
+}
+
+impl FromStr for Axis {
+    type Err = AxisError;
+
+    fn from_str(given: &str) -> Result<Self, AxisError> {
+        let refuse = |problem| AxisError { given: given.to_owned(), problem };
+        let (name, range) = given.split_once('=').ok_or_else(|| refuse("no `=`"))?;
+        let quantity = Quantity::ALL
+            .into_iter()
+            .find(|quantity| quantity.name() == name)
+            .ok_or_else(|| refuse("unknown quantity"))?;
+        let mut parts = range.split(':');
+        let (Some(from), Some(to), Some(count), None) =
+            (parts.next(), parts.next(), parts.next(), parts.next())
+        else {
+            return Err(refuse("the range is not FROM:TO:COUNT"));
+        };
+        let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let (from, to) =
+            number(from).zip(number(to)).ok_or_else(|| refuse("an end of the range is not a number"))?;
+        let count = count
+            .parse()
+            .ok()
+            .filter(|count| (2..=Self::MAX_COUNT).contains(count))
+            .ok_or_else(|| refuse("the count is not a number from 2 to 500"))?;
+        let positive =
+            matches!(quantity, Quantity::ThrustToWeight | Quantity::Height | Quantity::ThrustScale);
+        if positive && from.min(to) <= 0.0 {
+            return Err(refuse("the range must be above 0"));
+        }
+        Ok(Self { quantity, from, to, count })
+    }
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}:{}:{}", self.quantity.name(), self.from, self.to, self.count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_read_and_written_alike() {
+        for text in ["height=5:30:26", "tilt=-30:30:7", "thrust-to-weight=0.9:1.4:26"] {
+            assert_eq!(text.parse::<Axis>().unwrap().to_string(), text);
+        }
+        let axis: Axis = "height=5:30:26".parse().unwrap();
+        assert!((axis.value(0) - 5.0).abs() < 1e-12 && (axis.value(25) - 30.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wrong_axis_is_refused_with_what_would_do() {
+        for text in
+            ["", "height", "depth=1:2:3", "height=1:2", "height=a:2:3", "height=1:2:1", "height=-1:2:3"]
+        {
+            let error = text.parse::<Axis>().unwrap_err().to_string();
+            assert!(error.contains("QUANTITY=FROM:TO:COUNT") && error.contains("lateral-speed"), "{error}");
+        }
+    }
+}
