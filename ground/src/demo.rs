@@ -7,7 +7,7 @@ use std::io;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use onboard_sim::fly::{self, FlyOptions};
+use onboard_sim::fly::{self, FlyOptions, LoadedProfile};
 use onboard_sim::vehicle::DeadlinePolicy;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
@@ -22,8 +22,8 @@ const STOP_WITHIN: Duration = Duration::from_secs(3);
 /// What is simulated.
 #[derive(Debug, Clone)]
 pub struct DemoOptions {
-    /// Built-in profile or file.
-    pub profile: String,
+    /// What flies.
+    pub profile: LoadedProfile,
     /// Seed of its dispersions.
     pub seed: u64,
     /// Speed of simulated time.
@@ -31,13 +31,17 @@ pub struct DemoOptions {
 }
 
 impl DemoOptions {
-    /// The header of the log that holds both sides.
+    /// Reads the profile, once for the flight and its log.
     ///
     /// # Errors
     /// There is no such profile, or it is wrong.
-    pub fn log_header(&self, start_unix_ns: u64) -> anyhow::Result<LogHeader> {
-        let (profile, text) = fly::load_profile(&self.profile)?;
-        Ok(fly::log_header("ground", &profile, &text, self.seed, start_unix_ns))
+    pub fn load(name_or_path: &str, seed: u64, speed: Speed) -> anyhow::Result<Self> {
+        Ok(Self { profile: fly::load_profile(name_or_path)?, seed, speed })
+    }
+
+    /// The header of the log that holds both sides.
+    pub fn log_header(&self, start_unix_ns: u64) -> LogHeader {
+        fly::log_header("ground", &self.profile, self.seed, start_unix_ns)
     }
 }
 
@@ -60,7 +64,7 @@ impl Demo {
         log_clock: LogClock,
     ) -> io::Result<Self> {
         let fly_options = FlyOptions {
-            profile_name_or_path: options.profile.clone(),
+            profile: options.profile.clone(),
             links: vec![link],
             recorder,
             seed: options.seed,

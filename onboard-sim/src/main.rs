@@ -124,7 +124,7 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> {
-    let (profile, _) = load_profile(&arguments.profile)?;
+    let profile = load_profile(&arguments.profile)?.profile;
     let (x, y) = (arguments.x, arguments.y);
     anyhow::ensure!(x.quantity != y.quantity, "both axes vary {}; choose two quantities", x.quantity.name());
     let jobs =
@@ -178,28 +178,26 @@ fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
-        let (_, text) = load_profile(name)?;
-        out.write_all(text.as_bytes())?;
+        out.write_all(load_profile(name)?.toml.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
     for (name, _) in BUILTIN {
-        let (profile, _) = load_profile(name)?;
-        writeln!(out, "{name:<20} {}", profile.summary)?;
+        writeln!(out, "{name:<20} {}", load_profile(name)?.profile.summary)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
-    let (profile, profile_toml) = load_profile(&arguments.profile)?;
+    let profile = load_profile(&arguments.profile)?;
     let recorder = match &arguments.log {
         None => None,
         Some(path) => {
-            let header = log_header("onboard-sim", &profile, &profile_toml, arguments.seed, unix_ns());
+            let header = log_header("onboard-sim", &profile, arguments.seed, unix_ns());
             Some(Recorder::create(path, &header)?)
         }
     };
     let options = FlyOptions {
-        profile_name_or_path: arguments.profile,
+        profile,
         auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
         links: arguments.mavlink,
         recorder: recorder.clone(),

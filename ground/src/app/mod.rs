@@ -46,13 +46,12 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
 
 async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
     let clock = Clock::start();
-    let demo_options = cli.connect.is_none().then(|| DemoOptions {
-        profile: cli.profile.clone(),
-        seed: cli.seed,
-        speed: cli.speed,
-    });
+    let demo_options = match cli.connect {
+        None => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
+        Some(_) => None,
+    };
     let header = match &demo_options {
-        Some(options) => options.log_header(clock.start_unix_ns())?,
+        Some(options) => options.log_header(clock.start_unix_ns()),
         None => LogHeader {
             writer: "ground".to_owned(),
             start_unix_ns: clock.start_unix_ns(),

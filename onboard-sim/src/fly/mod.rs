@@ -53,8 +53,8 @@ impl std::str::FromStr for Speed {
 
 /// What to fly.
 pub struct FlyOptions {
-    /// A built-in profile's name, or a path to a TOML file.
-    pub profile_name_or_path: String,
+    /// What flies.
+    pub profile: LoadedProfile,
     /// Links to serve; none is allowed.
     pub links: Vec<Endpoint>,
     /// Log to write into.
@@ -162,36 +162,39 @@ pub struct FlightSummary {
     pub tx_bytes: u64,
 }
 
-/// Reads a profile by built-in name or path; returns its text too, for the log.
+/// A profile and the text it was read from. The log's header and the flight both come from one reading.
+#[derive(Debug, Clone)]
+pub struct LoadedProfile {
+    /// The profile.
+    pub profile: Profile,
+    /// Its text, for the log.
+    pub toml: String,
+}
+
+/// Reads a profile by built-in name or path.
 ///
 /// # Errors
 /// There is no such profile, or it is wrong: the message names the key.
-pub fn load_profile(name_or_path: &str) -> Result<(Profile, String), FlyError> {
-    if let Some(text) = Profile::builtin_toml(name_or_path) {
-        return Ok((Profile::from_toml(text, name_or_path)?, text.to_owned()));
-    }
-    if !Path::new(name_or_path).exists() {
-        return Err(FlyError::NoProfile { given: name_or_path.to_owned() });
-    }
-    let text = std::fs::read_to_string(name_or_path)
-        .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?;
-    Ok((Profile::from_toml(&text, name_or_path)?, text))
+pub fn load_profile(name_or_path: &str) -> Result<LoadedProfile, FlyError> {
+    let toml = match Profile::builtin_toml(name_or_path) {
+        Some(text) => text.to_owned(),
+        None if !Path::new(name_or_path).exists() => {
+            return Err(FlyError::NoProfile { given: name_or_path.to_owned() });
+        }
+        None => std::fs::read_to_string(name_or_path)
+            .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?,
+    };
+    Ok(LoadedProfile { profile: Profile::from_toml(&toml, name_or_path)?, toml })
 }
 
 /// The header of a flight's log.
-pub fn log_header(
-    writer: &str,
-    profile: &Profile,
-    profile_toml: &str,
-    seed: u64,
-    start_unix_ns: u64,
-) -> LogHeader {
+pub fn log_header(writer: &str, loaded: &LoadedProfile, seed: u64, start_unix_ns: u64) -> LogHeader {
     let run = BTreeMap::from([
-        ("profile".to_owned(), profile.name.clone()),
+        ("profile".to_owned(), loaded.profile.name.clone()),
         ("seed".to_owned(), seed.to_string()),
         ("start_unix_ns".to_owned(), start_unix_ns.to_string()),
     ]);
-    LogHeader { writer: writer.to_owned(), start_unix_ns, run, profile_toml: Some(profile_toml.to_owned()) }
+    LogHeader { writer: writer.to_owned(), start_unix_ns, run, profile_toml: Some(loaded.toml.clone()) }
 }
 
 /// Flies, reporting nothing but the summary. See [`fly_observed`].
@@ -208,14 +211,14 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
 /// the clock (unless deadlines are enforced, which makes it the machine's business).
 ///
 /// # Errors
-/// The profile cannot be read or simulated, or a link cannot be opened.
+/// The profile cannot be simulated, or a link cannot be opened.
 pub async fn fly_observed(
     options: FlyOptions,
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let (profile, _) = load_profile(&options.profile_name_or_path)?;
-    let mut vehicle = Vehicle::new(&profile, draw(&profile, options.seed), options.deadline_policy)?;
+    let profile = &options.profile.profile;
+    let mut vehicle = Vehicle::new(profile, draw(profile, options.seed), options.deadline_policy)?;
     vehicle.pull_pin();
     let mut links = Links::open(&options.links, options.recorder.clone()).await?;
     let mut endpoint = VehicleEndpoint::new();
