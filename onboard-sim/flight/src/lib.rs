@@ -7,6 +7,7 @@
 //! * [`profile`]: the vehicle, motor, start, weights and limits, as data.
 //! * [`phase`]: the flight phases and the one table that moves between them.
 //! * [`arming`] and [`gate`]: the checks before arming and before ignition, each with the value found.
+//! * [`rigid`]: the state of a rocket in space, and its frames.
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`nmpc`]: the landing optimal-control problem and its solver.
 //! * [`stabiliser`]: the upright law that flies when no plan can be had.
@@ -25,6 +26,7 @@ pub mod gate;
 pub mod nmpc;
 pub mod phase;
 pub mod profile;
+pub mod rigid;
 pub mod stabiliser;
 pub mod thrust_estimate;
 pub mod verdict;
