@@ -1,0 +1,194 @@
+//! Phase 1: falling tail-first on four fins, steered back to the pad.
+//!
+//! The fins' drag acts along the wind and gives no lift; the body does. With its nose leaning away from the wind by an
+//! angle of attack, the air on its side pushes it the other way, by `1/2 rho V^2 S_n sin^2`. The law asks for the
+//! horizontal acceleration that brings position and velocity to rest over the pad at the ignition (the least-effort
+//! law `a = -(6 p / t^2 + 4 v / t)`), turns it into a lean, the lean into a turning moment, and leaves it to the
+//! [allocation](crate::fins) to find four openings. Beyond some 15 degrees the body's own moment overcomes the fins',
+//! so the lean is limited.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use crate::aim::turn_to_aim_rad;
+use crate::rigid::RigidState;
+
+/// Slower than this through the air, fins do nothing worth steering, m/s.
+const LEAST_AIRSPEED_M_S: f64 = 4.0;
+
+/// How the fall is steered.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DescentGains {
+    /// Largest angle of attack asked for, degrees.
+    pub lean_max_deg: f64,
+    /// Natural frequency of the attitude loop, rad/s.
+    pub natural_frequency_rad_s: f64,
+    /// Its damping ratio.
+    pub damping: f64,
+    /// Decay rate of the roll rate, 1/s.
+    pub roll_decay_per_s: f64,
+    /// The least time to go that the steering law divides by, s.
+    pub time_to_go_min_s: f64,
+}
+
+/// What the law must know of the vehicle and the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DescentSituation {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Moments of inertia about the roll axis and across it, kg m^2.
+    pub inertia_kg_m2: [f64; 2],
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Wind in the world, m/s.
+    pub wind_m_s: Vector3<f64>,
+    /// Drag area of body and fins along the wind, m^2.
+    pub drag_area_m2: f64,
+    /// Drag area of the body across its axis, m^2.
+    pub crossflow_area_m2: f64,
+    /// Time until the vehicle should be at rest over the pad, s.
+    pub time_to_go_s: f64,
+}
+
+/// What the fins are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DescentDemand {
+    /// Moments about body x, y, z, N m.
+    pub moment_n_m: Vector3<f64>,
+    /// Dynamic pressure, Pa.
+    pub dynamic_pressure_pa: f64,
+    /// The nose's wanted direction in the world.
+    pub nose_in_world: Vector3<f64>,
+}
+
+impl DescentGains {
+    /// The horizontal acceleration wanted, m/s^2, in the world.
+    fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
+        let time_s = situation.time_to_go_s.max(self.time_to_go_min_s);
+        let wanted =
+            state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
+        Vector3::new(wanted.x, wanted.y, 0.0)
+    }
+
+    /// What to ask of the fins. `steered` is false in passive descent: the nose then follows the wind alone.
+    pub fn demand(&self, state: &RigidState, situation: &DescentSituation, steered: bool) -> DescentDemand {
+        let through_air_m_s = state.velocity_m_s - situation.wind_m_s;
+        let airspeed_m_s = through_air_m_s.norm();
+        let dynamic_pressure_pa = 0.5 * situation.air_density_kg_m3 * airspeed_m_s * airspeed_m_s;
+        if airspeed_m_s < LEAST_AIRSPEED_M_S {
+            return DescentDemand {
+                moment_n_m: Vector3::zeros(),
+                dynamic_pressure_pa,
+                nose_in_world: Vector3::z(),
+            };
+        }
+        let upstream = -through_air_m_s / airspeed_m_s;
+        let lean = if steered { self.lean(state, situation, &upstream, dynamic_pressure_pa) } else { Vector3::zeros() };
+        let nose_in_world = (upstream - lean).normalize();
+
+        let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
+        let [roll_inertia, inertia] = situation.inertia_kg_m2;
+        let rate = state.rate_rad_s;
+        let frequency = self.natural_frequency_rad_s;
+        let turn = |error: f64, rate: f64| {
+            inertia * (frequency * frequency * error - 2.0 * self.damping * frequency * rate)
+        };
+        let moment_n_m = Vector3::new(
+            -roll_inertia * self.roll_decay_per_s * rate.x,
+            turn(error.y, rate.y),
+            turn(error.z, rate.z),
+        );
+        DescentDemand { moment_n_m, dynamic_pressure_pa, nose_in_world }
+    }
+
+    /// How the nose leans out of the wind: the tangent of the angle of attack, along the push that is wanted.
+    fn lean(
+        &self,
+        state: &RigidState,
+        situation: &DescentSituation,
+        upstream: &Vector3<f64>,
+        dynamic_pressure_pa: f64,
+    ) -> Vector3<f64> {
+        let per_mass = dynamic_pressure_pa / situation.mass_kg;
+        // The wind's own drag is there anyway.
+        let carried_m_s2 = upstream * (per_mass * situation.drag_area_m2);
+        let carried_m_s2 = Vector3::new(carried_m_s2.x, carried_m_s2.y, 0.0);
+        let wanted_m_s2 = self.steering_m_s2(state, situation) - carried_m_s2;
+        let across = wanted_m_s2 - upstream * wanted_m_s2.dot(upstream);
+        let most = libm::tan(self.lean_max_deg.to_radians());
+        let sine = libm::sin(self.lean_max_deg.to_radians());
+        // Linear in the lean and true at its limit: the square root would have an infinite slope at nothing.
+        let per_lean_m_s2 = per_mass * situation.crossflow_area_m2 * sine * sine / most;
+        let lean = across / per_lean_m_s2.max(1e-6);
+        let length = lean.norm();
+        if length > most { lean * (most / length) } else { lean }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gains() -> DescentGains {
+        DescentGains {
+            lean_max_deg: 14.0,
+            natural_frequency_rad_s: 3.0,
+            damping: 0.8,
+            roll_decay_per_s: 3.0,
+            time_to_go_min_s: 2.5,
+        }
+    }
+
+    fn situation() -> DescentSituation {
+        DescentSituation {
+            mass_kg: 3.13,
+            inertia_kg_m2: [0.003, 0.12],
+            air_density_kg_m3: 1.2,
+            wind_m_s: Vector3::zeros(),
+            drag_area_m2: 0.031,
+            crossflow_area_m2: 0.0622,
+            time_to_go_s: 5.0,
+        }
+    }
+
+    fn falling() -> RigidState {
+        let mut state = RigidState::upright(150.0);
+        state.velocity_m_s = Vector3::new(0.0, 0.0, -38.0);
+        state
+    }
+
+    #[test]
+    fn over_the_pad_in_still_air_nothing_is_asked() {
+        let demand = gains().demand(&falling(), &situation(), true);
+        assert!(demand.moment_n_m.norm() < 1e-12 && (demand.nose_in_world - Vector3::z()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_nose_leans_to_the_side_the_vehicle_is_on() {
+        // The air then pushes it back.
+        let mut state = falling();
+        state.position_m.x = 10.0;
+        let demand = gains().demand(&state, &situation(), true);
+        assert!(demand.nose_in_world.x > 0.05, "{}", demand.nose_in_world);
+        assert!(demand.moment_n_m.y < 0.0, "the nose goes down towards +x");
+        let lean = libm::acos(demand.nose_in_world.z).to_degrees();
+        assert!(lean <= 14.0 + 1e-9, "{lean}");
+    }
+
+    #[test]
+    fn carried_by_the_wind_it_leans_with_the_wind_to_glide_against_it() {
+        let mut situation = situation();
+        situation.wind_m_s.y = 5.0;
+        let passive = gains().demand(&falling(), &situation, false);
+        let steered = gains().demand(&falling(), &situation, true);
+        assert!(passive.nose_in_world.y > 0.1, "weathercocked: {}", passive.nose_in_world);
+        assert!(steered.nose_in_world.y > passive.nose_in_world.y, "leaning further: {}", steered.nose_in_world);
+    }
+
+    #[test]
+    fn hanging_at_apogee_the_fins_are_left_alone() {
+        let demand = gains().demand(&RigidState::upright(300.0), &situation(), true);
+        assert_eq!(demand.moment_n_m, Vector3::zeros());
+    }
+}

@@ -1,0 +1,408 @@
+//! Phase 2 in space: from ignition to touchdown on a motor that cannot be throttled.
+//!
+//! A tick plans the landing in one vertical plane with the [NMPC](crate::nmpc), in the frame that moves with the wind,
+//! with the real thrust curve as the [`Burn`] believes it, a mass that burns off, the body's and the fins' drag, a
+//! floor above the ground and a free final time not before the thrust falls through the weight. Between ticks
+//! [`PoweredGuidance::aim`] reads where the nose is to point from that plan, and leans it across the plane as the
+//! velocity there and the wind ask. The fins open and close with the place in the
+//! [band of feasible heights](crate::vertical): high in it there is too much motor left, so they close.
+//!
+//! When no plan can be had it degrades in announced steps, the [`ControlLevel`]s of the planar controller.
+
+mod plane;
+
+pub use plane::Plane;
+
+use core::f64::consts::FRAC_PI_2;
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use crate::aim::Aim;
+use crate::burn::Burn;
+use crate::controller::ControlLevel;
+use crate::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
+use crate::nmpc::free_time::{
+    FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into,
+};
+use crate::nmpc::{Problem, SolveStatus};
+use crate::profile::{FinalBox, SolverLimits, StateWeights};
+use crate::rigid::RigidState;
+
+/// Longest and shortest horizons, intervals.
+const MOST_INTERVALS: usize = 60;
+const LEAST_INTERVALS: usize = 6;
+/// A plan that ends sooner than this is flown out, s.
+const FLOWN_OUT_S: f64 = 0.12;
+
+/// How the landing burn is planned and flown.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoweredSettings {
+    /// Length of a planned interval at most, s.
+    pub interval_s: f64,
+    /// Weights of the plan.
+    pub weights: StateWeights,
+    /// Largest planned gimbal angle on either side, degrees; the rest of the travel is the attitude loop's.
+    pub gimbal_deg: f64,
+    /// Largest horizontal distance at the end, m.
+    pub x_final_m: f64,
+    /// Box the plan ends in; its lateral speed is over the ground.
+    #[serde(rename = "final")]
+    pub final_box: FinalBox,
+    /// How long after thrust has fallen through the weight a plan may end, s.
+    pub latest_after_s: f64,
+    /// Most final times tried in a tick.
+    pub max_solves: u32,
+    /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
+    pub landing_miss: f64,
+    /// Decay rate of the velocity across the plane, 1/s.
+    pub across_decay_per_s: f64,
+    /// Largest lean across the plane, degrees.
+    pub across_lean_max_deg: f64,
+    /// Limits of the solver.
+    pub solver: SolverLimits,
+}
+
+/// What a tick must know besides the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoweredSituation<'a> {
+    /// The motor.
+    pub burn: Burn<'a>,
+    /// Time since thrust began, s.
+    pub burning_s: f64,
+    /// Mass before ignition, kg.
+    pub mass_at_ignition_kg: f64,
+    /// Moment of inertia across the axis, kg m^2.
+    pub inertia_kg_m2: f64,
+    /// Thrust's arm about the centre of gravity, m.
+    pub arm_m: f64,
+    /// Centre of gravity above the feet when upright, m.
+    pub feet_below_cg_m: f64,
+    /// Gravity, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Wind in the world, m/s.
+    pub wind_m_s: Vector3<f64>,
+    /// Drag area of the body along its axis, m^2.
+    pub body_drag_area_m2: f64,
+    /// Drag area of the body across its axis, m^2.
+    pub crossflow_area_m2: f64,
+    /// Drag area of the fins at their present opening, m^2.
+    pub fin_drag_area_m2: f64,
+    /// Largest gimbal angle, rad.
+    pub gimbal_limit_rad: f64,
+}
+
+impl PoweredSituation<'_> {
+    fn mass_kg(&self) -> f64 {
+        self.mass_at_ignition_kg - self.burn.burnt_kg(self.burning_s)
+    }
+
+    fn model(&self) -> PlanarModel {
+        let mass_kg = self.mass_kg();
+        let per_m = |area_m2: f64| 0.5 * self.air_density_kg_m3 * area_m2 / mass_kg;
+        PlanarModel {
+            params: PlanarParams {
+                mass_kg,
+                pitch_inertia_kg_m2: self.inertia_kg_m2,
+                thrust_arm_m: self.arm_m,
+                drag_per_m: per_m(self.body_drag_area_m2 + self.fin_drag_area_m2),
+                lateral_drag_per_m: per_m(self.fin_drag_area_m2),
+                crossflow_per_m: per_m(self.crossflow_area_m2),
+                gravity_m_s2: self.gravity_m_s2,
+            },
+            kind: ModelKind::Consistent,
+        }
+    }
+
+    /// Horizontal acceleration by the air, m/s^2.
+    fn air_m_s2(&self, state: &RigidState) -> Vector3<f64> {
+        let through_air = state.velocity_m_s - self.wind_m_s;
+        let nose = state.nose_in_world();
+        let across = through_air - nose * through_air.dot(&nose);
+        let per_mass = -0.5 * self.air_density_kg_m3 / self.mass_kg();
+        through_air * (per_mass * self.fin_drag_area_m2 * through_air.norm())
+            + across * (per_mass * self.crossflow_area_m2 * across.norm())
+    }
+}
+
+/// The burn ahead of a moment, as the planner wants it.
+struct Ahead<'a, 'b>(&'a PoweredSituation<'b>);
+
+impl Motor for Ahead<'_, '_> {
+    fn mean_thrust_n(&self, from_s: f64, to_s: f64) -> f64 {
+        self.0.burn.mean_thrust_n(self.0.burning_s + from_s, to_s - from_s)
+    }
+
+    fn mean_mass_kg(&self, from_s: f64, to_s: f64) -> f64 {
+        let middle_s = self.0.burning_s + 0.5 * (from_s + to_s);
+        self.0.mass_at_ignition_kg - self.0.burn.burnt_kg(middle_s)
+    }
+}
+
+/// What a tick found, in brief.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoweredReport {
+    /// What decides where the nose points.
+    pub level: ControlLevel,
+    /// How the last solve ended.
+    pub status: SolveStatus,
+    /// Iterations over all final times tried.
+    pub iterations: usize,
+    /// Residuals of the optimality conditions.
+    pub kkt_stationarity: f64,
+    /// Largest defect or complementarity.
+    pub kkt_feasibility: f64,
+    /// Cost of the plan.
+    pub cost: f64,
+    /// By how much the plan misses its end at worst.
+    pub condition_miss: f64,
+    /// Time to the planned touchdown, s.
+    pub touchdown_in_s: f64,
+    /// The planned state at touchdown; velocities are through the air.
+    pub touchdown: PlanarState,
+    /// Largest planned tilt, rad.
+    pub largest_tilt_rad: f64,
+}
+
+impl PoweredReport {
+    /// Before the first tick.
+    pub fn idle() -> Self {
+        Self {
+            level: ControlLevel::Idle,
+            status: SolveStatus::NotRun,
+            iterations: 0,
+            kkt_stationarity: 0.0,
+            kkt_feasibility: 0.0,
+            cost: 0.0,
+            condition_miss: 0.0,
+            touchdown_in_s: 0.0,
+            touchdown: PlanarState::default(),
+            largest_tilt_rad: 0.0,
+        }
+    }
+}
+
+/// A plan being flown.
+#[derive(Debug, Clone, PartialEq)]
+struct Flown {
+    plane: Plane,
+    begins_s: f64,
+    /// Rotational acceleration of a unit sine of the gimbal angle in each interval, rad/s^2.
+    turning_rad_s2: Vec<f64>,
+    plan: FreeTimeSolution,
+}
+
+/// The guidance and what it remembers.
+#[derive(Debug, Clone)]
+pub struct PoweredGuidance {
+    settings: PoweredSettings,
+    plane: Option<Plane>,
+    flown: Option<Flown>,
+    report: PoweredReport,
+    workspace: FreeTimeWorkspace,
+    trial: FreeTimeSolution,
+}
+
+impl PoweredGuidance {
+    /// Guidance with nothing planned.
+    pub fn new(settings: PoweredSettings) -> Self {
+        Self {
+            settings,
+            plane: None,
+            flown: None,
+            report: PoweredReport::idle(),
+            workspace: FreeTimeWorkspace::default(),
+            trial: FreeTimeSolution::default(),
+        }
+    }
+
+    /// What the last tick found.
+    pub fn report(&self) -> &PoweredReport {
+        &self.report
+    }
+
+    /// The plane of the landing, once there is one.
+    pub fn plane(&self) -> Option<&Plane> {
+        self.plane.as_ref()
+    }
+
+    /// The planned planar states, one step apart, if there is a plan: positions over the ground, velocities through
+    /// the air.
+    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
+        let flown = self.flown.as_ref()?;
+        Some((&flown.plan.solution.states, flown.plan.solution.step_s))
+    }
+
+    /// Plans the landing from a state at a time.
+    pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
+        let plane = *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
+        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < FLOWN_OUT_S) {
+            return;
+        }
+        let wind_m_s = situation.wind_m_s.dot(&plane.along);
+        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
+        let Some(problem) = self.pose(initial, wind_m_s, situation) else {
+            self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+            return;
+        };
+        let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
+        solve_free_time_into(&problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+        self.take(time_s, plane, &problem, situation);
+    }
+
+    fn pose(
+        &self,
+        initial: PlanarState,
+        wind_m_s: f64,
+        situation: &PoweredSituation<'_>,
+    ) -> Option<FreeTimeProblem> {
+        let settings = &self.settings;
+        let carried_until_s = situation
+            .burn
+            .falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
+        // Late in the burn there is no waiting for the thrust to fall any more, only for the ground.
+        let to_ground_s = initial.z_m.max(0.0) / 2.0;
+        let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
+        let latest_s = (carried_until_s + settings.latest_after_s - situation.burning_s)
+            .max(earliest_s + to_ground_s.min(0.4));
+        let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
+        let intervals =
+            (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+        let landing = Problem {
+            model: situation.model(),
+            initial,
+            step_s: settings.interval_s,
+            thrust_n: Vec::new(),
+            mass_kg: Vec::new(),
+            target: Plane::rest(wind_m_s),
+            state_weights: settings.weights.state_diagonal(),
+            input_weight: settings.weights.delta,
+            gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
+            x_final_m: settings.x_final_m,
+            final_box: Some(settings.final_box),
+            altitude_min_m: Some(0.0),
+            // How soft it can be is the plan's to say; a bound from straight-up thrust would only hide it.
+            touchdown_speed_max_m_s: f64::MAX,
+            solver: settings.solver,
+        };
+        Some(FreeTimeProblem {
+            landing,
+            intervals,
+            earliest_s,
+            latest_s,
+            target_drift_m_s: -wind_m_s,
+            max_solves: settings.max_solves,
+        })
+    }
+
+    /// Keeps the trial as the flown plan if it is worth flying.
+    fn take(&mut self, time_s: f64, plane: Plane, problem: &FreeTimeProblem, situation: &PoweredSituation<'_>) {
+        let solution = &self.trial.solution;
+        let usable = !solution.inputs_rad.is_empty()
+            && solution.states.iter().all(PlanarState::is_finite)
+            && solution.inputs_rad.iter().all(|input| input.is_finite());
+        let level = match () {
+            () if !usable => match &self.flown {
+                Some(flown) if flown.left_s(time_s) > 0.0 => ControlLevel::ShiftedPlan,
+                _ => ControlLevel::Stabiliser,
+            },
+            () if solution.status == SolveStatus::Converged
+                && solution.condition_miss <= self.settings.landing_miss =>
+            {
+                ControlLevel::Converged
+            }
+            () => ControlLevel::BestFeasible,
+        };
+        let touchdown = solution.states.last().copied().unwrap_or_default();
+        let tilt = |planned: &PlanarState| (planned.theta_rad - FRAC_PI_2).abs();
+        self.report = PoweredReport {
+            level,
+            status: solution.status,
+            iterations: solution.iterations,
+            kkt_stationarity: solution.kkt_stationarity,
+            kkt_feasibility: solution.kkt_feasibility,
+            cost: solution.cost,
+            condition_miss: solution.condition_miss,
+            touchdown_in_s: self.trial.final_time_s,
+            touchdown,
+            largest_tilt_rad: solution.states.iter().map(tilt).fold(0.0, f64::max),
+        };
+        if !usable {
+            return;
+        }
+        let step_s = self.trial.final_time_s / problem.intervals as f64;
+        let per_newton = situation.arm_m / situation.inertia_kg_m2;
+        let ahead = Ahead(situation);
+        let flown = self.flown.get_or_insert_with(|| Flown {
+            plane,
+            begins_s: time_s,
+            turning_rad_s2: Vec::with_capacity(MOST_INTERVALS),
+            plan: FreeTimeSolution::default(),
+        });
+        flown.begins_s = time_s;
+        flown.turning_rad_s2.clear();
+        flown.turning_rad_s2.extend((0..problem.intervals).map(|k| {
+            per_newton * ahead.mean_thrust_n(k as f64 * step_s, (k + 1) as f64 * step_s)
+        }));
+        core::mem::swap(&mut flown.plan, &mut self.trial);
+    }
+
+    /// Where the nose is to point at a time.
+    pub fn aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
+        let thrust_n = situation.burn.thrust_n(situation.burning_s);
+        let level_m_s2 = |push_m_s2: f64| {
+            let most = self.settings.across_lean_max_deg.to_radians();
+            libm::atan(push_m_s2 * situation.mass_kg() / thrust_n.max(1.0)).clamp(-most, most)
+        };
+        let air_m_s2 = situation.air_m_s2(state);
+        let decay = self.settings.across_decay_per_s;
+        let lean = |direction: &Vector3<f64>| {
+            libm::tan(level_m_s2(-decay * state.velocity_m_s.dot(direction) - air_m_s2.dot(direction)))
+        };
+        let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
+        let Some(flown) = flown else {
+            // Upright, and no faster sideways than can be helped.
+            let nose = Vector3::z() + Vector3::x() * lean(&Vector3::x()) + Vector3::y() * lean(&Vector3::y());
+            return Aim::at(nose / nose.norm());
+        };
+        let (theta_rad, q_rad_s, turning_rad_s2) = flown.elevation(time_s);
+        Aim {
+            nose_in_world: flown.plane.nose(theta_rad, lean(&flown.plane.across)),
+            rate_in_world_rad_s: flown.plane.turning(q_rad_s),
+            acceleration_in_world_rad_s2: flown.plane.turning(turning_rad_s2),
+        }
+    }
+
+    /// From now on only the upright law flies.
+    pub fn degrade(&mut self) {
+        self.flown = None;
+        self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+    }
+}
+
+impl Flown {
+    fn left_s(&self, time_s: f64) -> f64 {
+        self.begins_s + self.plan.final_time_s - time_s
+    }
+
+    /// Elevation, its rate and its acceleration at a time; upright at rest after the plan's end.
+    fn elevation(&self, time_s: f64) -> (f64, f64, f64) {
+        let solution = &self.plan.solution;
+        let since_s = (time_s - self.begins_s).max(0.0);
+        let k = (since_s / solution.step_s) as usize;
+        let planned = solution.states.get(k).zip(solution.inputs_rad.get(k)).zip(self.turning_rad_s2.get(k));
+        let Some(((state, input_rad), turning)) = planned else {
+            return (FRAC_PI_2, 0.0, 0.0);
+        };
+        let along_s = since_s - k as f64 * solution.step_s;
+        let acceleration = -turning * libm::sin(*input_rad);
+        (
+            state.theta_rad + along_s * (state.q_rad_s + 0.5 * along_s * acceleration),
+            state.q_rad_s + along_s * acceleration,
+            acceleration,
+        )
+    }
+}

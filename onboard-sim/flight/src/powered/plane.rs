@@ -1,0 +1,111 @@
+//! The vertical plane a landing is planned in.
+
+use core::f64::consts::FRAC_PI_2;
+
+use nalgebra::Vector3;
+
+use crate::dynamics::PlanarState;
+use crate::rigid::RigidState;
+
+/// Slower than this sideways, the wind chooses the plane, m/s.
+const CHOOSING_SPEED_M_S: f64 = 1.0;
+
+/// A vertical plane through the pad's axis, and what lies across it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// Horizontal direction in the plane, of length 1.
+    pub along: Vector3<f64>,
+    /// Horizontal direction across it: up cross along.
+    pub across: Vector3<f64>,
+}
+
+impl Plane {
+    /// The plane that needs the most doing: that of the horizontal velocity, or of the wind if there is hardly any, or
+    /// the world's x-z plane in a calm.
+    pub fn choose(velocity_m_s: &Vector3<f64>, wind_m_s: &Vector3<f64>) -> Self {
+        let level = |vector: &Vector3<f64>| Vector3::new(vector.x, vector.y, 0.0);
+        let directions = [level(velocity_m_s), level(wind_m_s)];
+        let along = directions
+            .iter()
+            .find(|direction| direction.norm() > CHOOSING_SPEED_M_S)
+            .map_or_else(Vector3::x, |direction| direction / direction.norm());
+        Self { along, across: Vector3::z().cross(&along) }
+    }
+
+    /// The motion in the plane, through air that moves with `wind_m_s` along it; positions are the ground's, with the
+    /// feet's height above the ground for altitude.
+    ///
+    /// The nose's component across the plane is left out: elevation and rate are those of its projection.
+    pub fn project(&self, state: &RigidState, feet_below_cg_m: f64, wind_m_s: f64) -> PlanarState {
+        let nose = state.nose_in_world();
+        let theta_rad = libm::atan2(nose.z, nose.dot(&self.along));
+        let (sin, cos) = libm::sincos(theta_rad);
+        let along_m_s = state.velocity_m_s.dot(&self.along) - wind_m_s;
+        let up_m_s = state.velocity_m_s.z;
+        // Elevation grows with a rotation about minus the across axis.
+        let rate = state.world_from_body * state.rate_rad_s;
+        PlanarState {
+            x_m: state.position_m.dot(&self.along),
+            z_m: state.position_m.z - feet_below_cg_m,
+            theta_rad,
+            u_m_s: along_m_s * cos + up_m_s * sin,
+            w_m_s: along_m_s * sin - up_m_s * cos,
+            q_rad_s: -rate.dot(&self.across),
+        }
+    }
+
+    /// The nose's direction at an elevation in the plane, leaning across it by a tangent.
+    pub fn nose(&self, theta_rad: f64, across_tangent: f64) -> Vector3<f64> {
+        let (sin, cos) = libm::sincos(theta_rad);
+        let nose = self.along * cos + Vector3::z() * sin + self.across * across_tangent;
+        nose / nose.norm()
+    }
+
+    /// The world's rotation vector of an elevation's rate (or acceleration).
+    pub fn turning(&self, elevation_rate: f64) -> Vector3<f64> {
+        self.across * -elevation_rate
+    }
+
+    /// What stands still on the ground, upright, in the frame of air that moves with `wind_m_s` along the plane.
+    pub fn rest(wind_m_s: f64) -> PlanarState {
+        PlanarState { theta_rad: FRAC_PI_2, w_m_s: -wind_m_s, ..PlanarState::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worlds_own_plane_gives_the_planar_state_back() {
+        let planar =
+            PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.2, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: 0.3 };
+        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros());
+        let found = plane.project(&RigidState::from(planar), 0.0, 0.0);
+        for (found, put) in found.to_array().iter().zip(planar.to_array()) {
+            assert!((found - put).abs() < 1e-12, "{found} for {put}");
+        }
+        let nose = plane.nose(1.2, 0.0);
+        assert!((nose - RigidState::from(planar).nose_in_world()).norm() < 1e-12);
+        let turning = RigidState::from(planar).world_from_body * Vector3::new(0.0, 0.3, 0.0);
+        assert!((plane.turning(0.3) - turning).norm() < 1e-12);
+    }
+
+    #[test]
+    fn it_follows_the_velocity_first_and_the_wind_then() {
+        let plane = Plane::choose(&Vector3::new(0.0, -3.0, -40.0), &Vector3::new(9.0, 0.0, 0.0));
+        assert!((plane.along - -Vector3::y()).norm() < 1e-15);
+        let plane = Plane::choose(&Vector3::new(0.0, -0.3, -40.0), &Vector3::new(9.0, 0.0, 0.0));
+        assert!((plane.along - Vector3::x()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn resting_on_the_ground_is_moving_through_the_wind() {
+        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros());
+        let standing = plane.project(&RigidState::upright(0.58), 0.58, 4.0);
+        let rest = Plane::rest(4.0);
+        for (standing, rest) in standing.to_array().iter().zip(rest.to_array()) {
+            assert!((standing - rest).abs() < 1e-12);
+        }
+    }
+}
