@@ -8,6 +8,7 @@
 //! * [`phase`]: the flight phases and the one table that moves between them.
 //! * [`arming`] and [`gate`]: the checks before arming and before ignition, each with the value found.
 //! * [`rigid`]: the state of a rocket in space, and its frames.
+//! * [`estimator`]: the state and the wind, from the sensors.
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`nmpc`]: the landing optimal-control problem and its solver.
 //! * [`stabiliser`]: the upright law that flies when no plan can be had.
@@ -22,6 +23,7 @@ pub mod arming;
 pub mod check;
 pub mod controller;
 pub mod dynamics;
+pub mod estimator;
 pub mod gate;
 pub mod nmpc;
 pub mod phase;

@@ -1,0 +1,139 @@
+//! Finding the start on the pad: at rest, the accelerometer feels which way is up and the gyro feels its own bias.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::ImuSample;
+use crate::rigid::upright;
+
+/// Fewest samples that give a start: one second at 200 Hz.
+const FEWEST: u32 = 200;
+/// Largest mean rate of a vehicle at rest, rad/s: the turn-on bias of a hobby gyro and some margin.
+const STILL_RAD_S: f64 = 0.017;
+
+/// Running means over the samples taken at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PadAlignment {
+    samples: u32,
+    gyro_rad_s: Vector3<f64>,
+    specific_force_m_s2: Vector3<f64>,
+}
+
+/// Why there is no start yet.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum AlignmentError {
+    /// Too few samples.
+    #[error("{found} samples at rest, {FEWEST} are needed")]
+    TooShort {
+        /// How many there are.
+        found: u32,
+    },
+    /// The mean rate is too large for a vehicle at rest.
+    #[error("turns at {found_deg_s:.2} deg/s, at rest is below 0.97 deg/s")]
+    Turning {
+        /// The mean rate, deg/s.
+        found_deg_s: f64,
+    },
+    /// The mean specific force is not gravity's.
+    #[error("feels {found_m_s2:.2} m/s^2, at rest is 9.3 to 10.3 m/s^2")]
+    NotAtRest {
+        /// Its length, m/s^2.
+        found_m_s2: f64,
+    },
+}
+
+/// What the pad told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PadStart {
+    /// The attitude, with the heading that was given.
+    pub world_from_body: UnitQuaternion<f64>,
+    /// The gyro's bias, body, rad/s: to be taken from every later sample.
+    pub gyro_bias_rad_s: Vector3<f64>,
+}
+
+impl PadAlignment {
+    /// Takes one sample; one that is not a number is left out.
+    pub fn take(&mut self, imu: &ImuSample) {
+        if !imu.is_finite() {
+            return;
+        }
+        self.samples = self.samples.saturating_add(1);
+        let share = 1.0 / f64::from(self.samples);
+        self.gyro_rad_s += (imu.gyro_rad_s - self.gyro_rad_s) * share;
+        self.specific_force_m_s2 += (imu.specific_force_m_s2 - self.specific_force_m_s2) * share;
+    }
+
+    /// The start, for a heading about the vertical, rad: 0 is [`upright`].
+    ///
+    /// # Errors
+    /// When the samples are too few, or not those of a vehicle at rest.
+    pub fn finish(&self, heading_rad: f64) -> Result<PadStart, AlignmentError> {
+        if self.samples < FEWEST {
+            return Err(AlignmentError::TooShort { found: self.samples });
+        }
+        let rate = self.gyro_rad_s.norm();
+        if rate > STILL_RAD_S {
+            return Err(AlignmentError::Turning { found_deg_s: rate.to_degrees() });
+        }
+        let felt = self.specific_force_m_s2.norm();
+        if !(9.3..=10.3).contains(&felt) {
+            return Err(AlignmentError::NotAtRest { found_m_s2: felt });
+        }
+        let headed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad) * upright();
+        let up_in_world = headed * self.specific_force_m_s2;
+        // The shortest turn that brings the felt direction to the vertical leaves the heading alone.
+        let lean = UnitQuaternion::rotation_between(&up_in_world, &Vector3::z())
+            .unwrap_or_else(UnitQuaternion::identity);
+        Ok(PadStart { world_from_body: lean * headed, gyro_bias_rad_s: self.gyro_rad_s })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at_rest(attitude: &UnitQuaternion<f64>) -> ImuSample {
+        ImuSample {
+            gyro_rad_s: Vector3::new(0.002, -0.003, 0.001),
+            specific_force_m_s2: attitude.inverse() * Vector3::new(0.0, 0.0, 9.80665),
+        }
+    }
+
+    #[test]
+    fn a_leaning_pad_is_found_and_its_heading_kept() {
+        let heading = 0.4;
+        let lean = UnitQuaternion::from_scaled_axis(Vector3::new(0.05, -0.03, 0.0));
+        let truth = lean * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * upright();
+        let mut alignment = PadAlignment::default();
+        for _ in 0..200 {
+            alignment.take(&at_rest(&truth));
+        }
+        let start = alignment.finish(heading).unwrap();
+        assert!(start.world_from_body.angle_to(&truth) < 1e-9, "{}", start.world_from_body.angle_to(&truth));
+        assert!((start.gyro_bias_rad_s - Vector3::new(0.002, -0.003, 0.001)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_vehicle_that_is_not_at_rest_is_refused_with_the_value_found() {
+        let good = at_rest(&upright());
+        let of = |imu: ImuSample, samples: u32| {
+            let mut alignment = PadAlignment::default();
+            for _ in 0..samples {
+                alignment.take(&imu);
+            }
+            alignment.finish(0.0).unwrap_err().to_string()
+        };
+        assert_eq!(of(good, 199), "199 samples at rest, 200 are needed");
+        assert_eq!(
+            of(ImuSample { gyro_rad_s: Vector3::new(0.0, 0.0, 0.05), ..good }, 300),
+            "turns at 2.86 deg/s, at rest is below 0.97 deg/s"
+        );
+        assert_eq!(
+            of(ImuSample { specific_force_m_s2: Vector3::new(12.0, 0.0, 0.0), ..good }, 300),
+            "feels 12.00 m/s^2, at rest is 9.3 to 10.3 m/s^2"
+        );
+        assert!(
+            of(ImuSample { gyro_rad_s: Vector3::new(f64::NAN, 0.0, 0.0), ..good }, 300)
+                .starts_with("0 samples")
+        );
+    }
+}

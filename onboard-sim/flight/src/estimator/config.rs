@@ -1,0 +1,188 @@
+//! How good the sensors are believed to be, as data. The defaults are a hobby-grade set: consumer inertial unit,
+//! barometer, single-frequency satellite receiver and a 12 m lidar.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+/// Standard gravity, m/s^2.
+pub const GRAVITY_M_S2: f64 = 9.80665;
+
+/// Noise of the sensors, and what else the filter believes. Standard deviations, unless the name says otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EstimatorConfig {
+    /// Length of one frame, s.
+    pub frame_s: f64,
+    /// Gravity, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Gyro noise density, deg/s/sqrt(Hz).
+    pub gyro_noise_deg_s_sqrt_hz: f64,
+    /// Wander of the gyro bias, deg/s in one second.
+    pub gyro_bias_walk_deg_s_sqrt_s: f64,
+    /// Accelerometer noise density, mg/sqrt(Hz).
+    pub accelerometer_noise_mg_sqrt_hz: f64,
+    /// Wander of the accelerometer bias, mg in one second. It covers the scale error as thrust comes and goes.
+    pub accelerometer_bias_walk_mg_sqrt_s: f64,
+    /// Barometer noise of one sample, m.
+    pub barometer_m: f64,
+    /// Wander of the barometer's offset, m in one second.
+    pub barometer_offset_walk_m_sqrt_s: f64,
+    /// Wander of the ram coefficient, in one second.
+    pub barometer_ram_walk_sqrt_s: f64,
+    /// White noise of a satellite position, horizontal, m.
+    pub gnss_horizontal_m: f64,
+    /// White noise of a satellite position, vertical, m.
+    pub gnss_vertical_m: f64,
+    /// Noise of a satellite velocity, m/s.
+    pub gnss_velocity_m_s: f64,
+    /// Wander of the satellite position's offset, horizontal, m in one second.
+    pub gnss_horizontal_walk_m_sqrt_s: f64,
+    /// Wander of the satellite position's offset, vertical, m in one second.
+    pub gnss_vertical_walk_m_sqrt_s: f64,
+    /// Lidar noise of one sample, m.
+    pub lidar_m: f64,
+    /// Wander of the wind at the vehicle, m/s in one second: gusts, and layers passed.
+    pub wind_walk_m_s_sqrt_s: f64,
+    /// Exponent of the wind's power law over height: the estimated wind dies down with it.
+    pub wind_shear_exponent: f64,
+    /// Doubt about the sideways aerodynamic force, as a share of it.
+    pub sideways_force_share: f64,
+    /// A measurement further from what was expected than this many standard deviations is left out.
+    pub gate_sigmas: f64,
+    /// Beyond these the estimate is called unhealthy.
+    pub health: HealthLimits,
+}
+
+/// Largest standard deviations of a healthy estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HealthLimits {
+    /// Velocity, any axis, m/s.
+    pub velocity_m_s: f64,
+    /// Height, m.
+    pub height_m: f64,
+    /// Horizontal position, either axis, m.
+    pub horizontal_m: f64,
+    /// Tilt, either axis, degrees.
+    pub tilt_deg: f64,
+}
+
+impl Default for EstimatorConfig {
+    fn default() -> Self {
+        Self {
+            frame_s: 0.005,
+            gravity_m_s2: GRAVITY_M_S2,
+            gyro_noise_deg_s_sqrt_hz: 0.05,
+            gyro_bias_walk_deg_s_sqrt_s: 0.002,
+            accelerometer_noise_mg_sqrt_hz: 0.65,
+            accelerometer_bias_walk_mg_sqrt_s: 0.6,
+            barometer_m: 0.08,
+            barometer_offset_walk_m_sqrt_s: 0.03,
+            barometer_ram_walk_sqrt_s: 0.001,
+            gnss_horizontal_m: 0.2,
+            gnss_vertical_m: 0.3,
+            gnss_velocity_m_s: 0.05,
+            gnss_horizontal_walk_m_sqrt_s: 0.15,
+            gnss_vertical_walk_m_sqrt_s: 0.25,
+            lidar_m: 0.06,
+            wind_walk_m_s_sqrt_s: 0.7,
+            wind_shear_exponent: 1.0 / 7.0,
+            sideways_force_share: 0.1,
+            gate_sigmas: 5.0,
+            health: HealthLimits::default(),
+        }
+    }
+}
+
+impl Default for HealthLimits {
+    fn default() -> Self {
+        Self { velocity_m_s: 0.5, height_m: 2.5, horizontal_m: 6.0, tilt_deg: 3.0 }
+    }
+}
+
+/// Standard deviations of the state the estimator starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartUncertainty {
+    /// Horizontal position, each axis, m.
+    pub horizontal_m: f64,
+    /// Height, m.
+    pub height_m: f64,
+    /// Velocity, each axis, m/s.
+    pub velocity_m_s: f64,
+    /// Lean, about each horizontal axis, degrees.
+    pub tilt_deg: f64,
+    /// Heading, about the vertical, degrees.
+    pub heading_deg: f64,
+    /// Gyro bias left after the calibration on the pad, each axis, deg/s.
+    pub gyro_bias_deg_s: f64,
+    /// Accelerometer bias, each axis, mg.
+    pub accelerometer_bias_mg: f64,
+    /// Wind, each horizontal axis, m/s.
+    pub wind_m_s: f64,
+    /// Barometer offset, m.
+    pub barometer_offset_m: f64,
+    /// Ram coefficient of the barometer: its error in height is this times the speed's height, `V^2 / 2 g`.
+    pub barometer_ram: f64,
+    /// Satellite position's offset since it was zeroed on the pad, horizontal, m.
+    pub gnss_horizontal_offset_m: f64,
+    /// Satellite position's offset since it was zeroed on the pad, vertical, m.
+    pub gnss_vertical_offset_m: f64,
+}
+
+impl StartUncertainty {
+    /// At rest on the pad after [`alignment`](super::alignment).
+    pub fn on_pad() -> Self {
+        Self {
+            horizontal_m: 0.05,
+            height_m: 0.02,
+            velocity_m_s: 0.01,
+            tilt_deg: 0.2,
+            heading_deg: 2.0,
+            gyro_bias_deg_s: 0.02,
+            accelerometer_bias_mg: 4.0,
+            wind_m_s: 4.0,
+            barometer_offset_m: 0.1,
+            barometer_ram: 0.05,
+            gnss_horizontal_offset_m: 0.1,
+            gnss_vertical_offset_m: 0.1,
+        }
+    }
+
+    /// At apogee, after an ascent of some 10 s that was estimated from the pad on.
+    pub fn at_apogee() -> Self {
+        Self {
+            horizontal_m: 0.7,
+            height_m: 0.5,
+            velocity_m_s: 0.15,
+            tilt_deg: 0.7,
+            heading_deg: 2.0,
+            gyro_bias_deg_s: 0.02,
+            accelerometer_bias_mg: 4.0,
+            wind_m_s: 4.0,
+            barometer_offset_m: 0.3,
+            barometer_ram: 0.05,
+            gnss_horizontal_offset_m: 0.7,
+            gnss_vertical_offset_m: 1.1,
+        }
+    }
+
+    /// Position's, each axis of the world, m.
+    pub(super) fn position_m(&self) -> Vector3<f64> {
+        Vector3::new(self.horizontal_m, self.horizontal_m, self.height_m)
+    }
+
+    /// Attitude's, about each axis of the world, rad.
+    pub(super) fn attitude_rad(&self) -> Vector3<f64> {
+        Vector3::new(self.tilt_deg, self.tilt_deg, self.heading_deg).map(f64::to_radians)
+    }
+
+    /// The satellite position's offset, each axis of the world, m.
+    pub(super) fn gnss_offset_m(&self) -> Vector3<f64> {
+        Vector3::new(
+            self.gnss_horizontal_offset_m,
+            self.gnss_horizontal_offset_m,
+            self.gnss_vertical_offset_m,
+        )
+    }
+}

@@ -1,0 +1,64 @@
+//! What one frame of the flight computer sees of the world. Plain data: a log of these flies the estimator again.
+
+use nalgebra::Vector3;
+
+/// Inertial measurement unit, the mean over the frame that has just ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuSample {
+    /// Rotation rate in body axes, rad/s.
+    pub gyro_rad_s: Vector3<f64>,
+    /// Acceleration less gravity at the centre of gravity, body axes, m/s^2.
+    pub specific_force_m_s2: Vector3<f64>,
+}
+
+impl ImuSample {
+    /// Every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.gyro_rad_s.iter().chain(self.specific_force_m_s2.iter()).all(|value| value.is_finite())
+    }
+}
+
+/// One fix of the satellite receiver. It arrives late: it tells where the vehicle was at `valid_at_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GnssFix {
+    /// Position in the world, relative to the pad, m.
+    pub position_m: Vector3<f64>,
+    /// Velocity in the world, m/s.
+    pub velocity_m_s: Vector3<f64>,
+    /// When this was so, s on the flight computer's clock.
+    pub valid_at_s: f64,
+}
+
+/// Everything one frame measured; what did not report is `None`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurements {
+    /// Every frame has one.
+    pub imu: ImuSample,
+    /// Height over the pad that the static pressure says, m, of the centre of gravity.
+    pub pressure_altitude_m: Option<f64>,
+    /// Satellite fix.
+    pub gnss: Option<GnssFix>,
+    /// Distance to the ground along body `-x` from the lidar, m.
+    pub lidar_range_m: Option<f64>,
+}
+
+/// What the flight computer knows about the vehicle this frame, and the estimator needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VehicleNow {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their force is along the
+    /// relative wind, so this counts sideways as well.
+    pub fin_drag_area_m2: f64,
+    /// Distance of the fins ahead of the centre of gravity, m.
+    pub fin_ahead_of_cg_m: f64,
+    /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that times the
+    /// dynamic pressure of the sideways wind alone.
+    pub crossflow_area_m2: f64,
+    /// The landing motor is lit. Its sideways force is not known well enough to feel the wind beside it.
+    pub motor_burning: bool,
+    /// Distance of the lidar behind the centre of gravity, m.
+    pub lidar_behind_cg_m: f64,
+}

@@ -1,0 +1,193 @@
+//! Corrections by the barometer, the satellites and the lidar, one scalar after the other.
+
+use super::covariance::{
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GYRO_BIAS, POSITION,
+    VELOCITY, WIND,
+};
+use super::{Estimator, GnssFix};
+
+/// Beyond this tilt a lidar range says little about the height: its cosine.
+const LIDAR_COS_TILT: f64 = 0.85;
+/// What the filter adds to its doubt when satellite velocities keep pulling one way: standard deviations.
+const DOUBT_VELOCITY_M_S: f64 = 0.5;
+const DOUBT_ATTITUDE_RAD: f64 = 0.02;
+const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.01;
+const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
+/// A barometer left out so often in a row has a new offset, m.
+const BAROMETER_REJECTIONS: u32 = 25;
+const DOUBT_BAROMETER_M: f64 = 3.0;
+/// Fixes left out so often in a row (three numbers each) mean that position is what is wrong, m.
+const POSITION_REJECTIONS: u32 = 9;
+const DOUBT_POSITION_M: f64 = 3.0;
+/// Ranges left out so often in a row mean that the height is what is wrong, m.
+const LIDAR_REJECTIONS: u32 = 10;
+
+/// What a scalar correction came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Correction {
+    /// Innovation squared over its variance; expected 1.
+    pub(super) normalised_squared: f64,
+    pub(super) accepted: bool,
+}
+
+impl Estimator {
+    /// Corrects by one scalar whose sensitivity to each error is given. Errors that are not `moved` are considered in
+    /// the variance, but held.
+    pub(super) fn correct(
+        &mut self,
+        sensitivity: &[(usize, f64)],
+        innovation: f64,
+        noise_variance: f64,
+        moved: impl Fn(usize) -> bool,
+    ) -> Correction {
+        self.catch_up();
+        let (seen, with) = self.covariance.project(sensitivity);
+        let variance = seen + noise_variance;
+        let normalised_squared = innovation * innovation / variance;
+        let gate = self.config.gate_sigmas * self.config.gate_sigmas;
+        // Written so that a number that is none is refused.
+        let accepted = normalised_squared <= gate && variance > 0.0;
+        if accepted {
+            let mut gain = with;
+            for (index, value) in gain.iter_mut().enumerate() {
+                *value = if moved(index) { *value / variance } else { 0.0 };
+            }
+            self.nominal.inject(&gain.map(|share| share * innovation));
+            self.covariance.update(&gain, &with, variance);
+        }
+        Correction { normalised_squared, accepted }
+    }
+
+    /// The barometer sees height, its own offset, and the ram error `-k V^2 / 2 g`.
+    pub(super) fn take_barometer(&mut self, altitude_m: f64) {
+        let gravity = self.config.gravity_m_s2;
+        let through_air = self.velocity_through_air_m_s();
+        let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
+        let state = &self.nominal;
+        let by_velocity = through_air * (-state.barometer_ram / gravity);
+        let predicted_m =
+            state.position_m.z + state.barometer_offset_m - state.barometer_ram * speed_height_m;
+        let sensitivity = [
+            (POSITION + 2, 1.0),
+            (VELOCITY, by_velocity.x),
+            (VELOCITY + 1, by_velocity.y),
+            (VELOCITY + 2, by_velocity.z),
+            (WIND, -by_velocity.x),
+            (WIND + 1, -by_velocity.y),
+            (BAROMETER_OFFSET, 1.0),
+            (BAROMETER_RAM, -speed_height_m),
+        ];
+        let noise = self.config.barometer_m * self.config.barometer_m;
+        let correction = self.correct(&sensitivity, altitude_m - predicted_m, noise, |_| true);
+        self.gates.barometer.count(correction.accepted);
+        if altitude_m.is_finite() {
+            let state = &self.nominal;
+            self.heights
+                .take_barometer(altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m);
+        }
+        if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
+            self.gates.barometer.rejected_in_a_row = 0;
+            self.covariance.widen(BAROMETER_OFFSET, DOUBT_BAROMETER_M * DOUBT_BAROMETER_M);
+        }
+    }
+
+    /// A fix sees position and velocity as they were, and the position's slow offset.
+    pub(super) fn take_gnss(&mut self, fix: &GnssFix) {
+        self.catch_up();
+        for axis in 0..3 {
+            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+                self.gates.gnss_velocity.count(false);
+                continue;
+            };
+            // The velocity then was the velocity now less what was gained, and that was gained along an attitude
+            // and with an accelerometer bias that have errors of their own.
+            let felt = since.gained_m_s + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
+            let by_attitude = felt.cross_matrix();
+            let by_bias = self.nominal.world_from_body.to_rotation_matrix().into_inner() * since.age_s;
+            let sensitivity = [
+                (VELOCITY + axis, 1.0),
+                (ATTITUDE, by_attitude[(axis, 0)]),
+                (ATTITUDE + 1, by_attitude[(axis, 1)]),
+                (ATTITUDE + 2, by_attitude[(axis, 2)]),
+                (ACCELEROMETER_BIAS, by_bias[(axis, 0)]),
+                (ACCELEROMETER_BIAS + 1, by_bias[(axis, 1)]),
+                (ACCELEROMETER_BIAS + 2, by_bias[(axis, 2)]),
+            ];
+            let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
+            let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s;
+            let correction = self.correct(&sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
+            self.gates.gnss_velocity.count(correction.accepted);
+            if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
+            {
+                self.doubt_motion();
+            }
+        }
+        for axis in 0..3 {
+            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+                self.gates.gnss_position.count(false);
+                continue;
+            };
+            let sensitivity =
+                [(POSITION + axis, 1.0), (VELOCITY + axis, -since.age_s), (GNSS_OFFSET + axis, 1.0)];
+            let predicted =
+                self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
+            let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
+            let correction =
+                self.correct(&sensitivity, fix.position_m[axis] - predicted, sigma * sigma, |_| true);
+            self.gates.gnss_position.count(correction.accepted);
+            if axis == 2 && fix.position_m.z.is_finite() {
+                self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z);
+            }
+        }
+        if self.gates.gnss_position.rejected_in_a_row >= POSITION_REJECTIONS {
+            self.gates.gnss_position.rejected_in_a_row = 0;
+            for axis in 0..3 {
+                self.covariance.widen(POSITION + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
+                self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
+            }
+        }
+    }
+
+    /// The lidar looks along body `-x` from its distance behind the centre of gravity: range and distance together
+    /// are the height over the cosine of the tilt.
+    pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
+        let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
+        if !(nose.z > LIDAR_COS_TILT) {
+            self.gates.lidar.count(false);
+            return;
+        }
+        let slant_m = self.nominal.position_m.z / nose.z;
+        let sensitivity = [
+            (POSITION + 2, 1.0 / nose.z),
+            (ATTITUDE, -slant_m / nose.z * nose.y),
+            (ATTITUDE + 1, slant_m / nose.z * nose.x),
+        ];
+        let measured_m = range_m + behind_cg_m;
+        let noise = self.config.lidar_m * self.config.lidar_m;
+        let correction = self.correct(&sensitivity, measured_m - slant_m, noise, |_| true);
+        self.gates.lidar.count(correction.accepted);
+        if measured_m.is_finite() {
+            self.heights.take_lidar(&self.config, measured_m * nose.z, nose.z);
+        }
+        if self.gates.lidar.rejected_in_a_row >= LIDAR_REJECTIONS {
+            self.gates.lidar.rejected_in_a_row = 0;
+            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
+        }
+    }
+
+    /// Satellite velocities keep pulling one way: the inertial unit must have changed.
+    fn doubt_motion(&mut self) {
+        self.surprised_at_s = self.time_s();
+        for axis in 0..3 {
+            let widen = [
+                (VELOCITY, DOUBT_VELOCITY_M_S),
+                (ATTITUDE, DOUBT_ATTITUDE_RAD),
+                (GYRO_BIAS, DOUBT_GYRO_BIAS_RAD_S),
+                (ACCELEROMETER_BIAS, DOUBT_ACCELEROMETER_BIAS_M_S2),
+            ];
+            for (first, sigma) in widen {
+                self.covariance.widen(first + axis, sigma * sigma);
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The sensors against their own figures.
+
+use super::*;
+
+fn falling(speed_m_s: f64, height_m: f64) -> SensorTruth {
+    let mut state = RigidState::upright(height_m);
+    state.velocity_m_s.z = -speed_m_s;
+    SensorTruth {
+        state,
+        specific_force_m_s2: Vector3::new(9.8, 0.1, -0.2),
+        airspeed_m_s: speed_m_s,
+        cg_over_feet_m: 0.6,
+    }
+}
+
+fn frames(seed: u64, truth: &SensorTruth, faults: &SensorFaults, frames: usize) -> Vec<Measurements> {
+    let mut sensors = Sensors::new(&SensorParams::default(), seed, 0.0).unwrap();
+    let steps = frames * FRAME_MS as usize;
+    (0..steps).filter_map(|_| sensors.observe(truth, faults)).collect()
+}
+
+#[test]
+fn rates_are_the_sensors_own() {
+    let seen = frames(1, &falling(10.0, 5.0), &SensorFaults::default(), 400);
+    assert_eq!(seen.len(), 400);
+    assert_eq!(seen.iter().filter(|m| m.pressure_altitude_m.is_some()).count(), 100);
+    assert_eq!(seen.iter().filter(|m| m.lidar_range_m.is_some()).count(), 200);
+    assert!((9..=10).contains(&seen.iter().filter(|m| m.gnss.is_some()).count()));
+}
+
+#[test]
+fn a_fix_is_120_ms_old_at_the_frame_that_gets_it() {
+    let seen = frames(2, &falling(10.0, 5.0), &SensorFaults::default(), 400);
+    for (frame, measurements) in seen.iter().enumerate() {
+        if let Some(fix) = measurements.gnss {
+            let age_s = (frame + 1) as f64 * 0.005 - fix.valid_at_s;
+            assert!((0.12 - 1e-9..0.125).contains(&age_s), "{age_s}");
+        }
+    }
+}
+
+#[test]
+fn the_lidar_is_silent_high_up_and_on_its_side() {
+    let lidar_of = |truth: &SensorTruth| {
+        frames(3, truth, &SensorFaults::default(), 100)
+            .iter()
+            .filter_map(|m| m.lidar_range_m)
+            .collect::<Vec<_>>()
+    };
+    assert!(lidar_of(&falling(5.0, 13.0)).is_empty());
+    let mut leaning = falling(5.0, 5.0);
+    let lean = |deg: f64| nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), deg.to_radians());
+    leaning.state.world_from_body = lean(26.0) * flight::rigid::upright();
+    assert!(lidar_of(&leaning).is_empty());
+    leaning.state.world_from_body = lean(20.0) * flight::rigid::upright();
+    let ranges = lidar_of(&leaning);
+    // 5 m / cos 20 deg - (0.6 - 0.15) m.
+    let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
+    assert!((mean - 4.870_889).abs() < 4.0 * 0.06 / (ranges.len() as f64).sqrt(), "{mean}");
+}
+
+#[test]
+fn a_fault_silences_its_sensor_and_moves_no_other_noise() {
+    let truth = falling(10.0, 5.0);
+    let healthy = frames(4, &truth, &SensorFaults::default(), 400);
+    let step = Vector3::new(0.1, 0.0, -0.2);
+    let faults = SensorFaults { gnss_out: true, gyro_bias_step_rad_s: step, ..SensorFaults::default() };
+    let broken = frames(4, &truth, &faults, 400);
+    for (well, ill) in healthy.iter().zip(&broken) {
+        assert!(ill.gnss.is_none());
+        assert_eq!(ill.pressure_altitude_m, well.pressure_altitude_m);
+        assert_eq!(ill.lidar_range_m, well.lidar_range_m);
+        assert_eq!(ill.imu.specific_force_m_s2, well.imu.specific_force_m_s2);
+        assert!((ill.imu.gyro_rad_s - well.imu.gyro_rad_s - step).norm() < 1e-12);
+    }
+    let silent = SensorFaults { barometer_out: true, lidar_out: true, ..SensorFaults::default() };
+    assert!(
+        frames(4, &truth, &silent, 400)
+            .iter()
+            .all(|m| m.pressure_altitude_m.is_none() && m.lidar_range_m.is_none())
+    );
+}
+
+#[test]
+fn noise_has_the_stated_size_and_a_seed_repeats_it() {
+    let truth = falling(30.0, 200.0);
+    let seen = frames(5, &truth, &SensorFaults::default(), 4000);
+    assert_eq!(seen, frames(5, &truth, &SensorFaults::default(), 4000));
+    assert_ne!(seen, frames(6, &truth, &SensorFaults::default(), 4000));
+    let spread = |values: Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+        (squares / values.len() as f64).sqrt()
+    };
+    // Densities over the square root of a frame's 5 ms; four standard errors of 4,000 samples are 4.5 %.
+    let gyro = spread(seen.iter().map(|m| m.imu.gyro_rad_s.x).collect());
+    assert!((gyro.to_degrees() / 0.707_107 - 1.0).abs() < 0.045, "{gyro}");
+    let force = spread(seen.iter().map(|m| m.imu.specific_force_m_s2.y).collect());
+    assert!((force / 0.090_147 - 1.0).abs() < 0.045, "{force}");
+}
+
+#[test]
+fn over_many_flights_the_ram_error_has_its_size() {
+    // 30 m/s is 45.89 m of speed height: 2.29 m of sigma, and 0.3 m of offset.
+    let n = 300;
+    let squares: f64 = (0..n)
+        .map(|seed| {
+            let seen = frames(seed, &falling(30.0, 200.0), &SensorFaults::default(), 4);
+            let error = seen.last().and_then(|m| m.pressure_altitude_m).map_or(f64::NAN, |m| m - 200.0);
+            error * error
+        })
+        .sum();
+    let sigma = (squares / n as f64).sqrt();
+    assert!((sigma / 2.316 - 1.0).abs() < 4.0 / (2.0 * n as f64).sqrt(), "{sigma}");
+}
