@@ -26,7 +26,7 @@ impl PlanarModel {
         let [_, _, theta, u, w, q] = *state;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2, .. } =
             self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let mut jacobian = [[0.0; 7]; 6];
@@ -40,16 +40,22 @@ impl PlanarModel {
         jacobian[1][W] = -sign * ct;
         jacobian[2][Q] = 1.0;
 
-        let (drag_u, drag_w) = match self.kind {
+        let PlanarParams { lateral_drag_per_m, crossflow_per_m, .. } = self.params;
+        let (drag_u, drag_w, across_u, across_w) = match self.kind {
             ModelKind::Consistent => {
                 let speed = libm::sqrt(u * u + w * w);
                 if speed > REST_SPEED_M_S {
-                    (-drag_per_m * (speed + u * u / speed), -drag_per_m * u * w / speed)
+                    (
+                        -drag_per_m * (speed + u * u / speed),
+                        -drag_per_m * u * w / speed,
+                        -lateral_drag_per_m * u * w / speed,
+                        -lateral_drag_per_m * (speed + w * w / speed) - 2.0 * crossflow_per_m * w.abs(),
+                    )
                 } else {
-                    (0.0, 0.0)
+                    (0.0, 0.0, 0.0, 0.0)
                 }
             }
-            ModelKind::AsPrinted => (2.0 * drag_per_m * u, 2.0 * drag_per_m * w),
+            ModelKind::AsPrinted => (2.0 * drag_per_m * u, 2.0 * drag_per_m * w, 0.0, 0.0),
         };
         jacobian[3][THETA] = -gravity_m_s2 * ct;
         jacobian[3][U] = drag_u;
@@ -58,7 +64,8 @@ impl PlanarModel {
         jacobian[3][DELTA] = -thrust_m_s2 * sd;
 
         jacobian[4][THETA] = -gravity_m_s2 * st;
-        jacobian[4][U] = q;
+        jacobian[4][U] = q + across_u;
+        jacobian[4][W] = across_w;
         jacobian[4][Q] = u;
         jacobian[4][DELTA] = -thrust_m_s2 * cd;
 
@@ -78,7 +85,7 @@ impl PlanarModel {
         let [wx, wz, _, wu, ww, wq] = *weights;
         let (st, ct) = libm::sincos(theta);
         let (sd, cd) = libm::sincos(gimbal_rad);
-        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2, .. } =
             self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let sign = self.lateral_sign();
@@ -103,7 +110,12 @@ impl PlanarModel {
                     let (a, b) = (u / speed, w / speed);
                     hessian[U][U] -= scale * a * (3.0 - a * a);
                     hessian[W][W] -= scale * a * (1.0 - b * b);
-                    set(&mut hessian, U, W, -scale * b * (1.0 - a * a));
+                    let across = ww * self.params.lateral_drag_per_m;
+                    hessian[U][U] -= across * b * (1.0 - a * a);
+                    hessian[W][W] -= across * b * (3.0 - b * b);
+                    set(&mut hessian, U, W, -scale * b * (1.0 - a * a) - across * a * (1.0 - b * b));
+                    // The crossflow's second derivative changes sign with w.
+                    hessian[W][W] -= ww * 2.0 * self.params.crossflow_per_m * w.signum();
                 }
             }
             ModelKind::AsPrinted => {

@@ -9,12 +9,16 @@
 //! z'     = u sin(theta) - w cos(theta)
 //! theta' = q
 //! u'     = (T/m) cos(delta) - (rho S Cx / 2m) V u - g sin(theta) - q w
-//! w'     = -(T/m) sin(delta) + g cos(theta) + q u
+//! w'     = -(T/m) sin(delta) - k V w - c |w| w + g cos(theta) + q u
 //! q'     = -T sin(delta) (X_CG - X_THR) / I_y
 //! ```
 //!
 //! This is the landing paper (`EuroGNC`), Eq. 18-22, put into one frame and with forces divided by mass; see
-//! [`ModelKind`] for the printed set.
+//! [`ModelKind`] for the printed set. The paper has no air force across the body (`k = c = 0`). A vehicle at speed
+//! has two: the drag of what is as wide as long (`k`), and the crossflow about a slender body, which depends on the
+//! velocity across it alone (`c`; Allen and Perkins, NACA Report 1048, 1951).
+//!
+//! In wind, let the frame move with the air: `(u, w)` and the positions are then relative to it.
 
 mod derivatives;
 
@@ -79,6 +83,10 @@ pub struct PlanarParams {
     pub thrust_arm_m: f64,
     /// `rho S Cx / 2m`: drag deceleration per squared speed, 1/m.
     pub drag_per_m: f64,
+    /// `k`, deceleration across the body per speed and speed across, 1/m; the printed set has none.
+    pub lateral_drag_per_m: f64,
+    /// `c`, deceleration across the body per squared speed across, 1/m; the printed set has none.
+    pub crossflow_per_m: f64,
     /// Gravity, m/s^2.
     pub gravity_m_s2: f64,
 }
@@ -94,7 +102,22 @@ impl PlanarParams {
             thrust_arm_m: vehicle.thrust_arm_m(),
             drag_per_m: environment.air_density_kg_m3 * vehicle.reference_area_m2 * vehicle.drag_coefficient
                 / (2.0 * vehicle.mass_kg),
+            lateral_drag_per_m: 0.0,
+            crossflow_per_m: 0.0,
             gravity_m_s2: environment.gravity_m_s2,
+        }
+    }
+
+    /// The same vehicle at another mass: the air forces are what they were, inertia and centre of gravity too.
+    #[must_use]
+    pub fn with_mass(self, mass_kg: f64) -> Self {
+        let lightness = self.mass_kg / mass_kg;
+        Self {
+            mass_kg,
+            drag_per_m: self.drag_per_m * lightness,
+            lateral_drag_per_m: self.lateral_drag_per_m * lightness,
+            crossflow_per_m: self.crossflow_per_m * lightness,
+            ..self
         }
     }
 }
@@ -114,30 +137,42 @@ impl PlanarModel {
         Self { params: PlanarParams::from_profile(profile), kind: profile.nmpc.model }
     }
 
+    /// The same model of the vehicle at another mass.
+    #[must_use]
+    pub fn with_mass(self, mass_kg: f64) -> Self {
+        Self { params: self.params.with_mass(mass_kg), ..self }
+    }
+
     /// Time derivative of the state (x, z, theta, u, w, q), SI and radians.
     pub fn derivative(&self, state: &[f64; 6], gimbal_rad: f64, thrust_n: f64) -> [f64; 6] {
         let [_, _, theta, u, w, q] = *state;
         let (sin_theta, cos_theta) = libm::sincos(theta);
         let (sin_delta, cos_delta) = libm::sincos(gimbal_rad);
-        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2 } =
+        let PlanarParams { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2, .. } =
             self.params;
         let thrust_m_s2 = thrust_n / mass_kg;
         let speed = libm::sqrt(u * u + w * w);
-        let (x_dot, z_dot, drag_m_s2) = match self.kind {
-            ModelKind::Consistent => {
-                (u * cos_theta + w * sin_theta, u * sin_theta - w * cos_theta, -drag_per_m * speed * u)
-            }
+        let (x_dot, z_dot, drag_m_s2, across_m_s2) = match self.kind {
+            ModelKind::Consistent => (
+                u * cos_theta + w * sin_theta,
+                u * sin_theta - w * cos_theta,
+                -drag_per_m * speed * u,
+                -(self.params.lateral_drag_per_m * speed + self.params.crossflow_per_m * w.abs()) * w,
+            ),
             // Eq. 22's rotation, and Eq. 18's drag, which is always towards the nose.
-            ModelKind::AsPrinted => {
-                (u * cos_theta - w * sin_theta, u * sin_theta + w * cos_theta, drag_per_m * speed * speed)
-            }
+            ModelKind::AsPrinted => (
+                u * cos_theta - w * sin_theta,
+                u * sin_theta + w * cos_theta,
+                drag_per_m * speed * speed,
+                0.0,
+            ),
         };
         [
             x_dot,
             z_dot,
             q,
             thrust_m_s2 * cos_delta + drag_m_s2 - gravity_m_s2 * sin_theta - q * w,
-            -thrust_m_s2 * sin_delta + gravity_m_s2 * cos_theta + q * u,
+            -thrust_m_s2 * sin_delta + gravity_m_s2 * cos_theta + q * u + across_m_s2,
             -thrust_n * sin_delta * thrust_arm_m / pitch_inertia_kg_m2,
         ]
     }

@@ -12,17 +12,18 @@ const SUB_STEPS: usize = 20;
 /// The vertical acceleration is largest upright with the nozzle straight, all the thrust working against the weight.
 /// So the path that is upright from now on sinks slowest at every instant and reaches the ground last, and no other
 /// touches down slower than it ever sinks. Left out is the drag of sideways flight, below one thousandth of gravity
-/// at these speeds; turning upright costs time that the bound does not count.
+/// at the landing paper's speeds; turning upright costs time that the bound does not count.
 pub fn best_touchdown_speed_m_s(problem: &Problem) -> f64 {
     let (_, vertical_m_s) = problem.initial.ground_velocity_m_s();
     let mut state = Upright { z_m: problem.initial.z_m, sink_m_s: -vertical_m_s };
     let mut slowest_m_s = state.sink_m_s;
     let sub_step_s = problem.step_s / SUB_STEPS as f64;
-    for thrust_n in &problem.thrust_n {
+    for (k, thrust_n) in problem.thrust_n.iter().enumerate() {
+        let params = problem.model_at(k).params;
         if state.z_m <= 0.0 || slowest_m_s <= 0.0 {
             return slowest_m_s.max(0.0);
         }
-        let after = state.after(&problem.model.params, *thrust_n, problem.step_s);
+        let after = state.after(&params, *thrust_n, problem.step_s);
         if after.z_m > 0.0 {
             state = after;
         } else {
@@ -31,7 +32,7 @@ pub fn best_touchdown_speed_m_s(problem: &Problem) -> f64 {
                 if state.z_m <= 0.0 || slowest_m_s <= 0.0 {
                     return slowest_m_s.max(0.0);
                 }
-                state = state.after(&problem.model.params, *thrust_n, sub_step_s);
+                state = state.after(&params, *thrust_n, sub_step_s);
             }
         }
         slowest_m_s = slowest_m_s.min(state.sink_m_s);

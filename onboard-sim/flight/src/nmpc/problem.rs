@@ -11,6 +11,9 @@ use crate::profile::{FinalBox, Profile, SolverLimits};
 /// `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other states there (the paper's Table 2)
 /// and `z >= altitude_min_m` at every node before it. The conditions on states are exact penalties, so the problem
 /// always has a solution.
+///
+/// Cost and end are about a [`target`](Self::target), upright and at rest at the origin in the paper. In the frame
+/// that moves with the wind it is what stands still on the ground: upright, it has a `w` of minus the wind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// The dynamics.
@@ -21,13 +24,18 @@ pub struct Problem {
     pub step_s: f64,
     /// Thrust in each interval, N; its length is the number of intervals.
     pub thrust_n: Vec<f64>,
-    /// Weights of (x, z, theta - pi/2, u, w, q).
+    /// Mass in each interval, kg, which scales thrust and air forces; empty for the model's own throughout.
+    pub mass_kg: Vec<f64>,
+    /// What cost and end conditions are about: running cost, horizontal distance and height at the end, and the box
+    /// there in pitch, `w` and pitch rate. The box in `u` stands as it is.
+    pub target: PlanarState,
+    /// Weights of the deviations from the target, in state order.
     pub state_weights: [f64; 6],
     /// Weight of the gimbal angle.
     pub input_weight: f64,
     /// Largest gimbal angle on either side, rad.
     pub gimbal_limit_rad: f64,
-    /// Largest horizontal distance at the end, m.
+    /// Largest horizontal distance from the target at the end, m.
     pub x_final_m: f64,
     /// Box the other states end in.
     pub final_box: Option<FinalBox>,
@@ -91,6 +99,8 @@ impl Problem {
             initial,
             step_s: nmpc.sample_time_s,
             thrust_n: Vec::new(),
+            mass_kg: Vec::new(),
+            target: PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() },
             state_weights: nmpc.weights.state_diagonal(),
             input_weight: nmpc.weights.delta,
             gimbal_limit_rad: nmpc.limits.gimbal_rad(),
@@ -122,6 +132,11 @@ impl Problem {
             (0..intervals)
                 .map(|k| thrust_scale * profile.motor.mean_thrust_n(starts_s + k as f64 * step_s, step_s)),
         );
+    }
+
+    /// The model in interval `k`, at the mass it has there.
+    pub fn model_at(&self, k: usize) -> PlanarModel {
+        self.mass_kg.get(k).map_or(self.model, |mass_kg| self.model.with_mass(*mass_kg))
     }
 
     /// Number of intervals.
@@ -182,30 +197,35 @@ impl Problem {
         let between = |node, component, lowest, highest| {
             [at_least(node, component, lowest), at_most(node, component, highest)]
         };
-        conditions.push(Condition { equality: true, ..at_least(end, Z, 0.0) });
-        conditions.extend(between(end, X, -self.x_final_m, self.x_final_m));
+        let about = |node, component, centre: f64, reach: f64| {
+            between(node, component, centre - reach, centre + reach)
+        };
+        let target = &self.target;
+        conditions.push(Condition { equality: true, ..at_least(end, Z, target.z_m) });
+        conditions.extend(about(end, X, target.x_m, self.x_final_m));
         if let Some(limits) = self.final_box {
             let tilt = limits.pitch_error_deg.to_radians();
             let rate = limits.pitch_rate_deg_s.to_radians();
             conditions.extend(between(end, U, limits.u_min_m_s, limits.u_max_m_s));
             // From the end backwards, so that a horizon too short for all of them keeps the order of the others.
             for node in (1..=end).rev().take(limits.settled_nodes) {
-                conditions.extend(between(node, THETA, FRAC_PI_2 - tilt, FRAC_PI_2 + tilt));
-                conditions.extend(between(node, W, -limits.w_m_s, limits.w_m_s));
-                conditions.extend(between(node, Q, -rate, rate));
+                conditions.extend(about(node, THETA, target.theta_rad, tilt));
+                conditions.extend(about(node, W, target.w_m_s, limits.w_m_s));
+                conditions.extend(about(node, Q, target.q_rad_s, rate));
             }
         }
     }
 
-    /// Deviation of a state from the target: upright, at rest, at the origin.
-    pub(super) fn deviation(state: &[f64; 6]) -> [f64; 6] {
-        let [x, z, theta, u, w, q] = *state;
-        [x, z, theta - FRAC_PI_2, u, w, q]
+    /// Deviation of a state from the target.
+    #[inline]
+    pub(super) fn deviation(&self, state: &[f64; 6]) -> [f64; 6] {
+        let target = self.target.to_array();
+        core::array::from_fn(|i| state[i] - target[i])
     }
 
     /// Running cost rate at a state and input.
     pub(super) fn cost_rate(&self, state: &[f64; 6], gimbal_rad: f64) -> f64 {
-        let deviation = Self::deviation(state);
+        let deviation = self.deviation(state);
         let state_part: f64 =
             self.state_weights.iter().zip(&deviation).map(|(weight, value)| weight * value * value).sum();
         0.5 * (state_part + self.input_weight * gimbal_rad * gimbal_rad)
@@ -216,7 +236,10 @@ impl Problem {
         self.initial.is_finite()
             && self.step_s.is_finite()
             && self.step_s > 0.0
+            && self.target.is_finite()
             && self.thrust_n.iter().all(|thrust| thrust.is_finite())
+            && (self.mass_kg.is_empty() || self.mass_kg.len() == self.intervals())
+            && self.mass_kg.iter().all(|mass| mass.is_finite() && *mass > 0.0)
             && self.gimbal_limit_rad.is_finite()
     }
 }

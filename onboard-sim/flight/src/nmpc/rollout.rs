@@ -21,18 +21,18 @@ pub struct Trajectory {
     pub cost: f64,
 }
 
-/// The states of the four RK4 stages of an interval and the state after it.
+/// The states of the four RK4 stages of interval `k` and the state after it.
 pub(super) fn stages(
     problem: &Problem,
+    k: usize,
     state: &[f64; 6],
     gimbal_rad: f64,
-    thrust_n: f64,
 ) -> ([[f64; 6]; 4], [f64; 6]) {
-    let step_s = problem.step_s;
+    let (step_s, thrust_n, model) = (problem.step_s, problem.thrust_n[k], problem.model_at(k));
     let mut points = [*state; 4];
     let mut next = *state;
     for stage in 0..4 {
-        let slope = problem.model.derivative(&points[stage], gimbal_rad, thrust_n);
+        let slope = model.derivative(&points[stage], gimbal_rad, thrust_n);
         if let Some(along_step) = STAGE_STEPS.get(stage) {
             points[stage + 1] = along(state, &slope, along_step * step_s);
         }
@@ -48,8 +48,8 @@ impl Trajectory {
         let mut states = Vec::with_capacity(inputs_rad.len() + 1);
         states.push(state);
         let mut cost = 0.0;
-        for (gimbal_rad, thrust_n) in inputs_rad.iter().zip(&problem.thrust_n) {
-            let (_, next) = stages(problem, &state, *gimbal_rad, *thrust_n);
+        for (k, gimbal_rad) in inputs_rad.iter().enumerate().take(problem.intervals()) {
+            let (_, next) = stages(problem, k, &state, *gimbal_rad);
             cost += problem.step_s * problem.cost_rate(&next, *gimbal_rad);
             state = next;
             states.push(state);

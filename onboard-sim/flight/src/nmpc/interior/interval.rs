@@ -4,6 +4,7 @@
 //! [`crate::dynamics`]. What the equations make simple is used:
 //!
 //! * Nothing depends on `x` and `z`: they are integrals, and no direction of differentiation.
+//! * Mass and thrust are held over an interval, and forces in the air scale with `m_0 / m`.
 //! * `q'` depends on `delta` alone, so `q` and `theta` of every stage are known in closed form, and of the tangents
 //!   only those of `u` and `w` are propagated (`tangent`).
 //!
@@ -37,9 +38,12 @@ const REST_SPEED_M_S: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Constants {
     pub(super) step_s: f64,
-    pub(super) inverse_mass: f64,
+    pub(super) mass_kg: f64,
     pub(super) arm_per_inertia: f64,
+    /// These three at the model's own mass.
     pub(super) drag_per_m: f64,
+    pub(super) lateral_drag_per_m: f64,
+    pub(super) crossflow_per_m: f64,
     pub(super) gravity_m_s2: f64,
     /// Sign of `w sin(theta)` in the horizontal velocity; -1 in the printed equations.
     pub(super) lateral: f64,
@@ -52,28 +56,48 @@ impl Constants {
         let printed = model.kind == ModelKind::AsPrinted;
         Self {
             step_s,
-            inverse_mass: 1.0 / params.mass_kg,
+            mass_kg: params.mass_kg,
             arm_per_inertia: params.thrust_arm_m / params.pitch_inertia_kg_m2,
             drag_per_m: params.drag_per_m,
+            lateral_drag_per_m: params.lateral_drag_per_m,
+            crossflow_per_m: params.crossflow_per_m,
             gravity_m_s2: params.gravity_m_s2,
             lateral: if printed { -1.0 } else { 1.0 },
             printed,
         }
     }
+
+    /// Whether the air pushes across the body; the equations are shorter where it does not.
+    pub(super) fn pushed_across(&self) -> bool {
+        !self.printed && (self.lateral_drag_per_m != 0.0 || self.crossflow_per_m != 0.0)
+    }
 }
 
-/// Where intervals are linearised: state at their beginning, input, thrust, and the costate of the state after them.
+/// Where intervals are linearised: state at their beginning, input, thrust, mass, and the costate of the state after
+/// them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Points {
     pub(super) state: [Lanes; 6],
     pub(super) gimbal: Lanes,
     pub(super) thrust: Lanes,
+    pub(super) inverse_mass: Lanes,
+    /// The model's own mass over that of the interval.
+    pub(super) lightness: Lanes,
     pub(super) costate: [Lanes; 6],
 }
 
 impl Points {
-    pub(super) const REST: Self =
-        Self { state: [Lanes::ZERO; 6], gimbal: Lanes::ZERO, thrust: Lanes::ZERO, costate: [Lanes::ZERO; 6] };
+    /// At rest, at the model's own mass.
+    pub(super) fn rest(c: &Constants) -> Self {
+        Self {
+            state: [Lanes::ZERO; 6],
+            gimbal: Lanes::ZERO,
+            thrust: Lanes::ZERO,
+            inverse_mass: Lanes::splat(1.0 / c.mass_kg),
+            lightness: Lanes::splat(1.0),
+            costate: [Lanes::ZERO; 6],
+        }
+    }
 }
 
 /// Intervals and their derivatives.
@@ -101,9 +125,9 @@ impl Block {
     };
 }
 
-/// What the thrust does over the whole interval.
+/// What is held over the whole interval.
 #[derive(Clone, Copy)]
-pub(super) struct Thrust {
+pub(super) struct Held {
     /// Acceleration along the nose axis and along the second body axis, m/s^2; each is the other's derivative by the
     /// gimbal angle, up to the sign.
     pub(super) push: Lanes,
@@ -111,19 +135,26 @@ pub(super) struct Thrust {
     /// Pitch acceleration, rad/s^2, and its derivative by the gimbal angle.
     pub(super) turn_acc: Lanes,
     pub(super) turn_acc_d: Lanes,
+    /// Air forces per mass and squared speed, 1/m.
+    pub(super) drag: Lanes,
+    pub(super) lateral_drag: Lanes,
+    pub(super) crossflow: Lanes,
 }
 
-impl Thrust {
+impl Held {
     #[inline(always)]
     fn of(c: &Constants, points: &Points) -> Self {
         let (sin, cos) = points.gimbal.sin_cos();
-        let acceleration = points.thrust * c.inverse_mass;
+        let acceleration = points.thrust * points.inverse_mass;
         let torque = points.thrust * c.arm_per_inertia;
         Self {
             push: acceleration * cos,
             side: -(acceleration * sin),
             turn_acc: -(torque * sin),
             turn_acc_d: -(torque * cos),
+            drag: points.lightness * c.drag_per_m,
+            lateral_drag: points.lightness * c.lateral_drag_per_m,
+            crossflow: points.lightness * c.crossflow_per_m,
         }
     }
 }
@@ -141,6 +172,9 @@ pub(super) struct Stage {
     /// Derivative of the drag's acceleration by u and w.
     pub(super) drag_u: Lanes,
     pub(super) drag_w: Lanes,
+    /// Derivative of the air's acceleration across the body by u and w.
+    pub(super) across_u: Lanes,
+    pub(super) across_w: Lanes,
     /// u and w over the speed.
     pub(super) along: Lanes,
     pub(super) across: Lanes,
@@ -152,13 +186,19 @@ pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 /// Share of half a squared step by which the pitch acceleration moves a stage's pitch.
 pub(super) const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
 
-/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`.
+/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`. `ACROSS`
+/// tells whether the air [pushes across](Constants::pushed_across) the body.
 #[inline(always)]
-pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, block: &mut Block) {
+#[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
+pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
+    c: &Constants,
+    points: &Points,
+    block: &mut Block,
+) {
     let h = c.step_s;
     let [x0, z0, th0, u0, w0, q0] = points.state;
-    let gimbal = Thrust::of(c, points);
-    let Thrust { push, side, turn_acc, turn_acc_d } = gimbal;
+    let held = Held::of(c, points);
+    let Held { push, side, turn_acc, turn_acc_d, drag: drag_per_m, lateral_drag, crossflow } = held;
 
     // The four stages.
     let mut stages = [Stage {
@@ -171,6 +211,8 @@ pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, 
         z_dot: Lanes::ZERO,
         drag_u: Lanes::ZERO,
         drag_w: Lanes::ZERO,
+        across_u: Lanes::ZERO,
+        across_w: Lanes::ZERO,
         along: Lanes::ZERO,
         across: Lanes::ZERO,
     }; 4];
@@ -182,30 +224,41 @@ pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, 
         let (sin, cos) = theta.sin_cos();
         let squared = u * u + w * w;
         let (drag, drag_u, drag_w, along, across);
+        let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
         if c.printed {
-            drag = squared * c.drag_per_m;
-            drag_u = u * (2.0 * c.drag_per_m);
-            drag_w = w * (2.0 * c.drag_per_m);
+            drag = squared * drag_per_m;
+            drag_u = u * (drag_per_m * 2.0);
+            drag_w = w * (drag_per_m * 2.0);
             (along, across) = (Lanes::ZERO, Lanes::ZERO);
         } else {
             let speed = squared.sqrt();
             let inverse = speed.reciprocal_above(REST_SPEED_M_S);
             along = u * inverse;
             across = w * inverse;
-            drag = speed * u * -c.drag_per_m;
-            drag_u = (speed + u * along) * -c.drag_per_m;
-            drag_w = u * across * -c.drag_per_m;
+            drag = speed * u * -drag_per_m;
+            drag_u = (speed + u * along) * -drag_per_m;
+            drag_w = u * across * -drag_per_m;
+            if ACROSS {
+                let aside = w.abs();
+                across_acc = -((lateral_drag * speed + crossflow * aside) * w);
+                across_u = -(lateral_drag * (u * across));
+                across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
+            }
         }
         let lateral = w * c.lateral;
         let x_dot = u * cos + lateral * sin;
         let z_dot = u * sin - lateral * cos;
         let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
-        let w_dot = side + cos * c.gravity_m_s2 + q * u;
+        let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
+        if ACROSS {
+            w_dot += across_acc;
+        }
         x_sum += x_dot * WEIGHTS[i];
         z_sum += z_dot * WEIGHTS[i];
         u_sum += u_dot * WEIGHTS[i];
         w_sum += w_dot * WEIGHTS[i];
-        stages[i] = Stage { sin, cos, u, w, q, x_dot, z_dot, drag_u, drag_w, along, across };
+        stages[i] =
+            Stage { sin, cos, u, w, q, x_dot, z_dot, drag_u, drag_w, across_u, across_w, along, across };
         if i < 3 {
             u = u0 + u_dot * (h * AHEAD[i + 1]);
             w = w0 + w_dot * (h * AHEAD[i + 1]);
@@ -245,6 +298,10 @@ pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, 
             sideways + ku * (stage.drag_w - stage.q),
             kt - ku * stage.w + kw * stage.u,
         ];
+        if ACROSS {
+            later[U] += kw * stage.across_u;
+            later[W] += kw * stage.across_w;
+        }
         pulled[TH] += later[TH];
         pulled[U] += later[U];
         pulled[W] += later[W];
@@ -254,7 +311,7 @@ pub(super) fn evaluate<const DERIVATIVES: bool>(c: &Constants, points: &Points, 
     }
     block.pulled = pulled;
     if DERIVATIVES {
-        differentiate(c, &gimbal, &stages, &slope_adjoints, block);
+        differentiate::<ACROSS>(c, &held, &stages, &slope_adjoints, block);
     }
 }
 

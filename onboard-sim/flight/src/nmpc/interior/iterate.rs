@@ -5,6 +5,7 @@ use super::interval::{Block, Constants, Points, blocks_for, evaluate};
 use super::lanes::LANES;
 use crate::nmpc::Problem;
 use crate::nmpc::problem::Condition;
+use crate::nmpc::rollout::stages;
 
 /// A point of the primal-dual space.
 #[derive(Debug, Clone, Default)]
@@ -35,9 +36,11 @@ impl Iterate {
     }
 
     /// Evaluates every interval at the iterate, with tangents and curvature if asked for.
-    pub(super) fn evaluate<const DERIVATIVES: bool>(&mut self, constants: &Constants, thrust_n: &[f64]) {
+    pub(super) fn evaluate<const DERIVATIVES: bool>(&mut self, constants: &Constants, problem: &Problem) {
         let count = self.inputs_rad.len();
-        let mut points = Points::REST;
+        let (thrust_n, mass_kg) = (&problem.thrust_n, &problem.mass_kg);
+        let across = constants.pushed_across();
+        let mut points = Points::rest(constants);
         for (index, block) in self.blocks.iter_mut().enumerate() {
             for lane in 0..LANES {
                 // Lanes beyond the end repeat the last interval.
@@ -48,8 +51,16 @@ impl Iterate {
                 }
                 points.gimbal.0[lane] = self.inputs_rad[k];
                 points.thrust.0[lane] = thrust_n[k];
+                if let Some(mass_kg) = mass_kg.get(k) {
+                    points.inverse_mass.0[lane] = 1.0 / mass_kg;
+                    points.lightness.0[lane] = constants.mass_kg / mass_kg;
+                }
             }
-            evaluate_block::<DERIVATIVES>(constants, &points, block);
+            if across {
+                evaluate_block::<DERIVATIVES, true>(constants, &points, block);
+            } else {
+                evaluate_block::<DERIVATIVES, false>(constants, &points, block);
+            }
         }
     }
 
@@ -70,7 +81,7 @@ impl Iterate {
     pub(super) fn cost(&self, problem: &Problem) -> f64 {
         let mut squares = [0.0; 6];
         for state in &self.states[1..] {
-            let deviation = Problem::deviation(state);
+            let deviation = problem.deviation(state);
             for (sum, value) in squares.iter_mut().zip(&deviation) {
                 *sum += value * value;
             }
@@ -116,12 +127,7 @@ impl Iterate {
     /// Rolls the inputs out from the first state; the states then have no defects.
     pub(super) fn roll_out(&mut self, problem: &Problem) {
         for k in 0..self.inputs_rad.len() {
-            let (_, next) = crate::nmpc::rollout::stages(
-                problem,
-                &self.states[k],
-                self.inputs_rad[k],
-                problem.thrust_n[k],
-            );
+            let (_, next) = stages(problem, k, &self.states[k], self.inputs_rad[k]);
             self.states[k + 1] = next;
         }
     }
@@ -129,6 +135,10 @@ impl Iterate {
 
 /// Not inlined into the loop: one function of straight-line vector code.
 #[inline(never)]
-fn evaluate_block<const DERIVATIVES: bool>(constants: &Constants, points: &Points, block: &mut Block) {
-    evaluate::<DERIVATIVES>(constants, points, block);
+fn evaluate_block<const DERIVATIVES: bool, const ACROSS: bool>(
+    constants: &Constants,
+    points: &Points,
+    block: &mut Block,
+) {
+    evaluate::<DERIVATIVES, ACROSS>(constants, points, block);
 }

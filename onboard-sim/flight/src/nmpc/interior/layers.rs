@@ -17,7 +17,7 @@ impl Workspace {
     /// Dynamics, first and second derivatives of every interval.
     pub fn evaluate_intervals(&mut self, problem: &Problem) {
         let constants = Constants::of(&problem.model, problem.step_s);
-        self.current.evaluate::<true>(&constants, &problem.thrust_n);
+        self.current.evaluate::<true>(&constants, problem);
     }
 
     /// One Newton step at the evaluated intervals: backward and forward sweep; whether the inertia was right.

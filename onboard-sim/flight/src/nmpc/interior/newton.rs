@@ -42,7 +42,7 @@ impl Newton {
         let input_weight = problem.input_weight * problem.step_s;
         let sweep = &mut self.sweep;
         for (k, state) in iterate.states.iter().enumerate() {
-            let deviation = Problem::deviation(state);
+            let deviation = problem.deviation(state);
             sweep.weights[k] = weights;
             sweep.slopes[k] = core::array::from_fn(|i| weights[i] * deviation[i]);
         }
@@ -119,7 +119,7 @@ impl Newton {
         let mut slope = 0.0;
         let mut along = [0.0; 6];
         for (state, step) in iterate.states.iter().zip(&self.sweep.states) {
-            let deviation = Problem::deviation(state);
+            let deviation = problem.deviation(state);
             for i in 0..6 {
                 along[i] += deviation[i] * step[i];
             }

@@ -40,7 +40,7 @@ impl Residual {
         let input_weight = problem.input_weight * problem.step_s;
         let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
         for (push, (state, costate)) in pushes.iter_mut().zip(iterate.states.iter().zip(&iterate.costates)) {
-            let deviation = Problem::deviation(state);
+            let deviation = problem.deviation(state);
             *push = core::array::from_fn(|i| weights[i] * deviation[i] - costate[i]);
         }
         for (condition, elastic) in conditions.iter().zip(&iterate.elastics) {

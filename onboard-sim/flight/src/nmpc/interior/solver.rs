@@ -163,13 +163,13 @@ impl Workspace {
         let mut barrier = first_barrier;
         let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
         if check_first {
-            self.current.evaluate::<false>(&constants, &problem.thrust_n);
+            self.current.evaluate::<false>(&constants, problem);
             let residual = self.residual(problem);
             if residual.largest(0.0) <= tolerance {
                 return Outcome { status: SolveStatus::Converged, residual, ..Outcome::BAD };
             }
         }
-        self.current.evaluate::<true>(&constants, &problem.thrust_n);
+        self.current.evaluate::<true>(&constants, problem);
         let mut residual = self.residual(problem);
         self.filter = Filter::starting_at(residual.infeasibility);
         let status = loop {
@@ -212,7 +212,7 @@ impl Workspace {
                 raises += 1;
                 barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
                 start::raise(problem, &self.conditions, barrier, &mut self.current);
-                self.current.evaluate::<true>(&constants, &problem.thrust_n);
+                self.current.evaluate::<true>(&constants, problem);
                 residual = self.residual(problem);
                 self.filter = Filter::starting_at(residual.infeasibility);
             } else {
@@ -239,7 +239,7 @@ impl Workspace {
         while share >= SHORTEST_STEP {
             let tried = Fractions { primal: share * fractions.primal, dual: fractions.dual };
             self.newton.take(&self.conditions, &self.current, tried, &mut self.trial);
-            self.trial.evaluate::<true>(constants, &problem.thrust_n);
+            self.trial.evaluate::<true>(constants, problem);
             let trial = Measures {
                 infeasibility: self.trial.infeasibility(),
                 objective: self.trial.barrier_objective(problem, barrier),

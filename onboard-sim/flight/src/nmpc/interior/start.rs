@@ -1,6 +1,6 @@
 //! Where a solve starts: cold, from an earlier solution, or again with a larger barrier.
 
-use core::f64::consts::{FRAC_PI_2, PI};
+use core::f64::consts::PI;
 
 use super::barrier::{Elastic, Limits};
 use super::iterate::Iterate;
@@ -20,7 +20,7 @@ pub(super) fn cold(
     let count = problem.intervals();
     let half_waves = f64::from(problem.solver.guess_half_waves);
     let from = problem.initial.to_array();
-    let to = [0.0, 0.0, FRAC_PI_2, 0.0, 0.0, 0.0];
+    let to = problem.target.to_array();
     for (k, state) in start.states.iter_mut().enumerate() {
         let share = k as f64 / count as f64;
         *state = core::array::from_fn(|i| from[i] + share * (to[i] - from[i]));
@@ -75,9 +75,11 @@ pub(super) fn warm(
             *limits = Limits::central(*input, limit, barrier);
         }
     }
-    let multipliers = warm.end_multipliers.iter().chain(&warm.floor_multipliers).copied();
-    let known = multipliers.map(|value| if value.is_finite() { value } else { 0.0 });
-    let known = known.chain(core::iter::repeat(0.0));
+    // A horizon too short for all settled nodes has fewer conditions at its end than the earlier solution had.
+    let none = core::iter::repeat(&0.0);
+    let ends = warm.end_multipliers.iter().chain(none.clone()).take(problem.end_conditions_len());
+    let known = ends.chain(warm.floor_multipliers.iter().chain(none));
+    let known = known.map(|value| if value.is_finite() { *value } else { 0.0 });
     for ((elastic, condition), multiplier) in start.elastics.iter_mut().zip(conditions).zip(known) {
         let value = condition.value(&start.states);
         *elastic = Elastic::warm(value, multiplier, condition.equality, price, barrier);

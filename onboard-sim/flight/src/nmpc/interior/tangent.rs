@@ -5,22 +5,22 @@
 #![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
 use super::interval::{
-    AHEAD, Block, Constants, D, DIRECTIONS, PAIRS, Q, Stage, TH, TURNED, Thrust, U, W, WEIGHTS, pair,
+    AHEAD, Block, Constants, D, DIRECTIONS, Held, PAIRS, Q, Stage, TH, TURNED, U, W, WEIGHTS, pair,
 };
 use super::lanes::Lanes;
 
 /// Fills in a block's tangent and curvature from the stages and the adjoints of their slopes by (x, z, u, w, q).
 #[inline(always)]
 #[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
-pub(super) fn differentiate(
+pub(super) fn differentiate<const ACROSS: bool>(
     c: &Constants,
-    thrust: &Thrust,
+    held: &Held,
     stages: &[Stage; 4],
     slope_adjoints: &[[Lanes; 5]; 4],
     block: &mut Block,
 ) {
     let h = c.step_s;
-    let Thrust { push, side, turn_acc, turn_acc_d } = *thrust;
+    let Held { push, side, turn_acc, turn_acc_d, drag, lateral_drag, crossflow } = *held;
     // Tangents of u and w from stage to stage, of x, z, u and w over the step, and the curvature.
     let mut tu = [Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO, Lanes::ZERO];
     let mut tw = [Lanes::ZERO, Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO];
@@ -37,17 +37,24 @@ pub(super) fn differentiate(
         let tt = (ku * s.sin - kw * s.cos) * c.gravity_m_s2 - kx * s.x_dot - kz * s.z_dot;
         let t_u = kz * s.cos - kx * s.sin;
         let t_w = (kx * s.cos + kz * s.sin) * c.lateral;
-        let (uu, uw, ww);
+        let (mut uu, mut uw, mut ww);
         if c.printed {
-            uu = ku * (2.0 * c.drag_per_m);
+            uu = ku * (drag * 2.0);
             ww = uu;
             uw = Lanes::ZERO;
         } else {
-            let scale = ku * -c.drag_per_m;
+            let scale = ku * -drag;
             let (aa, bb) = (s.along * s.along, s.across * s.across);
             uu = scale * s.along * (Lanes::splat(3.0) - aa);
             ww = scale * s.along * (Lanes::splat(1.0) - bb);
             uw = scale * s.across * (Lanes::splat(1.0) - aa);
+            if ACROSS {
+                let scale = kw * -lateral_drag;
+                uu += scale * s.across * (Lanes::splat(1.0) - aa);
+                uw += scale * s.along * (Lanes::splat(1.0) - bb);
+                // The crossflow's second derivative changes sign with w.
+                ww += scale * s.across * (Lanes::splat(3.0) - bb) - kw * crossflow * 2.0 * s.w.signum();
+            }
         }
         let (u_q, w_q) = (kw, -ku);
         if i == 0 {
@@ -98,6 +105,7 @@ pub(super) fn differentiate(
         let ut = s.cos * -c.gravity_m_s2;
         let wt = s.sin * -c.gravity_m_s2;
         let (ru, rw) = (s.drag_u, s.drag_w - s.q);
+        let wu = if ACROSS { s.q + s.across_u } else { s.q };
         let mut du = [Lanes::ZERO; DIRECTIONS];
         let mut dw = [Lanes::ZERO; DIRECTIONS];
         let mut dx = [Lanes::ZERO; DIRECTIONS];
@@ -105,13 +113,16 @@ pub(super) fn differentiate(
         let (ls, lc) = (s.sin * c.lateral, s.cos * c.lateral);
         if i == 0 {
             du = [ut, ru, rw, -s.w, side];
-            dw = [wt, s.q, Lanes::ZERO, s.u, -push];
+            dw = [wt, wu, s.across_w, s.u, -push];
             dx = [-s.z_dot, s.cos, ls, Lanes::ZERO, Lanes::ZERO];
             dz = [s.x_dot, s.sin, -lc, Lanes::ZERO, Lanes::ZERO];
         } else {
             for j in 0..DIRECTIONS {
                 du[j] = ru * tu[j] + rw * tw[j];
-                dw[j] = s.q * tu[j];
+                dw[j] = wu * tu[j];
+                if ACROSS {
+                    dw[j] += s.across_w * tw[j];
+                }
                 dx[j] = s.cos * tu[j] + ls * tw[j];
                 dz[j] = s.sin * tu[j] - lc * tw[j];
             }

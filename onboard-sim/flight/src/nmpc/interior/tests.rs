@@ -9,26 +9,42 @@ use crate::profile::Profile;
 
 const STEP_S: f64 = 0.1;
 const THRUST_N: f64 = 33.3;
-const KINDS: [ModelKind; 2] = [ModelKind::Consistent, ModelKind::AsPrinted];
 
 /// State, gimbal angle and costate.
 type Point = ([f64; 6], f64, [f64; 6]);
 
-fn model(kind: ModelKind) -> PlanarModel {
+/// A model and the vehicle's mass, kg.
+type Vehicle = (PlanarModel, f64);
+
+/// Both kinds of the paper's, and one lighter than it was in air that pushes across it.
+fn vehicles() -> [Vehicle; 3] {
     let profile = Profile::builtin("paper-calibrated").unwrap();
-    PlanarModel { kind, ..PlanarModel::from_profile(&profile) }
+    let paper = PlanarModel { kind: ModelKind::Consistent, ..PlanarModel::from_profile(&profile) };
+    let mut in_air = paper;
+    in_air.params.lateral_drag_per_m = 0.07;
+    in_air.params.crossflow_per_m = 0.04;
+    let mass_kg = paper.params.mass_kg;
+    let printed = PlanarModel { kind: ModelKind::AsPrinted, ..paper };
+    [(paper, mass_kg), (printed, mass_kg), (in_air, 0.9 * mass_kg)]
 }
 
 /// The interval in every lane, the last lane's result.
-fn block(kind: ModelKind, (state, gimbal, costate): &Point) -> Block {
+fn block((model, mass_kg): &Vehicle, (state, gimbal, costate): &Point) -> Block {
+    let constants = Constants::of(model, STEP_S);
     let points = Points {
         state: state.map(Lanes::splat),
         gimbal: Lanes::splat(*gimbal),
         thrust: Lanes::splat(THRUST_N),
+        inverse_mass: Lanes::splat(1.0 / mass_kg),
+        lightness: Lanes::splat(model.params.mass_kg / mass_kg),
         costate: costate.map(Lanes::splat),
     };
     let mut block = Block::EMPTY;
-    evaluate::<true>(&Constants::of(&model(kind), STEP_S), &points, &mut block);
+    if constants.pushed_across() {
+        evaluate::<true, true>(&constants, &points, &mut block);
+    } else {
+        evaluate::<true, false>(&constants, &points, &mut block);
+    }
     block
 }
 
@@ -43,8 +59,26 @@ fn moved((state, gimbal, costate): &Point, direction: usize, by: f64) -> Point {
 }
 
 /// The model's own step, with its own sine and cosine.
-fn step(kind: ModelKind, (state, gimbal, _): &Point) -> [f64; 6] {
-    model(kind).rk4_step(&PlanarState::from_array(*state), *gimbal, THRUST_N, STEP_S).to_array()
+fn step((model, mass_kg): &Vehicle, (state, gimbal, _): &Point) -> [f64; 6] {
+    let model = model.with_mass(*mass_kg);
+    model.rk4_step(&PlanarState::from_array(*state), *gimbal, THRUST_N, STEP_S).to_array()
+}
+
+/// Whether a stage comes so close to no speed across the body, where the crossflow's curvature jumps, that a
+/// difference may straddle it.
+fn near_the_jump((model, mass_kg): &Vehicle, (state, gimbal, _): &Point) -> bool {
+    const NEAR_M_S: f64 = 1e-3;
+    let mut problem = Problem::from_profile(
+        &Profile::builtin("paper-calibrated").unwrap(),
+        PlanarState::from_array(*state),
+        0.0,
+        1,
+        1.0,
+    );
+    problem.model = model.with_mass(*mass_kg);
+    problem.thrust_n = vec![THRUST_N];
+    let (stages, _) = crate::nmpc::rollout::stages(&problem, 0, state, *gimbal);
+    model.params.crossflow_per_m != 0.0 && stages.iter().any(|stage| stage[4].abs() < NEAR_M_S)
 }
 
 fn point() -> impl Strategy<Value = Point> {
@@ -56,9 +90,9 @@ fn point() -> impl Strategy<Value = Point> {
 proptest! {
     #[test]
     fn val_planar_model_step(point in point()) {
-        for kind in KINDS {
-            let block = block(kind, &point);
-            for (value, expected) in block.after.iter().zip(step(kind, &point)) {
+        for vehicle in &vehicles() {
+            let block = block(vehicle, &point);
+            for (value, expected) in block.after.iter().zip(step(vehicle, &point)) {
                 let error = (value.0[LANES - 1] - expected).abs();
                 prop_assert!(error < 1e-13 * (1.0 + expected.abs()), "{error}");
             }
@@ -68,10 +102,10 @@ proptest! {
     #[test]
     fn val_finite_differences_tangent_and_adjoint(point in point()) {
         const H: f64 = 1e-5;
-        for kind in KINDS {
-            let block = block(kind, &point);
+        for vehicle in &vehicles() {
+            let block = block(vehicle, &point);
             for j in 0..DIRECTIONS {
-                let (ahead, behind) = (step(kind, &moved(&point, j, H)), step(kind, &moved(&point, j, -H)));
+                let (ahead, behind) = (step(vehicle, &moved(&point, j, H)), step(vehicle, &moved(&point, j, -H)));
                 let column: [f64; 6] = core::array::from_fn(|i| (ahead[i] - behind[i]) / (2.0 * H));
                 for (row, state) in [0, 1, 3, 4].into_iter().enumerate() {
                     let error = (block.tangent[row][j].0[0] - column[state]).abs();
@@ -80,7 +114,7 @@ proptest! {
                 let expected: f64 = column.iter().zip(&point.2).map(|(slope, weight)| slope * weight).sum();
                 prop_assert!((block.pulled[j].0[0] - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{j}");
             }
-            let turn = (step(kind, &moved(&point, 4, H))[5] - step(kind, &moved(&point, 4, -H))[5]) / (2.0 * H);
+            let turn = (step(vehicle, &moved(&point, 4, H))[5] - step(vehicle, &moved(&point, 4, -H))[5]) / (2.0 * H);
             prop_assert!((block.turn.0[0] - turn).abs() < 1e-8 * (1.0 + turn.abs()));
         }
     }
@@ -88,11 +122,12 @@ proptest! {
     #[test]
     fn val_finite_differences_curvature(point in point()) {
         const H: f64 = 1e-5;
-        for kind in KINDS {
-            let curvature = block(kind, &point).curvature;
+        for vehicle in &vehicles() {
+            prop_assume!(!near_the_jump(vehicle, &point));
+            let curvature = block(vehicle, &point).curvature;
             for column in 0..DIRECTIONS {
-                let ahead = block(kind, &moved(&point, column, H)).pulled;
-                let behind = block(kind, &moved(&point, column, -H)).pulled;
+                let ahead = block(vehicle, &moved(&point, column, H)).pulled;
+                let behind = block(vehicle, &moved(&point, column, -H)).pulled;
                 for row in 0..=column {
                     let expected = (ahead[row].0[0] - behind[row].0[0]) / (2.0 * H);
                     let error = (curvature[pair(row, column)].0[0] - expected).abs();

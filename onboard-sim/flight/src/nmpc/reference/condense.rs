@@ -30,9 +30,9 @@ impl Linearised {
         let count = inputs_rad.len();
         let intervals: Vec<Interval> = inputs_rad
             .iter()
-            .zip(&problem.thrust_n)
             .zip(&trajectory.states)
-            .map(|((gimbal_rad, thrust_n), state)| Interval::about(problem, state, *gimbal_rad, *thrust_n))
+            .enumerate()
+            .map(|(k, (gimbal_rad, state))| Interval::about(problem, k, state, *gimbal_rad))
             .collect();
 
         let mut sensitivities: Vec<Vec<[f64; 6]>> = Vec::with_capacity(count + 1);

@@ -1,6 +1,6 @@
 //! Bent initial guesses.
 
-use core::f64::consts::{FRAC_PI_2, PI};
+use core::f64::consts::PI;
 
 use crate::nmpc::Problem;
 use crate::stabiliser::Stabiliser;
@@ -17,14 +17,14 @@ pub(super) fn bent(problem: &Problem, amplitude_rad: f64) -> Vec<f64> {
     let reference = |k: usize| {
         let phase = half_waves * PI * k as f64 / count as f64;
         let rate = half_waves * PI / (count as f64 * problem.step_s);
-        (FRAC_PI_2 + amplitude_rad * libm::sin(phase), amplitude_rad * rate * libm::cos(phase))
+        (problem.target.theta_rad + amplitude_rad * libm::sin(phase), amplitude_rad * rate * libm::cos(phase))
     };
     let mut state = problem.initial;
     let mut inputs_rad = Vec::with_capacity(count);
     for (k, thrust_n) in problem.thrust_n.iter().enumerate() {
         let (theta_rad, q_rad_s) = reference(k);
         let gimbal_rad = law.gimbal_towards(&state, theta_rad, q_rad_s, *thrust_n, problem.gimbal_limit_rad);
-        state = problem.model.rk4_step(&state, gimbal_rad, *thrust_n, problem.step_s);
+        state = problem.model_at(k).rk4_step(&state, gimbal_rad, *thrust_n, problem.step_s);
         inputs_rad.push(gimbal_rad);
     }
     inputs_rad

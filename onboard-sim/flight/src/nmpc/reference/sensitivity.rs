@@ -5,7 +5,7 @@
 //! `f` is nonlinear, so the second derivative of `adjoint . step` is the sum over the stages of (tangent of the
 //! stage)^T (second derivative of the adjoint-weighted `f`) (tangent of the stage).
 
-use crate::dynamics::{INPUT_INDEX, StageHessian, StageJacobian};
+use crate::dynamics::{INPUT_INDEX, PlanarModel, StageHessian, StageJacobian};
 use crate::nmpc::Problem;
 use crate::nmpc::rollout::{STAGE_STEPS, STAGE_WEIGHTS, stages};
 
@@ -15,6 +15,7 @@ pub(super) struct Interval {
     points: [[f64; 6]; 4],
     gimbal_rad: f64,
     thrust_n: f64,
+    model: PlanarModel,
     /// Derivative of each stage's slope by its own state and the input.
     jacobians: [StageJacobian; 4],
     /// Derivative of each stage's state by the stage variables.
@@ -36,10 +37,11 @@ pub(super) struct Backward {
 }
 
 impl Interval {
-    /// Linearises an interval about a state and an input.
-    pub(super) fn about(problem: &Problem, state: &[f64; 6], gimbal_rad: f64, thrust_n: f64) -> Self {
-        let (points, after) = stages(problem, state, gimbal_rad, thrust_n);
-        let jacobians = points.map(|point| problem.model.jacobian(&point, gimbal_rad, thrust_n));
+    /// Linearises interval `k` about a state and an input.
+    pub(super) fn about(problem: &Problem, k: usize, state: &[f64; 6], gimbal_rad: f64) -> Self {
+        let (points, after) = stages(problem, k, state, gimbal_rad);
+        let (thrust_n, model) = (problem.thrust_n[k], problem.model_at(k));
+        let jacobians = points.map(|point| model.jacobian(&point, gimbal_rad, thrust_n));
         let mut identity = [[0.0; 7]; 6];
         for (row, line) in identity.iter_mut().enumerate() {
             line[row] = 1.0;
@@ -53,13 +55,13 @@ impl Interval {
                 add_scaled(&mut tangents[stage + 1], &slope, along_step * problem.step_s);
             }
         }
-        Self { points, gimbal_rad, thrust_n, jacobians, tangents, after, step }
+        Self { points, gimbal_rad, thrust_n, model, jacobians, tangents, after, step }
     }
 
     /// Pulls the adjoint of the state after the interval, and the interval's own cost, back to its beginning.
     pub(super) fn backward(&self, problem: &Problem, adjoint_after: &[f64; 6]) -> Backward {
         let step_s = problem.step_s;
-        let deviation = Problem::deviation(&self.after);
+        let deviation = problem.deviation(&self.after);
         let after: [f64; 6] =
             core::array::from_fn(|i| adjoint_after[i] + step_s * problem.state_weights[i] * deviation[i]);
         let mut slope_adjoints = [[0.0; 6]; 4];
@@ -95,7 +97,7 @@ impl Interval {
         }
         sum[INPUT_INDEX][INPUT_INDEX] += problem.step_s * problem.input_weight;
         for stage in 0..4 {
-            let inner = problem.model.weighted_hessian(
+            let inner = self.model.weighted_hessian(
                 &self.points[stage],
                 self.gimbal_rad,
                 self.thrust_n,
@@ -189,11 +191,11 @@ mod tests {
     }
 
     fn interval_cost(problem: &Problem, state: &[f64; 6], delta: f64) -> f64 {
-        problem.step_s * problem.cost_rate(&stages(problem, state, delta, 33.3).1, delta)
+        problem.step_s * problem.cost_rate(&stages(problem, 0, state, delta).1, delta)
     }
 
     fn gradient(problem: &Problem, state: &[f64; 6], delta: f64, adjoint: &[f64; 6]) -> [f64; VARIABLES] {
-        let backward = Interval::about(problem, state, delta, 33.3).backward(problem, adjoint);
+        let backward = Interval::about(problem, 0, state, delta).backward(problem, adjoint);
         let [x, z, theta, u, w, q] = backward.adjoint;
         [x, z, theta, u, w, q, backward.input_gradient]
     }
@@ -210,11 +212,11 @@ mod tests {
             for kind in [ModelKind::Consistent, ModelKind::AsPrinted] {
                 let problem = problem(kind);
                 let (state, delta) = moved(&point, 0, 0.0);
-                let interval = Interval::about(&problem, &state, delta, 33.3);
+                let interval = Interval::about(&problem, 0, &state, delta);
                 for variable in 0..VARIABLES {
                     let at = |by| {
                         let (state, delta) = moved(&point, variable, by);
-                        stages(&problem, &state, delta, 33.3).1
+                        stages(&problem, 0, &state, delta).1
                     };
                     let (ahead, behind) = (at(step), at(-step));
                     for row in 0..6 {
@@ -235,13 +237,13 @@ mod tests {
             for kind in [ModelKind::Consistent, ModelKind::AsPrinted] {
                 let problem = problem(kind);
                 let (state, delta) = moved(&point, 0, 0.0);
-                let interval = Interval::about(&problem, &state, delta, 33.3);
+                let interval = Interval::about(&problem, 0, &state, delta);
                 let backward = interval.backward(&problem, &adjoint);
                 let hessian = interval.hessian(&problem, &backward);
                 let analytic = gradient(&problem, &state, delta, &adjoint);
                 let value = |by, variable| {
                     let (state, delta) = moved(&point, variable, by);
-                    let after = stages(&problem, &state, delta, 33.3).1;
+                    let after = stages(&problem, 0, &state, delta).1;
                     let adjoint_part: f64 = adjoint.iter().zip(after).map(|(weight, value)| weight * value).sum();
                     adjoint_part + interval_cost(&problem, &state, delta)
                 };
