@@ -19,16 +19,24 @@
 //! Units are SI and radians; names carry units and frames. The frames are those of [`dynamics`].
 #![warn(missing_docs)]
 
+pub mod aim;
 pub mod arming;
+pub mod burn;
 pub mod check;
 pub mod controller;
+pub mod descent;
 pub mod dynamics;
 pub mod estimator;
 pub mod gate;
+pub mod ignition;
+pub mod mission;
 pub mod nmpc;
 pub mod phase;
+pub mod pilot;
+pub mod powered;
 pub mod profile;
 pub mod rigid;
 pub mod stabiliser;
 pub mod thrust_estimate;
 pub mod verdict;
+pub mod vertical;

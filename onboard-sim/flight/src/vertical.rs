@@ -185,6 +185,44 @@ impl Column {
         (fallen_m, speed_m_s)
     }
 
+    /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
+    pub fn fallen(
+        &self,
+        height_m: f64,
+        vertical_m_s: f64,
+        fin_drag_area_m2: f64,
+        time_s: f64,
+    ) -> (f64, f64) {
+        /// Short enough for the midpoint rule at any speed a fall has.
+        const STEP_S: f64 = 0.05;
+        let steps = libm::ceil(time_s / STEP_S).max(1.0);
+        let step_s = time_s / steps;
+        let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;
+        let drag_per_v2 = 0.5 * self.air_density_kg_m3 * area_m2 / self.mass_at_ignition_kg;
+        let acceleration = |speed_m_s: f64| -self.gravity_m_s2 - drag_per_v2 * speed_m_s * speed_m_s.abs();
+        let (mut height_m, mut vertical_m_s) = (height_m, vertical_m_s);
+        for _ in 0..steps as u32 {
+            let midway_m_s = vertical_m_s + 0.5 * step_s * acceleration(vertical_m_s);
+            height_m += step_s * midway_m_s;
+            vertical_m_s += step_s * acceleration(midway_m_s);
+        }
+        (height_m, vertical_m_s)
+    }
+
+    /// How much of the fins to open, 0 to 1, to stay in the middle of the band: from the height the vehicle has.
+    ///
+    /// Without a band the vehicle is too fast or too slow for any landing, and the answer is an end of the range.
+    pub fn fin_share(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64, height_m: f64) -> f64 {
+        /// Share of the fins per share of the band.
+        const GAIN: f64 = 1.5;
+        match self.band(burn, burning_s, vertical_m_s) {
+            Some(band) => (0.5 + GAIN * (0.5 - band.place(height_m))).clamp(0.0, 1.0),
+            // Falling slower than a landing would: let it fall.
+            None if vertical_m_s > -1.0 => 0.0,
+            None => 1.0,
+        }
+    }
+
     /// Vertical speed of the unpowered fall, m/s, falling positive, that would not change any more.
     pub fn terminal_speed_m_s(&self, fin_drag_area_m2: f64) -> f64 {
         let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;

@@ -1,0 +1,75 @@
+//! When to light the landing motor.
+//!
+//! There is one chance, and how strong the motor will be is known only afterwards. At every tick the heights from
+//! which a landing exists are computed ([`crate::vertical`]) for the motor as certified, and for a weak and a strong
+//! one. The chosen height lies at a set place in what all of them have in common, so that whichever motor it turns
+//! out to be, the landing exists. The command goes out as early as an igniter needs.
+
+use serde::Deserialize;
+
+use crate::burn::Burn;
+use crate::thrust_curve::ThrustCurve;
+use crate::vertical::{Band, Column};
+
+/// How the instant is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IgnitionSettings {
+    /// Impulse of the weakest and strongest motor to be landed, over the certified impulse.
+    pub impulse_scales: [f64; 2],
+    /// Burn times of the shortest and the longest burn to be landed, over the certified burn time.
+    pub burn_time_scales: [f64; 2],
+    /// Where in the common band to start: 0 at its low end, 1 at its high end.
+    pub place: f64,
+    /// Time from command to thrust that is expected, s.
+    pub delay_s: f64,
+    /// How long before the expected ignition the landing controller takes over, s.
+    pub arm_before_s: f64,
+}
+
+/// What a tick says about the ignition.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct IgnitionOutlook {
+    /// Heights from which the certified motor lands, thrust beginning there at the speed expected then, m.
+    pub band: Option<Band>,
+    /// Heights from which all considered motors land, m.
+    pub common: Option<Band>,
+    /// The chosen height at which thrust should begin, m.
+    pub chosen_m: Option<f64>,
+    /// Height at which thrust would begin if commanded now, m.
+    pub onset_height_m: f64,
+    /// Vertical velocity there, m/s, up positive.
+    pub onset_vertical_m_s: f64,
+    /// Time until the command should go out, s; negative when late.
+    pub command_in_s: Option<f64>,
+}
+
+impl IgnitionSettings {
+    /// The outlook from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
+    pub fn outlook(
+        &self,
+        column: &Column,
+        curve: &ThrustCurve,
+        height_m: f64,
+        vertical_m_s: f64,
+        fin_drag_area_m2: f64,
+    ) -> IgnitionOutlook {
+        let (onset_height_m, onset_vertical_m_s) =
+            column.fallen(height_m, vertical_m_s, fin_drag_area_m2, self.delay_s);
+        let band = |impulse_scale, time_scale| {
+            column.band(&Burn { curve, impulse_scale, time_scale }, 0.0, onset_vertical_m_s)
+        };
+        let certified = band(1.0, 1.0);
+        let [weak, strong] = self.impulse_scales;
+        let [short, long] = self.burn_time_scales;
+        let extremes = [(weak, 1.0), (strong, 1.0), (1.0, short), (1.0, long)];
+        let common = certified.and_then(|certified| {
+            extremes.iter().try_fold(certified, |common, (impulse, time)| common.and(&band(*impulse, *time)?))
+        });
+        // Where no height suits all of them, what suits the certified motor has to do.
+        let chosen_m = common.or(certified).map(|band| band.low_m + self.place * (band.high_m - band.low_m));
+        let command_in_s =
+            chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
+        IgnitionOutlook { band: certified, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s }
+    }
+}

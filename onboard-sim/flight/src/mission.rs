@@ -1,0 +1,187 @@
+//! Missions: a vehicle, where its flight begins, and how it is steered, read from TOML.
+//!
+//! A mission is data only. Keys carry their units; unknown keys are errors. Its airframe is a table of its own or the
+//! name of a built-in one.
+
+use serde::Deserialize;
+
+use crate::aim::AimGains;
+use crate::airframe::{Airframe, AirframeError};
+use crate::descent::DescentGains;
+use crate::estimator::EstimatorConfig;
+use crate::ignition::IgnitionSettings;
+use crate::motors::{self, MotorError};
+use crate::powered::PoweredSettings;
+use crate::profile::{GateLimits, TouchdownBox};
+use crate::thrust_curve::ThrustCurve;
+
+/// Where a mission begins: at apogee, nose up.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ApogeeStart {
+    /// Height of the centre of gravity above the pad, m.
+    pub height_m: f64,
+    /// Horizontal distance from the pad, m.
+    pub distance_m: f64,
+    /// Horizontal speed, away from the pad, m/s.
+    pub speed_m_s: f64,
+    /// Tilt of the nose from the vertical, along the motion, degrees.
+    pub tilt_deg: f64,
+}
+
+/// What the legs take.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegLimits {
+    /// Largest vertical speed, m/s.
+    pub vertical_m_s: f64,
+    /// Largest lateral speed, m/s.
+    pub lateral_m_s: f64,
+    /// Largest tilt, degrees.
+    pub tilt_deg: f64,
+    /// Largest rotation rate, degrees per second.
+    pub rate_deg_s: f64,
+}
+
+/// Everything that distinguishes one flight from apogee from another, but for chance.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mission {
+    /// Short name, as given on a command line.
+    pub name: String,
+    /// One line for a person choosing.
+    pub summary: String,
+    /// The vehicle.
+    #[serde(deserialize_with = "airframe")]
+    pub airframe: Airframe,
+    /// Gravity, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Altitude of the pad above the sea, m.
+    pub pad_altitude_m: f64,
+    /// The fins steer; otherwise they stay open and equal (passive descent).
+    pub steered: bool,
+    /// Lag with which the thrust scale follows what is felt, s.
+    pub motor_lag_s: f64,
+    /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
+    pub soft_tilt_deg: f64,
+    /// Where it begins.
+    pub start: ApogeeStart,
+    /// The estimator.
+    #[serde(default)]
+    pub estimator: EstimatorConfig,
+    /// Steering by fins.
+    pub descent: DescentGains,
+    /// When to light.
+    pub ignition: IgnitionSettings,
+    /// The landing burn.
+    pub powered: PoweredSettings,
+    /// The gimbal loop.
+    pub aim: AimGains,
+    /// Limits of the checks before ignition.
+    pub gate: GateLimits,
+    /// What counts as a landing: the landing paper's Table 2.
+    pub touchdown_limits: TouchdownBox,
+    /// What the legs take.
+    pub leg_limits: LegLimits,
+}
+
+/// A mission that cannot be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum MissionError {
+    /// The text is not a mission.
+    #[error("{origin}: {message}")]
+    Parse {
+        /// Where the text came from (a path or a built-in's name).
+        origin: String,
+        /// The parser's words, with line, column and key.
+        message: String,
+    },
+    /// The airframe is out of range.
+    #[error("{origin}")]
+    Airframe {
+        /// Where the text came from.
+        origin: String,
+        /// Why.
+        #[source]
+        source: AirframeError,
+    },
+    /// The motor is not to be had.
+    #[error(transparent)]
+    Motor(#[from] MotorError),
+}
+
+/// The built-in missions: name and TOML text.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("mk2", include_str!("../missions/mk2.toml")),
+];
+
+impl Mission {
+    /// Reads a mission from TOML; `origin` names it in messages.
+    ///
+    /// # Errors
+    /// [`MissionError`] names the key and what would be accepted.
+    pub fn from_toml(text: &str, origin: &str) -> Result<Self, MissionError> {
+        let mission: Self = toml::from_str(text).map_err(|error| MissionError::Parse {
+            origin: origin.to_owned(),
+            message: error.to_string(),
+        })?;
+        mission
+            .airframe
+            .validate()
+            .map_err(|source| MissionError::Airframe { origin: origin.to_owned(), source })?;
+        mission.motor()?;
+        Ok(mission)
+    }
+
+    /// The built-in mission of a name.
+    pub fn builtin(name: &str) -> Option<Result<Self, MissionError>> {
+        BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| Self::from_toml(text, name))
+    }
+
+    /// The landing motor's certified thrust curve.
+    ///
+    /// # Errors
+    /// No built-in motor has that name.
+    pub fn motor(&self) -> Result<ThrustCurve, MissionError> {
+        Ok(motors::builtin(&self.airframe.motor)?)
+    }
+}
+
+/// An airframe's name, or the airframe itself.
+fn airframe<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Airframe, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum NameOrTable {
+        Name(String),
+        Table(Box<Airframe>),
+    }
+    match NameOrTable::deserialize(deserializer)? {
+        NameOrTable::Name(name) => Airframe::builtin(&name).map_err(serde::de::Error::custom),
+        NameOrTable::Table(airframe) => Ok(*airframe),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_builtin_mission_is_sound() {
+        for (name, text) in BUILTIN {
+            let mission = Mission::from_toml(text, name).expect("sound");
+            assert_eq!(mission.name, *name);
+        }
+    }
+
+    #[test]
+    fn an_unknown_airframe_or_key_is_named() {
+        let (name, text) = BUILTIN[0];
+        let message = Mission::from_toml(&text.replace("airframe = \"mk2\"", "airframe = \"mk9\""), name)
+            .expect_err("unknown")
+            .to_string();
+        assert!(message.contains("no airframe is named 'mk9'"), "{message}");
+        let message =
+            Mission::from_toml(&format!("colour = 1\n{text}"), name).expect_err("unknown").to_string();
+        assert!(message.contains("colour"), "{message}");
+    }
+}

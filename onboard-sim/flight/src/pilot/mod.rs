@@ -1,0 +1,207 @@
+//! The flight computer from apogee to touchdown: one frame in, one set of commands out.
+//!
+//! [`Pilot::step`] is deterministic and its only way forward: the same [`PilotInput`]s give the same
+//! [`PilotOutput`]s, so a log of inputs flies the flight again. A frame is 5 ms: estimate, watch the motor, move through
+//! the [phase table](crate::phase), point fins and gimbal. Every tenth frame the outlook and the landing are planned.
+
+mod fly;
+mod motor_watch;
+mod outlook;
+
+use nalgebra::Vector3;
+
+pub use motor_watch::MotorWatch;
+pub use outlook::Outlook;
+
+use crate::aim::AimLoop;
+use crate::airframe::{Airframe, MassModel};
+use crate::controller::ControlLevel;
+use crate::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
+use crate::mission::{Mission, MissionError};
+use crate::phase::{Event, Mode, Phase, StartPoint, transition};
+use crate::powered::{PoweredGuidance, PoweredReport};
+use crate::rigid::RigidState;
+use crate::thrust_curve::ThrustCurve;
+
+/// Frames between plans.
+pub const FRAMES_PER_PLAN: u64 = 10;
+
+/// What the flight computer knows of its motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sensed {
+    /// Sensors, through the estimator.
+    Measured(Measurements),
+    /// The truth as the estimate: for studies of guidance alone.
+    Known(Estimate),
+}
+
+/// Everything a frame depends on besides the pilot's memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PilotInput {
+    /// Number of the frame.
+    pub frame: u64,
+    /// End of the frame, s.
+    pub time_s: f64,
+    /// What was sensed.
+    pub sensed: Sensed,
+    /// Fin angles that the servos report, rad.
+    pub fins_rad: [f64; 4],
+    /// A foot touches the ground.
+    pub contact: bool,
+    /// The igniter has continuity.
+    pub igniter_continuity: bool,
+    /// The operator asked for an abort.
+    pub abort: bool,
+}
+
+/// The commands of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PilotOutput {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Fin openings, rad.
+    pub fins_rad: [f64; 4],
+    /// Current through the landing motor's igniter.
+    pub ignite: bool,
+    /// The parachute is released.
+    pub parachute: bool,
+    /// The phase after the frame.
+    pub phase: Phase,
+    /// What decided where the nose points.
+    pub level: ControlLevel,
+}
+
+/// The flight computer's memory.
+#[derive(Debug, Clone)]
+pub struct Pilot {
+    mission: Mission,
+    curve: ThrustCurve,
+    mass: MassModel,
+    estimator: Estimator,
+    estimate: Option<Estimate>,
+    mode: Mode,
+    ignited_at_s: Option<f64>,
+    motor: MotorWatch,
+    drag_scale: f64,
+    outlook: Outlook,
+    powered: PoweredGuidance,
+    aim_loop: AimLoop,
+    fin_share: f64,
+    fins_rad: [f64; 4],
+    gate_refusal: Option<&'static str>,
+}
+
+impl Pilot {
+    /// A pilot that is let go at apogee, armed, with its idea of where it is and how sure it is of that.
+    ///
+    /// # Errors
+    /// The mission's motor is not to be had.
+    pub fn at_apogee(
+        mission: &Mission,
+        time_s: f64,
+        believed: &RigidState,
+        uncertainty: &StartUncertainty,
+    ) -> Result<Self, MissionError> {
+        let curve = mission.motor()?;
+        let airframe = &mission.airframe;
+        let frame_s = mission.estimator.frame_s;
+        let mut mode = Mode::power_up(time_s);
+        for event in [
+            Event::SelfTestPassed,
+            Event::PinPulled,
+            Event::ArmRequested { checks_passed: true },
+            Event::StartRequested { countdown_s: 0.0 },
+            Event::ReleasedAt(StartPoint::Apogee),
+        ] {
+            mode = transition(&mode, event, time_s).mode;
+        }
+        Ok(Self {
+            curve: curve.clone(),
+            mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
+            estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
+            estimate: None,
+            mode,
+            ignited_at_s: None,
+            motor: MotorWatch::new(frame_s, mission.motor_lag_s),
+            drag_scale: 1.0,
+            outlook: Outlook::default(),
+            powered: PoweredGuidance::new(mission.powered),
+            aim_loop: AimLoop::new(mission.aim, frame_s),
+            fin_share: 1.0,
+            fins_rad: [airframe.fins.closed_rad(); 4],
+            gate_refusal: None,
+            mission: mission.clone(),
+        })
+    }
+
+    /// Phase and latches.
+    pub fn mode(&self) -> &Mode {
+        &self.mode
+    }
+
+    /// The estimate of the last frame.
+    pub fn estimate(&self) -> Option<&Estimate> {
+        self.estimate.as_ref()
+    }
+
+    /// What the last plan found.
+    pub fn report(&self) -> &PoweredReport {
+        self.powered.report()
+    }
+
+    /// The outlook on ignition and abort.
+    pub fn outlook(&self) -> &Outlook {
+        &self.outlook
+    }
+
+    /// Thrust felt over thrust certified.
+    pub fn thrust_scale(&self) -> f64 {
+        self.motor.scale()
+    }
+
+    /// Drag felt over drag expected.
+    pub fn drag_scale(&self) -> f64 {
+        self.drag_scale
+    }
+
+    /// Time since the landing motor's thrust began, s.
+    pub fn burning_s(&self, time_s: f64) -> Option<f64> {
+        self.motor.burning_s(time_s)
+    }
+
+    /// When the landing motor was commanded to light, s.
+    pub fn ignited_at_s(&self) -> Option<f64> {
+        self.ignited_at_s
+    }
+
+    /// The gate check that stands in the way, if one did at the last evaluation.
+    pub fn gate_refusal(&self) -> Option<&'static str> {
+        self.gate_refusal
+    }
+
+    fn airframe(&self) -> &Airframe {
+        &self.mission.airframe
+    }
+
+    fn crossflow_area_m2(&self) -> f64 {
+        let body = &self.airframe().body;
+        body.crossflow_drag_coefficient * body.length_m * body.diameter_m
+    }
+
+    fn body_drag_area_m2(&self) -> f64 {
+        self.airframe().drag_area_m2(0.0)
+    }
+
+    fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
+        let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
+        each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+    }
+
+    fn largest_fin_drag_area_m2(&self) -> f64 {
+        self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
+    }
+
+    fn wind_m_s(&self) -> Vector3<f64> {
+        self.estimate.map_or_else(Vector3::zeros, |estimate| estimate.wind_m_s.push(0.0))
+    }
+}
