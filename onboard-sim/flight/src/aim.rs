@@ -85,7 +85,8 @@ pub struct AimLoop {
 impl AimLoop {
     /// A loop at rest, called every `frame_s`.
     pub fn new(gains: AimGains, frame_s: f64) -> Self {
-        let latency_frames = libm::round(gains.latency_s / frame_s).clamp(0.0, MAX_LATENCY_FRAMES as f64) as usize;
+        let latency_frames =
+            libm::round(gains.latency_s / frame_s).clamp(0.0, MAX_LATENCY_FRAMES as f64) as usize;
         Self {
             gains,
             frame_s,
@@ -216,7 +217,8 @@ mod tests {
                 disturbance_rad_s2 - turning * libm::sin(applied[0]),
                 -turning * libm::sin(applied[1]),
             );
-            attitude *= UnitQuaternion::from_scaled_axis(rate * frame_s + acceleration * (0.5 * frame_s * frame_s));
+            attitude *=
+                UnitQuaternion::from_scaled_axis(rate * frame_s + acceleration * (0.5 * frame_s * frame_s));
             rate += acceleration * frame_s;
             overshoot = overshoot.max(-turn_to_aim_rad(&attitude, &Vector3::z()).y * -1.0);
         }

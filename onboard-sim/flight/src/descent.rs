@@ -66,8 +66,7 @@ impl DescentGains {
     /// The horizontal acceleration wanted, m/s^2, in the world.
     fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
         let time_s = situation.time_to_go_s.max(self.time_to_go_min_s);
-        let wanted =
-            state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
+        let wanted = state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
         Vector3::new(wanted.x, wanted.y, 0.0)
     }
 
@@ -84,7 +83,11 @@ impl DescentGains {
             };
         }
         let upstream = -through_air_m_s / airspeed_m_s;
-        let lean = if steered { self.lean(state, situation, &upstream, dynamic_pressure_pa) } else { Vector3::zeros() };
+        let lean = if steered {
+            self.lean(state, situation, &upstream, dynamic_pressure_pa)
+        } else {
+            Vector3::zeros()
+        };
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
@@ -183,7 +186,11 @@ mod tests {
         let passive = gains().demand(&falling(), &situation, false);
         let steered = gains().demand(&falling(), &situation, true);
         assert!(passive.nose_in_world.y > 0.1, "weathercocked: {}", passive.nose_in_world);
-        assert!(steered.nose_in_world.y > passive.nose_in_world.y, "leaning further: {}", steered.nose_in_world);
+        assert!(
+            steered.nose_in_world.y > passive.nose_in_world.y,
+            "leaning further: {}",
+            steered.nose_in_world
+        );
     }
 
     #[test]

@@ -70,6 +70,13 @@ impl IgnitionSettings {
         let chosen_m = common.or(certified).map(|band| band.low_m + self.place * (band.high_m - band.low_m));
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
-        IgnitionOutlook { band: certified, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s }
+        IgnitionOutlook {
+            band: certified,
+            common,
+            chosen_m,
+            onset_height_m,
+            onset_vertical_m_s,
+            command_in_s,
+        }
     }
 }

@@ -20,16 +20,20 @@
 #![warn(missing_docs)]
 
 pub mod aim;
+pub mod airframe;
 pub mod arming;
+pub mod atmosphere;
 pub mod burn;
 pub mod check;
 pub mod controller;
 pub mod descent;
 pub mod dynamics;
 pub mod estimator;
+pub mod fins;
 pub mod gate;
 pub mod ignition;
 pub mod mission;
+pub mod motors;
 pub mod nmpc;
 pub mod phase;
 pub mod pilot;
@@ -37,6 +41,7 @@ pub mod powered;
 pub mod profile;
 pub mod rigid;
 pub mod stabiliser;
+pub mod thrust_curve;
 pub mod thrust_estimate;
 pub mod verdict;
 pub mod vertical;

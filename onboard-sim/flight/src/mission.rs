@@ -111,9 +111,7 @@ pub enum MissionError {
 }
 
 /// The built-in missions: name and TOML text.
-pub const BUILTIN: &[(&str, &str)] = &[
-    ("mk2", include_str!("../missions/mk2.toml")),
-];
+pub const BUILTIN: &[(&str, &str)] = &[("mk2", include_str!("../missions/mk2.toml"))];
 
 impl Mission {
     /// Reads a mission from TOML; `origin` names it in messages.
@@ -121,10 +119,8 @@ impl Mission {
     /// # Errors
     /// [`MissionError`] names the key and what would be accepted.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, MissionError> {
-        let mission: Self = toml::from_str(text).map_err(|error| MissionError::Parse {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        })?;
+        let mission: Self = toml::from_str(text)
+            .map_err(|error| MissionError::Parse { origin: origin.to_owned(), message: error.to_string() })?;
         mission
             .airframe
             .validate()

@@ -186,13 +186,7 @@ impl Column {
     }
 
     /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
-    pub fn fallen(
-        &self,
-        height_m: f64,
-        vertical_m_s: f64,
-        fin_drag_area_m2: f64,
-        time_s: f64,
-    ) -> (f64, f64) {
+    pub fn fallen(&self, height_m: f64, vertical_m_s: f64, fin_drag_area_m2: f64, time_s: f64) -> (f64, f64) {
         /// Short enough for the midpoint rule at any speed a fall has.
         const STEP_S: f64 = 0.05;
         let steps = libm::ceil(time_s / STEP_S).max(1.0);

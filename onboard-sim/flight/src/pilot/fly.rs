@@ -2,20 +2,18 @@
 
 use nalgebra::Vector3;
 
+use super::known::Burning;
 use super::outlook::commit_height_m;
 use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
 use crate::aim::Aim;
 use crate::airframe::MassProperties;
-use crate::atmosphere;
-use crate::burn::Burn;
+use crate::atmosphere::Air;
 use crate::controller::ControlLevel;
 use crate::descent::DescentSituation;
 use crate::estimator::{Estimate, VehicleNow};
 use crate::fins::{Allocation, FinCommand, Moments, OpeningRange};
 use crate::gate::{GateInput, gate_checks};
 use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
-use crate::powered::PoweredSituation;
-use crate::vertical::{Braking, Column};
 
 /// A fin that is farther than this from its command is not there, rad.
 const FIN_THERE_RAD: f64 = 0.1;
@@ -31,10 +29,8 @@ impl Pilot {
         let time_s = input.time_s;
         let estimate = self.sense(input);
         self.estimate = Some(estimate);
-        let density_kg_m3 = atmosphere::at_geometric_altitude_m(
-            self.mission.pad_altitude_m + estimate.state.position_m.z,
-        )
-        .density_kg_m3;
+        let density_kg_m3 =
+            Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         self.feel(time_s, &estimate, density_kg_m3, &input.fins_rad);
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         if planning && self.mode.phase.in_descent() {
@@ -42,9 +38,9 @@ impl Pilot {
         }
         self.move_through_phases(input, &estimate);
 
-        let burning_s = self.motor.burning_s(time_s);
-        let mass = self.mass_now(burning_s);
-        let situation = burning_s.map(|burning_s| Situation { burning_s, mass, density_kg_m3 });
+        let burning_s = self.known.motor.burning_s(time_s);
+        let mass = self.known.mass_now(burning_s);
+        let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3 });
         let flying = self.mode.phase.in_landing_burn();
         let gimbal_rad = match &situation {
             Some(situation) if flying => {
@@ -66,30 +62,22 @@ impl Pilot {
         }
     }
 
-    fn mass_now(&self, burning_s: Option<f64>) -> MassProperties {
-        self.mass.at(burning_s.map_or(0.0, |burning_s| self.curve.propellant_burnt_kg(burning_s)))
-    }
-
-    fn burn(&self) -> Burn<'_> {
-        Burn { curve: &self.curve, impulse_scale: self.motor.scale(), time_scale: 1.0 }
-    }
-
     fn sense(&mut self, input: &PilotInput) -> Estimate {
         match input.sensed {
             Sensed::Known(estimate) => estimate,
             Sensed::Measured(measurements) => {
-                let burning_s = self.motor.burning_s(input.time_s);
-                let mass = self.mass_now(burning_s);
+                let burning_s = self.known.motor.burning_s(input.time_s);
+                let mass = self.known.mass_now(burning_s);
                 let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
-                let air = atmosphere::at_geometric_altitude_m(self.mission.pad_altitude_m + height_m);
+                let air = Air::at_height_m(self.known.mission.pad_altitude_m + height_m);
                 let vehicle = VehicleNow {
                     mass_kg: mass.mass_kg,
                     air_density_kg_m3: air.density_kg_m3,
-                    fin_drag_area_m2: self.drag_scale * self.fin_drag_area_m2(&input.fins_rad),
-                    fin_ahead_of_cg_m: self.airframe().fins.station_m - mass.cg_station_m,
-                    crossflow_area_m2: self.crossflow_area_m2(),
+                    fin_drag_area_m2: self.known.drag_scale * self.known.fin_drag_area_m2(&input.fins_rad),
+                    fin_ahead_of_cg_m: self.known.airframe().fins.station_m - mass.cg_station_m,
+                    crossflow_area_m2: self.known.crossflow_area_m2(),
                     motor_burning: burning_s.is_some() || self.mode.phase.in_landing_burn(),
-                    lidar_behind_cg_m: self.airframe().above_feet_m(mass.cg_station_m),
+                    lidar_behind_cg_m: self.known.airframe().above_feet_m(mass.cg_station_m),
                 };
                 self.estimator.step(&measurements, &vehicle)
             }
@@ -98,54 +86,36 @@ impl Pilot {
 
     /// Motor and drag from the specific force along the axis.
     fn feel(&mut self, time_s: f64, estimate: &Estimate, density_kg_m3: f64, fins_rad: &[f64; 4]) {
-        let mass = self.mass_now(self.motor.burning_s(time_s));
+        let mass = self.known.mass_now(self.known.motor.burning_s(time_s));
         let through_air = estimate.velocity_through_air_m_s();
         let along_m_s = through_air.dot(&estimate.state.nose_in_world());
-        let area_m2 = self.body_drag_area_m2() + self.fin_drag_area_m2(fins_rad);
+        let area_m2 = self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(fins_rad);
         let drag_n = -0.5 * density_kg_m3 * through_air.norm() * along_m_s * area_m2;
         let felt_n = mass.mass_kg * estimate.specific_force_m_s2.x;
         if self.mode.phase.in_landing_burn() {
-            self.motor.feel(time_s, felt_n - self.drag_scale * drag_n, &self.curve);
+            self.known.motor.feel(time_s, felt_n - self.known.drag_scale * drag_n, &self.known.curve);
         } else if self.mode.phase.in_descent() && -along_m_s > DRAG_SPEED_M_S {
-            let share = self.mission.estimator.frame_s / DRAG_LAG_S;
-            self.drag_scale += share * ((felt_n / drag_n).clamp(0.7, 1.3) - self.drag_scale);
+            let share = self.known.mission.estimator.frame_s / DRAG_LAG_S;
+            self.known.drag_scale += share * ((felt_n / drag_n).clamp(0.7, 1.3) - self.known.drag_scale);
         }
-    }
-
-    fn column(&self, density_kg_m3: f64) -> Column {
-        let mission = &self.mission;
-        let scaled = |area_m2: f64| self.drag_scale * area_m2;
-        Column {
-            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
-            gravity_m_s2: mission.gravity_m_s2,
-            air_density_kg_m3: density_kg_m3,
-            body_drag_area_m2: scaled(self.body_drag_area_m2()),
-            crossflow_area_m2: self.crossflow_area_m2(),
-            soft: Braking { tilt_rad: mission.soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
-            hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
-            touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
-            latest_after_s: mission.powered.latest_after_s,
-        }
-    }
-
-    fn feet_below_cg_m(&self, mass: &MassProperties) -> f64 {
-        self.airframe().above_feet_m(mass.cg_station_m)
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
-        let column = self.column(density_kg_m3);
+        let column = self.known.column(density_kg_m3);
         let state = &estimate.state;
-        let height_m = state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let vertical_m_s = state.velocity_m_s.z;
-        let fins_m2 = self.drag_scale * self.fin_drag_area_m2(&self.fins_rad);
-        let ignition = self.mission.ignition.outlook(&column, &self.curve, height_m, vertical_m_s, fins_m2);
-        let parachute = &self.airframe().parachute;
+        let fins_m2 = self.known.drag_scale * self.known.fin_drag_area_m2(&self.fins_rad);
+        let ignition =
+            self.known.mission.ignition.outlook(&column, &self.known.curve, height_m, vertical_m_s, fins_m2);
+        let parachute = &self.known.airframe().parachute;
         let to_ground_s = height_m.max(0.0) / (-vertical_m_s).max(5.0);
         let drifting = state.position_m + state.velocity_m_s * to_ground_s;
         // What the fall from apogee has made of the speed so far, by drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
-        let fallen_m = (self.mission.start.height_m - state.position_m.z).max(0.0);
-        let shed = libm::exp(-2.0 * self.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
+        let fallen_m = (self.known.mission.start.height_m - state.position_m.z).max(0.0);
+        let shed =
+            libm::exp(-2.0 * self.known.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
         self.outlook = Outlook {
             ignition,
             commit_height_m: commit_height_m(
@@ -173,14 +143,14 @@ impl Pilot {
                     .outlook
                     .ignition
                     .command_in_s
-                    .is_some_and(|in_s| in_s <= self.mission.ignition.arm_before_s);
+                    .is_some_and(|in_s| in_s <= self.known.mission.ignition.arm_before_s);
                 if soon {
                     self.happen(Event::LandArm, time_s);
                 }
             }
             Phase::LandArmed => self.consider_ignition(input, estimate),
             Phase::Ignition => {
-                if self.motor.burning_s(time_s).is_some() {
+                if self.known.motor.burning_s(time_s).is_some() {
                     self.happen(Event::ThrustConfirmed, time_s);
                 } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
                     && !self.mode.interlocks.no_light_latched
@@ -191,10 +161,10 @@ impl Pilot {
             _ => {}
         }
         if input.contact && !matches!(self.mode.phase, Phase::Touchdown | Phase::Safed) {
-            let burning_s = self.motor.burning_s(time_s);
-            let mass = self.mass_now(burning_s);
-            let thrust_n = burning_s.map_or(0.0, |burning_s| self.burn().thrust_n(burning_s));
-            let thrust_below_weight = thrust_n < mass.mass_kg * self.mission.gravity_m_s2;
+            let burning_s = self.known.motor.burning_s(time_s);
+            let mass = self.known.mass_now(burning_s);
+            let thrust_n = burning_s.map_or(0.0, |burning_s| self.known.burn().thrust_n(burning_s));
+            let thrust_below_weight = thrust_n < mass.mass_kg * self.known.mission.gravity_m_s2;
             self.happen(Event::Contact { thrust_below_weight }, time_s);
         }
     }
@@ -202,9 +172,10 @@ impl Pilot {
     /// The chosen instant is now when thrust, commanded at the next frame, would begin below the chosen height.
     fn consider_ignition(&mut self, input: &PilotInput, estimate: &Estimate) {
         let ignition = &self.outlook.ignition;
-        let height_m = estimate.state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
+        let height_m = estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let fallen_since_m = self.outlook.height_m - height_m;
-        let due = ignition.chosen_m.is_some_and(|chosen_m| ignition.onset_height_m - fallen_since_m <= chosen_m);
+        let due =
+            ignition.chosen_m.is_some_and(|chosen_m| ignition.onset_height_m - fallen_since_m <= chosen_m);
         if due {
             let open = self.gate_open(input, estimate);
             self.happen(Event::IgnitionGate { open }, input.time_s);
@@ -214,7 +185,7 @@ impl Pilot {
     fn gate_open(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
         let state = &estimate.state;
         let ignition = &self.outlook.ignition;
-        let height_m = state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let onset_m = ignition.onset_height_m - (self.outlook.height_m - height_m);
         let gate = GateInput {
             tilt_rad: state.tilt_rad(),
@@ -231,7 +202,7 @@ impl Pilot {
             igniter_continuity: input.igniter_continuity,
             estimator_healthy: estimate.health.is_good(),
         };
-        let checks = gate_checks(&self.mission.gate, &gate);
+        let checks = gate_checks(&self.known.mission.gate, &gate);
         self.gate_refusal = checks.iter().find(|check| !check.passed).map(|check| check.name);
         self.gate_refusal.is_none()
     }
@@ -251,59 +222,38 @@ impl Pilot {
         }
     }
 
-    fn powered_situation<'a>(
-        &'a self,
-        estimate: &Estimate,
-        situation: &Situation,
-        fins_rad: &[f64; 4],
-    ) -> PoweredSituation<'a> {
-        PoweredSituation {
-            burn: self.burn(),
-            burning_s: situation.burning_s,
-            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
-            inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
-            arm_m: situation.mass.cg_station_m,
-            feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
-            gravity_m_s2: self.mission.gravity_m_s2,
-            air_density_kg_m3: situation.density_kg_m3,
-            wind_m_s: estimate.wind_m_s.push(0.0),
-            body_drag_area_m2: self.drag_scale * self.body_drag_area_m2(),
-            crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.drag_scale * self.fin_drag_area_m2(fins_rad),
-            gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
-        }
-    }
-
-    fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Situation, fins_rad: &[f64; 4]) {
-        let column = self.column(situation.density_kg_m3);
+    fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
+        let column = self.known.column(situation.density_kg_m3);
         let state = &estimate.state;
-        let height_m = state.position_m.z - self.feet_below_cg_m(&situation.mass);
-        let burn = self.burn();
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
+        let burn = self.known.burn();
         self.fin_share = column.fin_share(&burn, situation.burning_s, state.velocity_m_s.z, height_m);
         if self.mode.interlocks.degraded {
             return;
         }
-        let mut powered = self.powered.clone();
-        powered.plan(time_s, state, &self.powered_situation(estimate, situation, fins_rad));
-        self.powered = powered;
+        let situation = self.known.powered_situation(estimate, situation, fins_rad);
+        self.powered.plan(time_s, state, &situation);
     }
 
     fn gimbal(
         &mut self,
         time_s: f64,
         estimate: &Estimate,
-        situation: &Situation,
+        situation: &Burning,
         fins_rad: &[f64; 4],
     ) -> [f64; 2] {
-        let thrust_n = self.burn().thrust_n(situation.burning_s);
-        let aim: Aim =
-            self.powered.aim(time_s, &estimate.state, &self.powered_situation(estimate, situation, fins_rad));
+        let thrust_n = self.known.burn().thrust_n(situation.burning_s);
+        let aim: Aim = self.powered.aim(
+            time_s,
+            &estimate.state,
+            &self.known.powered_situation(estimate, situation, fins_rad),
+        );
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
             thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2
         } else {
             0.0
         };
-        let limit_rad = self.airframe().gimbal.limit_rad();
+        let limit_rad = self.known.airframe().gimbal.limit_rad();
         self.aim_loop.command_rad(
             &estimate.state.world_from_body,
             &estimate.state.rate_rad_s,
@@ -313,35 +263,42 @@ impl Pilot {
         )
     }
 
-    fn fins(&self, estimate: &Estimate, mass: &MassProperties, density_kg_m3: f64, burning: bool) -> [f64; 4] {
-        let fins = &self.airframe().fins;
+    fn fins(
+        &self,
+        estimate: &Estimate,
+        mass: &MassProperties,
+        density_kg_m3: f64,
+        burning: bool,
+    ) -> [f64; 4] {
+        let fins = &self.known.airframe().fins;
         let steering = matches!(self.mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition);
         if !(steering || burning) {
             // On the ground they stay where they are: nobody needs a servo moving there.
             let keep = matches!(self.mode.phase, Phase::Touchdown | Phase::Safed);
             return if keep { self.fins_rad } else { [fins.open_rad(); 4] };
         }
-        let largest_m2 = self.largest_fin_drag_area_m2();
+        let largest_m2 = self.known.largest_fin_drag_area_m2();
         let situation = DescentSituation {
             mass_kg: mass.mass_kg,
             inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
             air_density_kg_m3: density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            drag_area_m2: self.body_drag_area_m2() + self.fin_drag_area_m2(&self.fins_rad),
-            crossflow_area_m2: self.crossflow_area_m2(),
+            drag_area_m2: self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(&self.fins_rad),
+            crossflow_area_m2: self.known.crossflow_area_m2(),
             time_to_go_s: self.outlook.ignition.command_in_s.unwrap_or(0.0),
         };
-        let demand = self.mission.descent.demand(&estimate.state, &situation, self.mission.steered);
+        let demand =
+            self.known.mission.descent.demand(&estimate.state, &situation, self.known.mission.steered);
         let (moments, drag_area_m2, min_rad) = if burning {
             // The gimbal turns the vehicle now; the fins brake, and keep it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
-        } else if self.mission.steered {
+        } else if self.known.mission.steered {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())
         } else {
             return [fins.open_rad(); 4];
         };
         let allocation = Allocation {
-            model: self.airframe().fin_model(),
+            model: self.known.airframe().fin_model(),
             arm_m: fins.station_m - mass.cg_station_m,
             range: OpeningRange { min_rad, max_rad: fins.open_rad() },
         };
@@ -351,11 +308,4 @@ impl Pilot {
         };
         allocation.openings_rad(&command, demand.dynamic_pressure_pa)
     }
-}
-
-/// The burning vehicle this frame.
-struct Situation {
-    burning_s: f64,
-    mass: MassProperties,
-    density_kg_m3: f64,
 }

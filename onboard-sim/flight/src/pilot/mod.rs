@@ -5,23 +5,22 @@
 //! the [phase table](crate::phase), point fins and gimbal. Every tenth frame the outlook and the landing are planned.
 
 mod fly;
+mod known;
 mod motor_watch;
 mod outlook;
 
-use nalgebra::Vector3;
-
+use known::Known;
 pub use motor_watch::MotorWatch;
 pub use outlook::Outlook;
 
 use crate::aim::AimLoop;
-use crate::airframe::{Airframe, MassModel};
+use crate::airframe::MassModel;
 use crate::controller::ControlLevel;
 use crate::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::mission::{Mission, MissionError};
 use crate::phase::{Event, Mode, Phase, StartPoint, transition};
 use crate::powered::{PoweredGuidance, PoweredReport};
 use crate::rigid::RigidState;
-use crate::thrust_curve::ThrustCurve;
 
 /// Frames between plans.
 pub const FRAMES_PER_PLAN: u64 = 10;
@@ -74,15 +73,11 @@ pub struct PilotOutput {
 /// The flight computer's memory.
 #[derive(Debug, Clone)]
 pub struct Pilot {
-    mission: Mission,
-    curve: ThrustCurve,
-    mass: MassModel,
+    known: Known,
     estimator: Estimator,
     estimate: Option<Estimate>,
     mode: Mode,
     ignited_at_s: Option<f64>,
-    motor: MotorWatch,
-    drag_scale: f64,
     outlook: Outlook,
     powered: PoweredGuidance,
     aim_loop: AimLoop,
@@ -116,21 +111,23 @@ impl Pilot {
             mode = transition(&mode, event, time_s).mode;
         }
         Ok(Self {
-            curve: curve.clone(),
-            mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
             estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
             estimate: None,
             mode,
             ignited_at_s: None,
-            motor: MotorWatch::new(frame_s, mission.motor_lag_s),
-            drag_scale: 1.0,
             outlook: Outlook::default(),
             powered: PoweredGuidance::new(mission.powered),
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
             gate_refusal: None,
-            mission: mission.clone(),
+            known: Known {
+                mission: mission.clone(),
+                mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
+                curve,
+                motor: MotorWatch::new(frame_s, mission.motor_lag_s),
+                drag_scale: 1.0,
+            },
         })
     }
 
@@ -156,17 +153,17 @@ impl Pilot {
 
     /// Thrust felt over thrust certified.
     pub fn thrust_scale(&self) -> f64 {
-        self.motor.scale()
+        self.known.motor.scale()
     }
 
     /// Drag felt over drag expected.
     pub fn drag_scale(&self) -> f64 {
-        self.drag_scale
+        self.known.drag_scale
     }
 
     /// Time since the landing motor's thrust began, s.
     pub fn burning_s(&self, time_s: f64) -> Option<f64> {
-        self.motor.burning_s(time_s)
+        self.known.motor.burning_s(time_s)
     }
 
     /// When the landing motor was commanded to light, s.
@@ -177,31 +174,5 @@ impl Pilot {
     /// The gate check that stands in the way, if one did at the last evaluation.
     pub fn gate_refusal(&self) -> Option<&'static str> {
         self.gate_refusal
-    }
-
-    fn airframe(&self) -> &Airframe {
-        &self.mission.airframe
-    }
-
-    fn crossflow_area_m2(&self) -> f64 {
-        let body = &self.airframe().body;
-        body.crossflow_drag_coefficient * body.length_m * body.diameter_m
-    }
-
-    fn body_drag_area_m2(&self) -> f64 {
-        self.airframe().drag_area_m2(0.0)
-    }
-
-    fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
-        let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
-        each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
-    }
-
-    fn largest_fin_drag_area_m2(&self) -> f64 {
-        self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
-    }
-
-    fn wind_m_s(&self) -> Vector3<f64> {
-        self.estimate.map_or_else(Vector3::zeros, |estimate| estimate.wind_m_s.push(0.0))
     }
 }

@@ -238,7 +238,8 @@ impl PoweredGuidance {
 
     /// Plans the landing from a state at a time.
     pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
-        let plane = *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
+        let plane =
+            *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
         if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < FLOWN_OUT_S) {
             return;
         }
@@ -260,9 +261,8 @@ impl PoweredGuidance {
         situation: &PoweredSituation<'_>,
     ) -> Option<FreeTimeProblem> {
         let settings = &self.settings;
-        let carried_until_s = situation
-            .burn
-            .falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
+        let carried_until_s =
+            situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
         // Late in the burn there is no waiting for the thrust to fall any more, only for the ground.
         let to_ground_s = initial.z_m.max(0.0) / 2.0;
         let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
@@ -299,7 +299,13 @@ impl PoweredGuidance {
     }
 
     /// Keeps the trial as the flown plan if it is worth flying.
-    fn take(&mut self, time_s: f64, plane: Plane, problem: &FreeTimeProblem, situation: &PoweredSituation<'_>) {
+    fn take(
+        &mut self,
+        time_s: f64,
+        plane: Plane,
+        problem: &FreeTimeProblem,
+        situation: &PoweredSituation<'_>,
+    ) {
         let solution = &self.trial.solution;
         let usable = !solution.inputs_rad.is_empty()
             && solution.states.iter().all(PlanarState::is_finite)
@@ -344,9 +350,10 @@ impl PoweredGuidance {
         });
         flown.begins_s = time_s;
         flown.turning_rad_s2.clear();
-        flown.turning_rad_s2.extend((0..problem.intervals).map(|k| {
-            per_newton * ahead.mean_thrust_n(k as f64 * step_s, (k + 1) as f64 * step_s)
-        }));
+        flown.turning_rad_s2.extend(
+            (0..problem.intervals)
+                .map(|k| per_newton * ahead.mean_thrust_n(k as f64 * step_s, (k + 1) as f64 * step_s)),
+        );
         core::mem::swap(&mut flown.plan, &mut self.trial);
     }
 

@@ -1,0 +1,103 @@
+//! What the pilot knows of its vehicle, and has learnt of motor and drag.
+
+use super::MotorWatch;
+use crate::airframe::{Airframe, MassModel, MassProperties};
+use crate::burn::Burn;
+use crate::estimator::Estimate;
+use crate::mission::Mission;
+use crate::powered::PoweredSituation;
+use crate::thrust_curve::ThrustCurve;
+use crate::vertical::{Braking, Column};
+
+/// The vehicle as the pilot knows it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Known {
+    pub(super) mission: Mission,
+    pub(super) curve: ThrustCurve,
+    pub(super) mass: MassModel,
+    pub(super) motor: MotorWatch,
+    /// Drag felt over drag expected.
+    pub(super) drag_scale: f64,
+}
+
+/// The burning vehicle of a frame.
+pub(super) struct Burning {
+    pub(super) burning_s: f64,
+    pub(super) mass: MassProperties,
+    pub(super) density_kg_m3: f64,
+}
+
+impl Known {
+    pub(super) fn airframe(&self) -> &Airframe {
+        &self.mission.airframe
+    }
+
+    pub(super) fn crossflow_area_m2(&self) -> f64 {
+        let body = &self.airframe().body;
+        body.crossflow_drag_coefficient * body.length_m * body.diameter_m
+    }
+
+    pub(super) fn body_drag_area_m2(&self) -> f64 {
+        self.airframe().drag_area_m2(0.0)
+    }
+
+    pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
+        let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
+        each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+    }
+
+    pub(super) fn largest_fin_drag_area_m2(&self) -> f64 {
+        self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
+    }
+
+    pub(super) fn mass_now(&self, burning_s: Option<f64>) -> MassProperties {
+        self.mass.at(burning_s.map_or(0.0, |burning_s| self.curve.propellant_burnt_kg(burning_s)))
+    }
+
+    pub(super) fn burn(&self) -> Burn<'_> {
+        Burn { curve: &self.curve, impulse_scale: self.motor.scale(), time_scale: 1.0 }
+    }
+
+    pub(super) fn column(&self, density_kg_m3: f64) -> Column {
+        let mission = &self.mission;
+        let scaled = |area_m2: f64| self.drag_scale * area_m2;
+        Column {
+            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
+            gravity_m_s2: mission.gravity_m_s2,
+            air_density_kg_m3: density_kg_m3,
+            body_drag_area_m2: scaled(self.body_drag_area_m2()),
+            crossflow_area_m2: self.crossflow_area_m2(),
+            soft: Braking { tilt_rad: mission.soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
+            hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
+            touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
+            latest_after_s: mission.powered.latest_after_s,
+        }
+    }
+
+    pub(super) fn feet_below_cg_m(&self, mass: &MassProperties) -> f64 {
+        self.airframe().above_feet_m(mass.cg_station_m)
+    }
+
+    pub(super) fn powered_situation<'a>(
+        &'a self,
+        estimate: &Estimate,
+        situation: &Burning,
+        fins_rad: &[f64; 4],
+    ) -> PoweredSituation<'a> {
+        PoweredSituation {
+            burn: self.burn(),
+            burning_s: situation.burning_s,
+            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
+            inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
+            arm_m: situation.mass.cg_station_m,
+            feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
+            gravity_m_s2: self.mission.gravity_m_s2,
+            air_density_kg_m3: situation.density_kg_m3,
+            wind_m_s: estimate.wind_m_s.push(0.0),
+            body_drag_area_m2: self.drag_scale * self.body_drag_area_m2(),
+            crossflow_area_m2: self.crossflow_area_m2(),
+            fin_drag_area_m2: self.drag_scale * self.fin_drag_area_m2(fins_rad),
+            gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
+        }
+    }
+}
