@@ -20,7 +20,7 @@ const STILL_S: f64 = 0.3;
 pub struct Touchdown {
     /// Time since the start, s.
     pub time_s: f64,
-    /// State at contact.
+    /// The last state free of contact, a quarter of a millisecond before at most.
     pub state: RigidState,
     /// Vertical velocity of the centre of gravity, up, m/s.
     pub vertical_m_s: f64,
@@ -78,6 +78,12 @@ pub(crate) struct Ground {
 pub(crate) struct Contact {
     pub(crate) feet: usize,
     pub(crate) hull: bool,
+}
+
+impl Contact {
+    pub(crate) fn any(self) -> bool {
+        self.feet > 0 || self.hull
+    }
 }
 
 impl Ground {

@@ -216,34 +216,36 @@ impl World {
         let (mut specific_force, mut angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
         for part in 0..PARTS {
             let time_s = from_s + part_s * part as f64;
+            let before = self.state;
+            self.move_by(time_s, part_s, true);
+            specific_force += self.specific_force_m_s2;
+            angular_acceleration += self.angular_acceleration_rad_s2;
             let contact = self.ground.contact(&self.state, &self.cg_m());
-            if self.touchdown.is_none() && (contact.feet > 0 || contact.hull) {
-                self.touchdown = Some(self.touchdown_at(time_s));
+            if self.touchdown.is_none() && contact.any() {
+                // The last state free of contact: within this part the feet have already pushed.
+                self.touchdown = Some(self.touchdown_at(time_s, &before));
             }
             if self.touchdown.is_some() {
                 let thrust_over_weight = self.motor.thrust_n(time_s) / self.weight_n();
                 let outcome = self.ground.outcome(&self.state, contact, thrust_over_weight, part_s);
                 if let Some(outcome) = outcome {
-                    self.come_to_rest(time_s, outcome);
+                    self.come_to_rest(time_s + part_s, outcome);
                     return;
                 }
             }
-            self.move_by(time_s, part_s, true);
-            specific_force += self.specific_force_m_s2;
-            angular_acceleration += self.angular_acceleration_rad_s2;
         }
         self.specific_force_m_s2 = specific_force / PARTS as f64;
         self.angular_acceleration_rad_s2 = angular_acceleration / PARTS as f64;
     }
 
-    fn touchdown_at(&self, time_s: f64) -> Touchdown {
-        let (velocity, rate) = (&self.state.velocity_m_s, &self.state.rate_rad_s);
+    fn touchdown_at(&self, time_s: f64, state: &RigidState) -> Touchdown {
+        let (velocity, rate) = (&state.velocity_m_s, &state.rate_rad_s);
         Touchdown {
             time_s,
-            state: self.state,
+            state: *state,
             vertical_m_s: velocity.z,
             lateral_m_s: libm::hypot(velocity.x, velocity.y),
-            tilt_rad: self.state.tilt_rad(),
+            tilt_rad: state.tilt_rad(),
             rate_rad_s: rate.norm_squared().sqrt(),
             cross_rate_rad_s: libm::hypot(rate.y, rate.z),
             thrust_n: self.motor.thrust_n(time_s),

@@ -99,7 +99,7 @@ fn val_landing_paper_fig_5() {
     let speed_m_s = -world.touchdown().unwrap().vertical_m_s;
     let terminal_m_s = speed_m_s * (STANDARD_GRAVITY_M_S2 / felt_m_s2).sqrt();
     assert!((terminal_m_s - 39.4).abs() < 0.05, "{terminal_m_s} m/s");
-    assert!((speed_m_s - terminal_m_s).abs() < 0.1, "{speed_m_s} m/s, terminal {terminal_m_s}");
+    assert!((speed_m_s - terminal_m_s).abs() < 0.2, "{speed_m_s} m/s, terminal {terminal_m_s}");
 }
 
 /// Without air and thrust the mechanical energy and the angular momentum stay what they are.
