@@ -5,6 +5,9 @@ use nalgebra::UnitQuaternion;
 
 use super::*;
 
+mod invariants;
+mod landing;
+
 const OPEN: Actuators =
     Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
 
