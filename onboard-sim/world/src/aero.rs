@@ -121,15 +121,14 @@ impl Shape {
     fn add_fins(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
         let drag = half_density * self.fins.reference_area_m2 * self.fins.drag_coefficient;
         let lift = half_density * self.fins.reference_area_m2 * self.fins.lift_coefficient;
-        for i in 0..4 {
-            let (sine, outward) = (configuration.fin_sines[i], &self.fin_directions[i]);
+        for ((outward, sine), turn) in self.fin_directions.iter().zip(configuration.fin_sines).zip(ROLL) {
             let mut place_m = outward * self.fins.radius_m(sine) - configuration.cg_m;
             place_m.x += self.fin_station_m;
             let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
             let airspeed = length(&local);
             // Drag along the local wind; lift across both the wind and the fin's own direction from the axis.
             let force_n =
-                local * (-drag * sine * airspeed) - local.cross(outward) * (lift * sine * airspeed * ROLL[i]);
+                local * (-drag * sine * airspeed) - local.cross(outward) * (lift * sine * airspeed * turn);
             load.add_at(&place_m, &force_n);
         }
     }

@@ -100,10 +100,8 @@ proptest! {
         rows in proptest::collection::vec((-1.0..9.0_f64, -1.0..99.0_f64), 0..8),
         times in proptest::collection::vec(proptest::num::f64::ANY, 4),
     ) {
-        let mut text = "T 38 100 0 0.1 0.2 M\n".to_owned();
-        for (time_s, thrust_n) in rows {
-            text.push_str(&format!("{time_s} {thrust_n}\n"));
-        }
+        let rows = rows.iter().map(|(time_s, thrust_n)| format!("{time_s} {thrust_n}\n"));
+        let text: String = core::iter::once("T 38 100 0 0.1 0.2 M\n".to_owned()).chain(rows).collect();
         if let Ok(motor) = ThrustCurve::from_rasp(&text) {
             for time_s in times {
                 let thrust_n = motor.thrust_at_n(time_s);
