@@ -7,6 +7,9 @@
 //! * [`profile`]: the vehicle, motor, start, weights and limits, as data.
 //! * [`phase`]: the flight phases and the one table that moves between them.
 //! * [`arming`] and [`gate`]: the checks before arming and before ignition, each with the value found.
+//! * [`airframe`]: the vehicle's masses, shape and actuators, as data.
+//! * [`atmosphere`], [`thrust_curve`], [`motors`] and [`fins`]: the air, the motors and the fins' aerodynamics, for
+//!   the controller's model and the simulated truth alike.
 //! * [`rigid`]: the state of a rocket in space, and its frames.
 //! * [`estimator`]: the state and the wind, from the sensors.
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
