@@ -1,0 +1,248 @@
+//! One flight, from apogee until it lies still.
+
+use flight::estimator::{Estimate, Health, HeightSources, Measurements, Sigmas, StartUncertainty};
+use flight::mission::{Mission, MissionError};
+use flight::phase::Phase;
+use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
+use nalgebra::{Vector2, Vector3};
+use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
+use world::world::WorldError;
+use world::{Actuators, World};
+
+use crate::dispersion::Dispersion;
+use crate::draw::Draw;
+use crate::outcome::{Ending, Outcome, judge};
+
+/// A flight that lasts longer is given up, s: a fall from apogee under the parachute takes a minute.
+const LONGEST_S: f64 = 150.0;
+
+/// A flight that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum FlyError {
+    /// The mission's motor is not to be had.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The drawn truth cannot be simulated.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A sensor figure cannot be.
+    #[error(transparent)]
+    Sensors(#[from] SensorParamError),
+}
+
+/// One flight in the air.
+pub struct Flight {
+    mission: Mission,
+    world: World,
+    sensors: Option<Sensors>,
+    sensor_faults: SensorFaults,
+    pilot: Pilot,
+    command: Actuators,
+    output: Option<PilotOutput>,
+    frame: u64,
+    abort: bool,
+    finite: bool,
+    largest_errors: EstimatorErrors,
+}
+
+/// Errors of the estimate against the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EstimatorErrors {
+    /// Vertical velocity, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal velocity, m/s.
+    pub lateral_m_s: f64,
+    /// Height, m.
+    pub height_m: f64,
+    /// Angle between the estimated and the true nose, rad.
+    pub nose_rad: f64,
+}
+
+impl Flight {
+    /// A flight about to be let go at apogee.
+    ///
+    /// # Errors
+    /// The mission or the draw cannot be flown.
+    pub fn new(mission: &Mission, dispersion: &Dispersion, draw: &Draw) -> Result<Self, FlyError> {
+        let curve = mission.motor()?;
+        let world = World::new(&mission.airframe, &curve, &draw.truth, &draw.apogee, draw.flight_seed)?;
+        let uncertainty = StartUncertainty::at_apogee();
+        let (sensors, believed) = if dispersion.sensors {
+            let sensors = Sensors::new(&dispersion.sensor_params, draw.flight_seed, 0.0)?;
+            (Some(sensors), believed_start(&draw.apogee, &uncertainty, draw.flight_seed))
+        } else {
+            (None, draw.apogee)
+        };
+        let pilot = Pilot::at_apogee(mission, 0.0, &believed, &uncertainty)?;
+        let closed_rad = mission.airframe.fins.closed_rad();
+        Ok(Self {
+            mission: mission.clone(),
+            world,
+            sensors,
+            sensor_faults: SensorFaults::default(),
+            pilot,
+            command: Actuators {
+                gimbal_rad: [0.0; 2],
+                fins_rad: [closed_rad; 4],
+                ignite: false,
+                parachute: false,
+            },
+            output: None,
+            frame: 0,
+            abort: false,
+            finite: true,
+            largest_errors: EstimatorErrors::default(),
+        })
+    }
+
+    /// The truth.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The truth, to break something in it.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// What is broken about the sensors, to break more.
+    pub fn sensor_faults_mut(&mut self) -> &mut SensorFaults {
+        &mut self.sensor_faults
+    }
+
+    /// The flight computer.
+    pub fn pilot(&self) -> &Pilot {
+        &self.pilot
+    }
+
+    /// Asks for an abort at the next frame.
+    pub fn abort(&mut self) {
+        self.abort = true;
+    }
+
+    /// Number of frames flown.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// The commands of the last frame.
+    pub fn output(&self) -> Option<&PilotOutput> {
+        self.output.as_ref()
+    }
+
+    /// Flies one frame. `false` when there is no more to fly.
+    pub fn step(&mut self) -> bool {
+        let mut measured: Option<Measurements> = None;
+        for _ in 0..FRAME_MS {
+            self.world.step(&self.command);
+            if let Some(sensors) = &mut self.sensors {
+                let truth = SensorTruth {
+                    state: *self.world.state(),
+                    specific_force_m_s2: *self.world.specific_force_m_s2(),
+                    airspeed_m_s: self.world.air_velocity_m_s().norm(),
+                    cg_over_feet_m: self.world.cg_above_feet_m(),
+                };
+                measured = sensors.observe(&truth, &self.sensor_faults).or(measured);
+            }
+        }
+        self.frame += 1;
+        let input = PilotInput {
+            frame: self.frame,
+            time_s: self.world.time_s(),
+            sensed: measured.map_or_else(|| Sensed::Known(self.known()), Sensed::Measured),
+            fins_rad: self.world.fins_rad(),
+            contact: self.world.touchdown().is_some(),
+            igniter_continuity: true,
+            abort: core::mem::take(&mut self.abort),
+        };
+        let output = self.pilot.step(&input);
+        self.command = Actuators {
+            gimbal_rad: output.gimbal_rad,
+            fins_rad: output.fins_rad,
+            ignite: output.ignite,
+            parachute: output.parachute,
+        };
+        self.output = Some(output);
+        self.finite &= self.world.state().is_finite()
+            && output.gimbal_rad.iter().chain(&output.fins_rad).all(|angle| angle.is_finite());
+        if self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
+            let errors = self.errors();
+            let largest = &mut self.largest_errors;
+            largest.vertical_m_s = largest.vertical_m_s.max(errors.vertical_m_s);
+            largest.lateral_m_s = largest.lateral_m_s.max(errors.lateral_m_s);
+            largest.height_m = largest.height_m.max(errors.height_m);
+            largest.nose_rad = largest.nose_rad.max(errors.nose_rad);
+        }
+        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
+    }
+
+    /// The truth as an estimate.
+    fn known(&self) -> Estimate {
+        let world = &self.world;
+        let zero = Vector3::zeros();
+        Estimate {
+            time_s: world.time_s(),
+            state: *world.state(),
+            specific_force_m_s2: *world.specific_force_m_s2(),
+            wind_m_s: Vector2::new(world.wind_m_s().x, world.wind_m_s().y),
+            gyro_bias_rad_s: zero,
+            accelerometer_bias_m_s2: zero,
+            sigmas: Sigmas {
+                position_m: zero,
+                velocity_m_s: zero,
+                attitude_rad: zero,
+                gyro_bias_rad_s: zero,
+                accelerometer_bias_m_s2: zero,
+                wind_m_s: Vector2::zeros(),
+            },
+            heights: HeightSources {
+                inertial_m: world.state().position_m.z,
+                inertial_sigma_m: 0.0,
+                barometric_m: Some(world.state().position_m.z),
+            },
+            health: Health::Good,
+        }
+    }
+
+    /// Errors of the estimate at this moment.
+    pub fn errors(&self) -> EstimatorErrors {
+        let Some(estimate) = self.pilot.estimate() else { return EstimatorErrors::default() };
+        let truth = self.world.state();
+        let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
+        EstimatorErrors {
+            vertical_m_s: velocity.z.abs(),
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            height_m: (estimate.state.position_m.z - truth.position_m.z).abs(),
+            nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
+        }
+    }
+
+    /// The largest errors of the estimate in the last ten metres.
+    pub fn largest_errors(&self) -> &EstimatorErrors {
+        &self.largest_errors
+    }
+
+    /// What became of it so far.
+    pub fn outcome(&self) -> Outcome {
+        let ending = Ending {
+            touchdown: self.world.touchdown().copied(),
+            rest: self.world.rest().map(|rest| rest.outcome),
+            phase: self.pilot.mode().phase,
+            ignited: self.pilot.ignited_at_s().is_some(),
+            lit: self.world.thrust_begins_s().is_some(),
+            finite: self.finite,
+        };
+        judge(&self.mission, &ending)
+    }
+
+    /// Flies to the end.
+    pub fn run(&mut self) -> Outcome {
+        while self.step() {}
+        self.outcome()
+    }
+}
+
+/// Whether a phase is past the landing motor's light.
+pub fn burning(phase: Phase) -> bool {
+    matches!(phase, Phase::Powered)
+}
