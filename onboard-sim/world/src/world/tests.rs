@@ -7,6 +7,7 @@ use super::*;
 
 mod invariants;
 mod landing;
+mod planar;
 
 const OPEN: Actuators =
     Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
