@@ -54,6 +54,12 @@ pub enum ThrustCurveError {
         /// What would be accepted.
         required: &'static str,
     },
+    /// The file's name does not tell its format.
+    #[error("motor file '{file_name}': names that end in .eng (RASP) and .rse (RockSim) are accepted")]
+    UnknownFormat {
+        /// The name.
+        file_name: String,
+    },
     /// The text is not XML.
     #[error("not XML: {0}")]
     Xml(String),
@@ -87,6 +93,22 @@ impl ThrustCurve {
     /// [`ThrustCurveError`] names the line, the field and what would be accepted.
     pub fn from_rocksim(text: &str) -> Result<Self, ThrustCurveError> {
         Self::from_parts(rocksim::parse(text)?)
+    }
+
+    /// Reads a motor file by the ending of its name: `.eng` or `.rse`, in any case.
+    ///
+    /// # Errors
+    ///
+    /// [`ThrustCurveError`] names the line, the field and what would be accepted.
+    pub fn from_file_text(file_name: &str, text: &str) -> Result<Self, ThrustCurveError> {
+        let ending = file_name.rsplit_once('.').map_or("", |(_, ending)| ending);
+        if ending.eq_ignore_ascii_case("eng") {
+            Self::from_rasp(text)
+        } else if ending.eq_ignore_ascii_case("rse") {
+            Self::from_rocksim(text)
+        } else {
+            Err(ThrustCurveError::UnknownFormat { file_name: file_name.to_owned() })
+        }
     }
 
     fn from_parts(parts: Parts) -> Result<Self, ThrustCurveError> {

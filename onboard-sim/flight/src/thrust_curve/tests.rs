@@ -62,6 +62,10 @@ fn a_rocksim_file_is_the_same_motor() {
 <eng-data t="3." f="40." m="20."/><eng-data t="4." f="0." m="0."/></data>
 </engine></engine-list></engine-database>"#;
     assert_eq!(ThrustCurve::from_rocksim(text).unwrap(), trapezium());
+    assert_eq!(ThrustCurve::from_file_text("motors/T40.RSE", text).unwrap(), trapezium());
+    assert_eq!(ThrustCurve::from_file_text("T40.eng", TRAPEZIUM).unwrap(), trapezium());
+    let error = ThrustCurve::from_file_text("T40.csv", TRAPEZIUM).unwrap_err().to_string();
+    assert_eq!(error, "motor file 'T40.csv': names that end in .eng (RASP) and .rse (RockSim) are accepted");
 }
 
 #[test]
