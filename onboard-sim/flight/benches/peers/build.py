@@ -27,8 +27,8 @@ def main():
     todo = list(jobs())
     with multiprocessing.Pool(os.cpu_count()) as pool:
         for done, _ in enumerate(pool.imap_unordered(build, todo), 1):
-            print(f"\rcompiling the problem's functions: {done} of {len(todo)}", end="", flush=True)
-    print()
+            if done % 10 == 0 or done == len(todo):
+                print(f"compiling the problem's functions: {done} of {len(todo)}", flush=True)
 
 
 if __name__ == "__main__":

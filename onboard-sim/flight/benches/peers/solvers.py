@@ -13,7 +13,7 @@ import numpy as np
 import landing
 
 # Several times what any solve of these problems that ends takes.
-MOST_ITERATIONS = 200
+MOST_ITERATIONS = 100
 
 COLD_OPTIONS = {
     "fatrop": {
@@ -45,9 +45,14 @@ WARM_OPTIONS = {
 }
 
 
+# A path that misses the end height by more is no landing: with a hard end height the problem has no solution, m.
+LANDING_MISS_M = 1e-6
+
+
 @dataclasses.dataclass
 class Result:
-    """One solve. Inputs in rad; `plan` is what the same solver is warm-started with."""
+    """One solve. Inputs in rad; `plan` is what the same solver is warm-started with. `lands` is false where our
+    solver, which may pay for a missed end height, had to or found the start out of reach."""
 
     converged: bool
     ns: int
@@ -55,7 +60,7 @@ class Result:
     cost: float
     inputs: np.ndarray
     plan: object = None
-    miss: float = 0.0
+    lands: bool = True
 
 
 def guess(start, bend):
@@ -103,7 +108,7 @@ class Nlp:
         ns = time.thread_time_ns() - before
         stats, out = self.buffer.stats(), self.outputs
         plan = (out["x"].copy(), out["lam_x"].copy(), out["lam_g"].copy())
-        converged = bool(stats["success"]) and bool(np.all(np.isfinite(plan[0])))
+        converged = bool(stats["success"])
         return Result(converged, ns, stats["iter_count"], float(out["f"][0]), plan[0].reshape(-1, 7)[:, 0], plan)
 
 
@@ -158,7 +163,8 @@ class Ours:
     def _solve(self, *words):
         status, ns, iterations, cost, _stationarity, _feasibility, miss, *inputs = self._ask(*words)
         inputs = np.array([float(word) for word in inputs])
-        return Result(status == "converged", int(ns), int(iterations), float(cost), inputs, None, float(miss))
+        lands = status == "converged" and float(miss) <= LANDING_MISS_M
+        return Result(status == "converged", int(ns), int(iterations), float(cost), inputs, None, lands)
 
     def cold(self, start):
         """From its own two guesses, bent either way."""

@@ -14,14 +14,15 @@
 //! A solve runs twice and the second is timed, in the thread's own processor time: interruptions do not count. It is
 //! answered by `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad; `sweep` by
 //! the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one iteration;
-//! `peak` by flop/ns and the latencies of addition, multiplication, division and root in ns.
+//! `peak` by Gflop/s and the latencies of addition, multiplication, division and root in ns.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
 mod peak;
 
+use std::fmt::Write as _;
 use std::hint::black_box;
-use std::io::{BufRead, Write};
+use std::io::{BufRead, Write as _};
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
@@ -72,7 +73,7 @@ impl Peer {
         match words.next() {
             Some("cold") => {
                 let problem = self.problem(state(words)?, HORIZON);
-                Ok(self.timed(&problem, None))
+                self.timed(&problem, None)
             }
             Some("hold") => {
                 self.plan = self.last.clone();
@@ -85,7 +86,7 @@ impl Peer {
                 ensure!(samples < planned, "the plan has {planned} intervals; samples must be fewer");
                 let problem = self.problem(state(words)?, planned - samples);
                 let warm = self.plan.shifted(samples);
-                Ok(self.timed(&problem, Some(&warm)))
+                self.timed(&problem, Some(&warm))
             }
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
@@ -97,7 +98,7 @@ impl Peer {
         Problem::from_profile(&self.profile, start, 0.0, intervals, 1.0)
     }
 
-    fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> String {
+    fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> Result<String> {
         let Self { workspace, last, .. } = self;
         solve_into(black_box(problem), warm, workspace, last);
         let before = thread_ns();
@@ -113,9 +114,9 @@ impl Peer {
             last.condition_miss
         );
         for input in &last.inputs_rad {
-            answer += &format!(" {input:e}");
+            write!(answer, " {input:e}")?;
         }
-        answer
+        Ok(answer)
     }
 
     fn layers(&mut self, start: PlanarState) -> String {

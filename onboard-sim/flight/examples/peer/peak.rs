@@ -16,7 +16,7 @@ const STEPS: u32 = 20_000;
 
 /// Throughput of multiplication and addition, and latencies.
 pub(crate) struct Peak {
-    flop_per_ns: f64,
+    gflop_per_s: f64,
     add_ns: f64,
     multiply_ns: f64,
     divide_ns: f64,
@@ -25,8 +25,8 @@ pub(crate) struct Peak {
 
 impl fmt::Display for Peak {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { flop_per_ns, add_ns, multiply_ns, divide_ns, root_ns } = self;
-        write!(f, "{flop_per_ns} {add_ns} {multiply_ns} {divide_ns} {root_ns}")
+        let Self { gflop_per_s, add_ns, multiply_ns, divide_ns, root_ns } = self;
+        write!(f, "{gflop_per_s} {add_ns} {multiply_ns} {divide_ns} {root_ns}")
     }
 }
 
@@ -35,7 +35,7 @@ pub(crate) fn measured() -> Peak {
     let flops = (2 * WIDTH * CHAINS) as f64;
     let (factor, term) = (black_box(0.999_999), black_box(1e-6));
     Peak {
-        flop_per_ns: flops / per_step(&mut || multiply_add(factor, term)),
+        gflop_per_s: flops / per_step(&mut || multiply_add(factor, term)),
         add_ns: per_step(&mut || chain(|value| value + term)),
         multiply_ns: per_step(&mut || chain(|value| value * factor)),
         divide_ns: per_step(&mut || chain(|value| value / factor)),
