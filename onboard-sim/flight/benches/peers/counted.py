@@ -82,8 +82,8 @@ def root(number):
 
 
 # Additions and multiplications of a sine and cosine together to double precision: reduction by a pi/2 of three parts
-# (2 + 1 and 3 + 3), square and fourth power, two polynomials of six coefficients (5 + 6 each by Estrin's scheme), and
-# their ends (1 + 2, 2 + 2). On the longest path: 9 multiplications and 9 additions.
+# (5 and 4), square and fourth power (0 and 2), two polynomials of six coefficients in pairs (5 and 5 each), and their
+# ends (1 and 2, 2 and 2). On the longest path: 9 additions and 9 multiplications.
 SINE_COSINE = {"add": 5 + 2 * 5 + 1 + 2, "multiply": 4 + 2 + 2 * 5 + 2 + 2}
 SINE_COSINE_DEPTH = 9
 
