@@ -1,0 +1,99 @@
+"""The landing paper's problem as a CasADi NLP, compiled to C, and the public solvers on it.
+
+Variables are ordered by stage: (u_0, x_1, u_1, x_2, ..., u_{N-1}, x_N); the start state is a parameter.
+SI and radians; states are (x, z, theta, u, w, q) as in the controller.
+"""
+
+import math
+import os
+import subprocess
+
+import casadi as ca
+import numpy as np
+
+MASS_KG, INERTIA_KG_M2, ARM_M, GRAVITY_M_S2, THRUST_N = 3.0, 0.12, 0.52, 9.81, 33.3
+DRAG_PER_M = 1.225 * 0.0043 * 1.0 / (2.0 * MASS_KG)
+STEP_S, HORIZON = 0.1, 50
+STATE_WEIGHTS = np.array([0.5, 60.0, 150.0, 50.0, 70.0, 90.0])
+INPUT_WEIGHT = 1.0
+TARGET = np.array([0.0, 0.0, math.pi / 2.0, 0.0, 0.0, 0.0])
+GIMBAL_LIMIT_RAD = math.radians(20.0)
+X_FINAL_M = 20.0
+TOLERANCE = 1e-6
+
+FLAGS = ["-O3", "-march=native", "-fPIC", "-shared"]
+
+
+def step_function():
+    """One RK4 step of the planar equations, (state, gimbal) -> state."""
+    state, gimbal = ca.SX.sym("state", 6), ca.SX.sym("gimbal")
+
+    def slope(point):
+        theta, u, w, q = point[2], point[3], point[4], point[5]
+        speed = ca.sqrt(u * u + w * w + 1e-300)
+        push, side = THRUST_N / MASS_KG * ca.cos(gimbal), -THRUST_N / MASS_KG * ca.sin(gimbal)
+        return ca.vertcat(
+            u * ca.cos(theta) + w * ca.sin(theta),
+            u * ca.sin(theta) - w * ca.cos(theta),
+            q,
+            push - DRAG_PER_M * speed * u - GRAVITY_M_S2 * ca.sin(theta) - q * w,
+            side + GRAVITY_M_S2 * ca.cos(theta) + q * u,
+            -THRUST_N * ca.sin(gimbal) * ARM_M / INERTIA_KG_M2,
+        )
+
+    k1 = slope(state)
+    k2 = slope(state + STEP_S / 2 * k1)
+    k3 = slope(state + STEP_S / 2 * k2)
+    k4 = slope(state + STEP_S * k3)
+    after = state + STEP_S / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return ca.Function("step", [state, gimbal], [after])
+
+
+STEP = step_function()
+
+
+def nlp(intervals):
+    """The problem over `intervals` samples; one column of `path` a stage: (u_k, x_{k+1})."""
+    start, path = ca.MX.sym("start", 6), ca.MX.sym("path", 7, intervals)
+    gimbals, after = path[0, :], path[1:, :]
+    gaps = after - STEP.map(intervals)(ca.horzcat(start, after[:, :-1]), gimbals)
+    misses = after - ca.repmat(ca.DM(TARGET), 1, intervals)
+    weighted = ca.mtimes(ca.diag(ca.DM(STATE_WEIGHTS)), misses)
+    cost = STEP_S * 0.5 * (ca.dot(misses, weighted) + INPUT_WEIGHT * ca.dot(gimbals, gimbals))
+    return {"x": ca.vec(path), "p": start, "f": cost, "g": ca.vec(gaps)}
+
+
+def structure(solver, intervals):
+    """What a solver is told of the problem's structure."""
+    if solver != "fatrop":
+        return {}
+    return {
+        "structure_detection": "manual",
+        "N": intervals,
+        "nx": [0] + [6] * intervals,
+        "nu": [1] * intervals + [0],
+        "ng": [0] * (intervals + 1),
+        "equality": [True] * (6 * intervals),
+    }
+
+
+def compiled(solver, intervals, folder, expand=False):
+    """Path of a shared library of the problem's functions and derivatives as `solver` wants them.
+
+    `expand` unrolls all stages into one straight line: a little faster, and minutes to compile.
+    """
+    name = f"{solver}_{intervals}" + ("_expanded" if expand else "")
+    library = os.path.join(folder, name + ".so")
+    if not os.path.exists(library):
+        options = {**structure(solver, intervals), "expand": expand}
+        generator = ca.nlpsol("S", solver, nlp(intervals), options)
+        before = os.getcwd()
+        os.chdir(folder)  # CasADi writes into the working directory
+        try:
+            generator.generate_dependencies(name + ".c")
+        finally:
+            os.chdir(before)
+        source, partial = os.path.join(folder, name + ".c"), library + ".partial"
+        subprocess.check_call([os.environ.get("CC", "cc"), *FLAGS, source, "-o", partial])
+        os.rename(partial, library)
+    return library

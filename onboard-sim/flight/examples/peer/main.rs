@@ -1,0 +1,148 @@
+//! The landing controller's solver on a pipe, for a comparison with other solvers that takes turns problem by problem.
+//!
+//! One command a line on standard input, one line of answer each. A state is `x z theta u w q`, in m, rad, m/s and
+//! rad/s. The problem is the landing paper's own (no box at the end but its distance and height), N = 50.
+//!
+//! ```text
+//! cold STATE          solve the whole horizon from the solver's own two bent guesses
+//! hold                make the last solution the plan
+//! warm SAMPLES STATE  solve what is left SAMPLES after the plan began, warm-started with the plan
+//! sweep STATE         time the layers of one iteration at the cold solution
+//! peak                time the arithmetic of this machine
+//! ```
+//!
+//! A solve runs twice and the second is timed, in the thread's own processor time: interruptions do not count. It is
+//! answered by `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad; `sweep` by
+//! the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one iteration;
+//! `peak` by Gflop/s and the latencies of addition, multiplication, division and root in ns.
+#![expect(clippy::print_stdout, reason = "the answers")]
+
+mod clock;
+mod peak;
+
+use std::fmt::Write as _;
+use std::hint::black_box;
+use std::io::{BufRead, Write as _};
+
+use anyhow::{Context, Result, bail, ensure};
+use clock::{best_of, thread_ns};
+use flight::dynamics::PlanarState;
+use flight::nmpc::{Problem, Solution, WarmStart, Workspace, solve, solve_into};
+use flight::profile::Profile;
+
+const HORIZON: usize = 50;
+
+/// Fewest runs that are averaged, and how often that is repeated, for the layers of an iteration.
+const RUNS: u32 = 50;
+const REPEATS: u32 = 40;
+
+fn main() -> Result<()> {
+    let mut peer = Peer::new()?;
+    for line in std::io::stdin().lock().lines() {
+        let line = line?;
+        let answer = peer.answer(&line).with_context(|| format!("command '{line}'"))?;
+        println!("{answer}");
+        std::io::stdout().flush()?;
+    }
+    Ok(())
+}
+
+struct Peer {
+    profile: Profile,
+    workspace: Workspace,
+    last: Solution,
+    plan: Solution,
+}
+
+impl Peer {
+    fn new() -> Result<Self> {
+        let mut profile =
+            Profile::builtin("paper-calibrated").context("built-in profile paper-calibrated")?;
+        profile.nmpc.limits.final_box = None;
+        profile.nmpc.limits.altitude_min_m = None;
+        Ok(Self {
+            profile,
+            workspace: Workspace::default(),
+            last: Solution::default(),
+            plan: Solution::default(),
+        })
+    }
+
+    fn answer(&mut self, line: &str) -> Result<String> {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("cold") => {
+                let problem = self.problem(state(words)?, HORIZON);
+                self.timed(&problem, None)
+            }
+            Some("hold") => {
+                self.plan = self.last.clone();
+                Ok("held".to_owned())
+            }
+            Some("warm") => {
+                let samples: usize =
+                    words.next().context("samples are missing")?.parse().context("samples")?;
+                let planned = self.plan.inputs_rad.len();
+                ensure!(samples < planned, "the plan has {planned} intervals; samples must be fewer");
+                let problem = self.problem(state(words)?, planned - samples);
+                let warm = self.plan.shifted(samples);
+                self.timed(&problem, Some(&warm))
+            }
+            Some("sweep") => Ok(self.layers(state(words)?)),
+            Some("peak") => Ok(peak::measured().to_string()),
+            _ => bail!("must start with cold, hold, warm, sweep or peak"),
+        }
+    }
+
+    fn problem(&self, start: PlanarState, intervals: usize) -> Problem {
+        Problem::from_profile(&self.profile, start, 0.0, intervals, 1.0)
+    }
+
+    fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> Result<String> {
+        let Self { workspace, last, .. } = self;
+        solve_into(black_box(problem), warm, workspace, last);
+        let before = thread_ns();
+        solve_into(black_box(problem), warm, workspace, last);
+        let ns = thread_ns() - before;
+        let mut answer = format!(
+            "{} {ns} {} {:e} {:e} {:e} {:e}",
+            last.status.name().replace(' ', "-"),
+            last.iterations,
+            last.cost,
+            last.kkt_stationarity,
+            last.kkt_feasibility,
+            last.condition_miss
+        );
+        for input in &last.inputs_rad {
+            write!(answer, " {input:e}")?;
+        }
+        Ok(answer)
+    }
+
+    fn layers(&mut self, start: PlanarState) -> String {
+        let mut problem = self.problem(start, HORIZON);
+        let solution = solve(&problem, None);
+        let warm = solution.shifted(0);
+        let workspace = &mut self.workspace;
+        workspace.load(&problem, &warm);
+        let evaluated = best_of(REPEATS, RUNS, || workspace.evaluate_intervals(black_box(&problem)));
+        let swept = best_of(REPEATS, RUNS, || {
+            black_box(workspace.sweep(black_box(&problem)));
+        });
+        problem.solver.max_iterations = 1;
+        problem.initial.w_m_s += 0.02;
+        let last = &mut self.last;
+        let iterated =
+            best_of(REPEATS, RUNS, || solve_into(black_box(&problem), Some(&warm), workspace, last));
+        format!("{evaluated} {swept} {iterated}")
+    }
+}
+
+fn state<'a>(words: impl Iterator<Item = &'a str>) -> Result<PlanarState> {
+    let numbers: Vec<f64> =
+        words.map(|word| word.parse().with_context(|| format!("number '{word}'"))).collect::<Result<_>>()?;
+    let state: [f64; 6] = numbers
+        .try_into()
+        .map_err(|got: Vec<f64>| anyhow::anyhow!("6 numbers make a state, not {}", got.len()))?;
+    Ok(PlanarState::from_array(state))
+}
