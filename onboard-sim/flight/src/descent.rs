@@ -14,7 +14,7 @@ use crate::aim::turn_to_aim_rad;
 use crate::rigid::RigidState;
 
 /// Slower than this through the air, fins do nothing worth steering, m/s.
-const LEAST_AIRSPEED_M_S: f64 = 4.0;
+const LEAST_AIRSPEED_M_S: f64 = 12.0;
 
 /// How the fall is steered.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

@@ -25,6 +25,8 @@ pub struct ApogeeStart {
     pub distance_m: f64,
     /// Horizontal speed, away from the pad, m/s.
     pub speed_m_s: f64,
+    /// Share of the mean wind there that the vehicle has taken on by then.
+    pub carried_share: f64,
     /// Tilt of the nose from the vertical, along the motion, degrees.
     pub tilt_deg: f64,
 }
