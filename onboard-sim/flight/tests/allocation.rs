@@ -1,8 +1,12 @@
-//! A tick of the controller does not allocate, once it has rehearsed.
+//! A tick of the controller does not allocate, once it has rehearsed; nor does a search for the final time.
 #![expect(clippy::expect_used, reason = "a missing built-in profile is a failed test")]
 
 use flight::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
 use flight::dynamics::{PlanarModel, PlanarState};
+use flight::nmpc::Problem;
+use flight::nmpc::free_time::{
+    FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into,
+};
 use flight::phase::Phase;
 use flight::profile::Profile;
 
@@ -52,4 +56,49 @@ fn powered_ticks_do_not_allocate() {
     for level in [ControlLevel::Converged, ControlLevel::ShiftedPlan, ControlLevel::Stabiliser] {
         assert!(levels.contains(&level), "{level:?}");
     }
+}
+
+/// 37 N now and 1.5 N/s less ever after, on 3 kg that stay.
+struct Fading;
+
+impl Motor for Fading {
+    fn mean_thrust_n(&self, from_s: f64, to_s: f64) -> f64 {
+        37.0 - 0.75 * (from_s + to_s)
+    }
+
+    fn mean_mass_kg(&self, _: f64, _: f64) -> f64 {
+        3.0
+    }
+}
+
+#[test]
+fn warm_searches_for_the_final_time_do_not_allocate() {
+    let profile = Profile::builtin("paper-calibrated").expect("built in");
+    let mut problem = FreeTimeProblem {
+        landing: Problem::from_profile(&profile, profile.start.planar_state(), 0.0, 0, 1.0),
+        intervals: 50,
+        earliest_s: 0.5,
+        latest_s: 6.0,
+        target_drift_m_s: 0.0,
+        max_solves: 8,
+    };
+    problem.landing.final_box = None;
+    let mut workspace = FreeTimeWorkspace::default();
+    let (mut best, mut next) = (FreeTimeSolution::default(), FreeTimeSolution::default());
+    for found in [&mut best, &mut next] {
+        solve_free_time_into(&problem, &Fading, None, &mut workspace, found);
+    }
+    assert!(best.lands(), "{}", best.solution.condition_miss);
+    problem.max_solves = 3;
+    let mut iterations = 0;
+    for kick in [0.0, 0.02, -0.05] {
+        problem.landing.initial.w_m_s += kick;
+        let allocated = allocation_counter::measure(|| {
+            solve_free_time_into(&problem, &Fading, Some((&best, 0.0)), &mut workspace, &mut next);
+        });
+        assert_eq!(allocated.count_total, 0, "{kick}");
+        assert!(next.solves <= 3, "{}", next.solves);
+        iterations += next.solution.iterations;
+    }
+    assert!(iterations > 0);
 }

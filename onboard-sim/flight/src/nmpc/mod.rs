@@ -4,6 +4,8 @@
 //! [`SolveStatus`], data like the rest. [`solve_into`] is the same without allocation.
 //!
 //! * `problem`: the problem and its conditions, as data.
+//! * [`free_time`]: the same with the final time as one more unknown.
+//! * `resample`: a solution as a start for a problem with other nodes.
 //! * `bound`: what cannot be landed, and why.
 //! * `interior`: the solver, a stage-structured interior-point method with exact Hessians; its page has the
 //!   formulation, the steps and the references.
@@ -14,9 +16,11 @@
 //! dynamics with it, and full Gauss-Newton steps diverge from tilted starts.
 
 mod bound;
+pub mod free_time;
 mod interior;
 mod problem;
 pub mod reference;
+mod resample;
 mod rollout;
 
 pub use bound::best_touchdown_speed_m_s;
@@ -94,6 +98,10 @@ pub struct Solution {
     pub qp_iterations: u32,
     /// Running cost (Eq. 28 of the landing paper), without penalties.
     pub cost: f64,
+    /// Running cost plus the price of every broken condition.
+    pub price: f64,
+    /// Length of an interval, s.
+    pub step_s: f64,
     /// Largest component of the Lagrangian's gradient by states and inputs.
     pub kkt_stationarity: f64,
     /// Largest defect of the dynamics (m, rad, m/s or rad/s) or product of a slack and its multiplier (cost).
@@ -141,6 +149,17 @@ impl Solution {
         refill(&mut warm.inputs_rad, &self.inputs_rad, steps);
         refill(&mut warm.end_multipliers, &self.end_multipliers, 0);
         refill(&mut warm.floor_multipliers, &self.floor_multipliers, steps);
+    }
+
+    /// Back to nothing solved, with room for one as long as another.
+    fn make_room(&mut self, like: &Self) {
+        self.clear();
+        self.states.reserve(like.states.len());
+        self.costates.reserve(like.costates.len());
+        self.limit_multipliers.reserve(like.limit_multipliers.len());
+        self.inputs_rad.reserve(like.inputs_rad.len());
+        self.end_multipliers.reserve(like.end_multipliers.len());
+        self.floor_multipliers.reserve(like.floor_multipliers.len());
     }
 
     /// Back to nothing solved, keeping the room.
@@ -198,6 +217,7 @@ pub fn solve_into(
         let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
         workspace.solve(problem, fitting, solution);
     }
+    solution.step_s = problem.step_s;
     solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;
 }
 

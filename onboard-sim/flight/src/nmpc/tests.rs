@@ -1,5 +1,7 @@
 //! What the solver promises, on the landing paper's problem and the flown one.
 
+mod free_time;
+mod in_air;
 mod robust;
 
 use super::*;

@@ -45,6 +45,7 @@ mod barrier;
 mod filter;
 mod interval;
 mod iterate;
+mod lagrangian;
 mod lanes;
 mod layers;
 mod newton;

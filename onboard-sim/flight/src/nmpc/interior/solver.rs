@@ -87,7 +87,7 @@ impl Outcome {
 pub struct Workspace {
     pub(super) conditions: Vec<Condition>,
     pub(super) current: Iterate,
-    trial: Iterate,
+    pub(super) trial: Iterate,
     other: Iterate,
     pub(super) newton: Newton,
     filter: Filter,
@@ -274,6 +274,7 @@ impl Workspace {
         }
         solution.status = status;
         solution.cost = cost;
+        solution.price = current.price(problem, &self.conditions);
         solution.kkt_stationarity = residual.stationarity;
         solution.kkt_feasibility = residual.defect.max(residual.complementarity(0.0));
         solution.condition_miss = current.worst_violation(&self.conditions);

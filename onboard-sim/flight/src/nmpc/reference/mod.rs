@@ -27,10 +27,11 @@ use super::{Problem, Solution, WarmStart};
 
 /// Solves the landing problem.
 pub fn solve(problem: &Problem, warm: Option<&WarmStart>) -> Solution {
-    match warm.filter(|start| start.inputs_rad.len() == problem.intervals()) {
+    let solution = match warm.filter(|start| start.inputs_rad.len() == problem.intervals()) {
         Some(start) => sqp::solve_from(problem, start),
         None => cold(problem),
-    }
+    };
+    Solution { step_s: problem.step_s, ..solution }
 }
 
 fn cold(problem: &Problem) -> Solution {

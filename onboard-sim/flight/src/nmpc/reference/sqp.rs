@@ -101,6 +101,7 @@ fn solution_of(
     let (end_multipliers, floor_multipliers) = multipliers.split_at(ends);
     Solution {
         cost: iterate.trajectory.cost,
+        price: iterate.merit,
         kkt_stationarity: residual.stationarity,
         kkt_feasibility: residual.feasibility,
         condition_miss: iterate.trajectory.worst_violation(conditions),
