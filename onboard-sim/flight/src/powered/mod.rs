@@ -50,6 +50,8 @@ pub struct PoweredSettings {
     /// Box the plan ends in; its lateral speed is over the ground.
     #[serde(rename = "final")]
     pub final_box: FinalBox,
+    /// Least height of the feet for each second before touchdown, m/s.
+    pub floor_rise_m_s: f64,
     /// How long after thrust has fallen through the weight a plan may end, s.
     pub latest_after_s: f64,
     /// Most final times tried in a tick.
@@ -284,6 +286,7 @@ impl PoweredGuidance {
             x_final_m: settings.x_final_m,
             final_box: Some(settings.final_box),
             altitude_min_m: Some(0.0),
+            floor_rise_m_s: settings.floor_rise_m_s,
             // How soft it can be is the plan's to say; a bound from straight-up thrust would only hide it.
             touchdown_speed_max_m_s: f64::MAX,
             solver: settings.solver,
