@@ -66,6 +66,8 @@ pub struct Mission {
     pub motor_lag_s: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
     pub soft_tilt_deg: f64,
+    /// How long before touchdown the vehicle is upright already in that band, s.
+    pub settle_s: f64,
     /// Where it begins.
     pub start: ApogeeStart,
     /// The estimator.

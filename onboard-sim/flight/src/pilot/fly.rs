@@ -227,7 +227,13 @@ impl Pilot {
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
         let burn = self.known.burn();
-        self.fin_share = column.fin_share(&burn, situation.burning_s, state.velocity_m_s.z, height_m);
+        self.fin_share = column.fin_share(
+            &burn,
+            situation.burning_s,
+            state.velocity_m_s.z,
+            height_m,
+            self.known.mission.ignition.place,
+        );
         if self.mode.interlocks.degraded {
             return;
         }

@@ -71,6 +71,7 @@ impl Known {
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
             touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
             latest_after_s: mission.powered.latest_after_s,
+            settle_s: mission.settle_s,
         }
     }
 
