@@ -14,7 +14,7 @@ const FRAMES: u32 = 4;
 /// Below this dynamic pressure the air is not felt, Pa.
 const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
 /// An error of the drag coefficients does not average out; it counts as noise that lasts this long, s.
-const COEFFICIENT_ERROR_LASTS_S: f64 = 1.0;
+const COEFFICIENT_ERROR_LASTS_S: f64 = 2.0;
 
 /// The running mean of the sideways specific force, body y and z.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
