@@ -51,9 +51,9 @@ pub struct PadStart {
 }
 
 impl PadAlignment {
-    /// Takes one sample; one that is not a number is left out.
+    /// Takes one sample; one that no inertial unit can send is left out.
     pub fn take(&mut self, imu: &ImuSample) {
-        if !imu.is_finite() {
+        if !imu.is_plausible() {
             return;
         }
         self.samples = self.samples.saturating_add(1);

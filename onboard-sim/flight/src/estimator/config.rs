@@ -162,7 +162,7 @@ impl StartUncertainty {
             wind_m_s: 4.0,
             barometer_offset_m: 0.3,
             barometer_ram: 0.05,
-            gnss_horizontal_offset_m: 0.7,
+            gnss_horizontal_offset_m: 0.65,
             gnss_vertical_offset_m: 1.1,
         }
     }

@@ -2,6 +2,11 @@
 
 use nalgebra::Vector3;
 
+/// Beyond the range of hobby gyros (4,000 deg/s), rad/s.
+pub const LARGEST_RATE_RAD_S: f64 = 75.0;
+/// Beyond the range of high-g accelerometers (200 g), m/s^2.
+pub const LARGEST_SPECIFIC_FORCE_M_S2: f64 = 2000.0;
+
 /// Inertial measurement unit, the mean over the frame that has just ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuSample {
@@ -12,9 +17,11 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
-    /// Every number is finite.
-    pub fn is_finite(&self) -> bool {
-        self.gyro_rad_s.iter().chain(self.specific_force_m_s2.iter()).all(|value| value.is_finite())
+    /// Every number is one that an inertial unit can send: below [`LARGEST_RATE_RAD_S`] and
+    /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
+    pub fn is_plausible(&self) -> bool {
+        self.gyro_rad_s.iter().all(|rate| rate.abs() <= LARGEST_RATE_RAD_S)
+            && self.specific_force_m_s2.iter().all(|force| force.abs() <= LARGEST_SPECIFIC_FORCE_M_S2)
     }
 }
 

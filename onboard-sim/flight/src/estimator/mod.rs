@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is taken in the world). The inertial unit carries the state forward in full
-//! every frame. Its error, 22 numbers ([`covariance`]), is corrected by scalars: barometer with offset and ram error,
+//! every frame. its error, 22 numbers, is corrected by scalars: barometer with offset and ram error,
 //! late satellite fixes with a slowly wandering offset, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are all that a frame depends on: a log of them flies the estimator again, bit
@@ -41,7 +41,9 @@ pub use self::health::{Doubt, Health};
 use self::heights::HeightChannel;
 pub use self::heights::HeightSources;
 use self::history::History;
-pub use self::measurements::{GnssFix, ImuSample, Measurements, VehicleNow};
+pub use self::measurements::{
+    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements, VehicleNow,
+};
 use self::strapdown::{Noise, Nominal, Pending};
 use self::wind::Sideways;
 use crate::rigid::RigidState;

@@ -45,6 +45,17 @@ pub(crate) struct Frame {
     pub(crate) nees: f64,
 }
 
+impl Frame {
+    pub(crate) fn velocity_error_m_s(&self) -> Vector3<f64> {
+        self.estimate.state.velocity_m_s - self.truth.velocity_m_s
+    }
+
+    /// The turn about the world's axes from the estimated to the true attitude, rad.
+    pub(crate) fn turn_error_rad(&self) -> Vector3<f64> {
+        (self.truth.world_from_body * self.estimate.state.world_from_body.inverse()).scaled_axis()
+    }
+}
+
 impl Scene {
     /// Wind of some 3 m/s from a direction of the seed's own.
     pub(crate) fn of(seed: u64) -> Self {
