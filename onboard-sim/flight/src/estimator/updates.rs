@@ -152,7 +152,7 @@ impl Estimator {
     /// are the height over the cosine of the tilt.
     pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
-        if !(nose.z > LIDAR_COS_TILT) {
+        if nose.z < LIDAR_COS_TILT {
             self.gates.lidar.count(false);
             return;
         }

@@ -64,7 +64,8 @@ impl Estimator {
     pub(super) fn feel_wind(&mut self, vehicle: &VehicleNow) {
         let through_air = self.velocity_through_air_m_s();
         let dynamic_pressure_pa = 0.5 * vehicle.air_density_kg_m3 * through_air.norm_squared();
-        if vehicle.motor_burning || !(dynamic_pressure_pa > SMALLEST_DYNAMIC_PRESSURE_PA) {
+        let felt = dynamic_pressure_pa > SMALLEST_DYNAMIC_PRESSURE_PA;
+        if vehicle.motor_burning || !felt {
             self.sideways.clear();
             return;
         }

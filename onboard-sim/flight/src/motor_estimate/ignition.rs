@@ -28,7 +28,7 @@ impl Detector {
     pub(super) fn take(&mut self, curve: &impl NominalThrust, middle_s: f64, thrust_n: f64) -> Option<f64> {
         let mark_n = CAUGHT_SHARE * curve.peak_n();
         let before = self.last.replace((middle_s, thrust_n));
-        if !(thrust_n > mark_n) {
+        if thrust_n <= mark_n {
             self.crossed_s = None;
             return None;
         }

@@ -215,11 +215,10 @@ impl MotorEstimate {
     pub fn predict(&self, curve: &impl NominalThrust, time_s: f64, lights_at_s: f64) -> PredictedThrust {
         let ignition_s = match self.stage {
             MotorStage::Waiting => lights_at_s,
-            MotorStage::Burning => self.mean[IGNITION],
             MotorStage::EndedEarly { at_s } if time_s >= at_s => {
                 return PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 };
             }
-            MotorStage::EndedEarly { .. } => self.mean[IGNITION],
+            MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
         };
         let (thrust_n, sensitivity) = self.thrust(curve, time_s - ignition_s);
         let variance = sensitivity.dot(&(self.covariance * sensitivity));
