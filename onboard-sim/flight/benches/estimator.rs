@@ -7,7 +7,7 @@ use flight::estimator::{
     Estimator, EstimatorConfig, GRAVITY_M_S2, GnssFix, ImuSample, Measurements, StartUncertainty, VehicleNow,
 };
 use flight::rigid::RigidState;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 fn main() {
     divan::main();
@@ -16,7 +16,9 @@ fn main() {
 const VEHICLE: VehicleNow = VehicleNow {
     mass_kg: 3.0,
     air_density_kg_m3: 1.2,
+    body_drag_area_m2: 0.0043,
     fin_drag_area_m2: 0.031,
+    fin_lift_area_m2: Vector2::new(0.0, 0.0),
     fin_ahead_of_cg_m: 0.11,
     crossflow_area_m2: 0.09,
     motor_burning: false,

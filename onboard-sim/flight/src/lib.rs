@@ -7,6 +7,9 @@
 //! * [`profile`]: the vehicle, motor, start, weights and limits, as data.
 //! * [`phase`]: the flight phases and the one table that moves between them.
 //! * [`arming`] and [`gate`]: the checks before arming and before ignition, each with the value found.
+//! * [`airframe`]: the vehicle's masses, shape and actuators, as data.
+//! * [`atmosphere`], [`thrust_curve`], [`motors`] and [`fins`]: the air, the motors and the fins' aerodynamics, for
+//!   the controller's model and the simulated truth alike.
 //! * [`rigid`]: the state of a rocket in space, and its frames.
 //! * [`estimator`]: the state and the wind, from the sensors.
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
@@ -20,18 +23,23 @@
 //! Units are SI and radians; names carry units and frames. The frames are those of [`dynamics`].
 #![warn(missing_docs)]
 
+pub mod airframe;
 pub mod arming;
+pub mod atmosphere;
 pub mod check;
 pub mod controller;
 pub mod dynamics;
 pub mod estimator;
+pub mod fins;
 pub mod gate;
 pub mod motor_estimate;
+pub mod motors;
 pub mod nmpc;
 pub mod phase;
 pub mod profile;
 pub mod rigid;
 pub mod stabiliser;
+pub mod thrust_curve;
 pub mod thrust_estimate;
 pub mod thrust_offset;
 pub mod verdict;

@@ -48,24 +48,3 @@ pub struct Measurements {
     /// Distance to the ground along body `-x` from the lidar, m.
     pub lidar_range_m: Option<f64>,
 }
-
-/// What the flight computer knows about the vehicle this frame, and the estimator needs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VehicleNow {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Air density, kg/m^3.
-    pub air_density_kg_m3: f64,
-    /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their force is along the
-    /// relative wind, so this counts sideways as well.
-    pub fin_drag_area_m2: f64,
-    /// Distance of the fins ahead of the centre of gravity, m.
-    pub fin_ahead_of_cg_m: f64,
-    /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that times the
-    /// dynamic pressure of the sideways wind alone.
-    pub crossflow_area_m2: f64,
-    /// The landing motor is lit. Its sideways force is not known well enough to feel the wind beside it.
-    pub motor_burning: bool,
-    /// Distance of the lidar behind the centre of gravity, m.
-    pub lidar_behind_cg_m: f64,
-}

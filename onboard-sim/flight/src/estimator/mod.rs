@@ -26,6 +26,7 @@ mod strapdown;
 #[cfg(test)]
 mod tests;
 mod updates;
+mod vehicle;
 mod wind;
 
 use nalgebra::{Vector2, Vector3};
@@ -42,9 +43,10 @@ use self::heights::HeightChannel;
 pub use self::heights::HeightSources;
 use self::history::History;
 pub use self::measurements::{
-    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements, VehicleNow,
+    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements,
 };
 use self::strapdown::{Noise, Nominal, Pending};
+pub use self::vehicle::VehicleNow;
 use self::wind::Sideways;
 use crate::rigid::RigidState;
 

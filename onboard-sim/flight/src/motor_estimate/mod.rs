@@ -14,6 +14,7 @@ mod tests;
 use nalgebra::{Matrix4, Vector4};
 
 use self::ignition::Detector;
+use crate::thrust_curve::ThrustCurve;
 
 /// The data sheet's thrust over time since ignition, s to N; nil before 0 and after the burn.
 pub trait NominalThrust {
@@ -21,6 +22,16 @@ pub trait NominalThrust {
     fn thrust_n(&self, time_s: f64) -> f64;
     /// Largest thrust, N.
     fn peak_n(&self) -> f64;
+}
+
+impl NominalThrust for ThrustCurve {
+    fn thrust_n(&self, time_s: f64) -> f64 {
+        self.thrust_at_n(time_s)
+    }
+
+    fn peak_n(&self) -> f64 {
+        self.peak_thrust_n()
+    }
 }
 
 /// What one frame tells.

@@ -1,0 +1,50 @@
+//! What a millisecond of the world costs, and a whole fall with its landing burn.
+//!
+//! `cargo bench -p world`.
+#![expect(clippy::expect_used, reason = "a bench without its built-in vehicle cannot run")]
+
+use core::f64::consts::FRAC_PI_2;
+
+use flight::airframe::Airframe;
+use flight::motors;
+use flight::rigid::RigidState;
+use world::{Actuators, Truth, World};
+
+fn main() {
+    divan::main();
+}
+
+fn windy(height_m: f64) -> World {
+    let airframe = Airframe::builtin("mk2").expect("built in");
+    let motor = motors::builtin(&airframe.motor).expect("built in");
+    let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
+    World::new(&airframe, &motor, &truth, &RigidState::upright(height_m), 1)
+        .expect("sound")
+        .with_fins_at(FRAC_PI_2)
+}
+
+const OPEN: Actuators =
+    Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
+
+/// A thousand steps of the fall, in wind and gusts: a microsecond of the table is a nanosecond a step.
+#[divan::bench]
+fn a_thousand_steps_in_the_air(bencher: divan::Bencher) {
+    bencher.with_inputs(|| windy(500.0)).bench_refs(|world| world.advance(&OPEN, 1000));
+}
+
+/// A thousand steps of the fall with the motor burning.
+#[divan::bench]
+fn a_thousand_steps_under_thrust(bencher: divan::Bencher) {
+    let burning = || {
+        let mut world = windy(500.0);
+        world.advance(&Actuators { ignite: true, ..OPEN }, 300);
+        world
+    };
+    bencher.with_inputs(burning).bench_refs(|world| world.advance(&OPEN, 1000));
+}
+
+/// Two hundred steps of four substeps near the ground.
+#[divan::bench]
+fn two_hundred_steps_on_the_legs(bencher: divan::Bencher) {
+    bencher.with_inputs(|| windy(0.6)).bench_refs(|world| world.advance(&OPEN, 200));
+}

@@ -1,0 +1,139 @@
+//! The air's force on body, fins and parachute, each from the air's own motion at the place where it acts.
+//!
+//! Because rotation moves those places, damping comes out by itself, and so does static stability: the fins drag behind
+//! the centre of gravity of a vehicle that falls tail first. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
+//! (coefficients, areas, radius), with the force turned into the local wind; the body follows its Eq. 8 along the axis and
+//! the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3).
+
+use flight::airframe::Airframe;
+use flight::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
+use nalgebra::Vector3;
+
+/// Strips of the body's crossflow.
+const STRIPS: usize = 8;
+
+/// The vehicle's shape.
+#[derive(Debug, Clone)]
+pub(crate) struct Shape {
+    axial_area_m2: f64,
+    /// Crossflow drag area of one strip, m^2.
+    strip_area_m2: f64,
+    strip_stations_m: [f64; STRIPS],
+    fins: FinModel,
+    fin_station_m: f64,
+    /// Directions from the axis to the fins, in body axes.
+    fin_directions: [Vector3<f64>; 4],
+    nose_station_m: f64,
+    scale: f64,
+}
+
+/// The air and the vehicle's moving parts at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Flow {
+    /// Air density, kg/m^3.
+    pub(crate) density_kg_m3: f64,
+    /// Velocity of the centre of gravity through the air, in body axes, m/s.
+    pub(crate) velocity_m_s: Vector3<f64>,
+    /// Rotation rate in body axes, rad/s.
+    pub(crate) rate_rad_s: Vector3<f64>,
+}
+
+/// What of the shape moves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Configuration {
+    /// Sines of the fins' opening angles.
+    pub(crate) fin_sines: [f64; 4],
+    /// Parachute's drag area, m^2.
+    pub(crate) parachute_area_m2: f64,
+    /// Centre of gravity: x is its station (above the nozzle), y and z its distance from the axis, m.
+    pub(crate) cg_m: Vector3<f64>,
+}
+
+/// A force and its moment about the centre of gravity, in body axes, N and N m.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Load {
+    pub(crate) force_n: Vector3<f64>,
+    pub(crate) moment_n_m: Vector3<f64>,
+}
+
+impl Load {
+    pub(crate) fn none() -> Self {
+        Self { force_n: Vector3::zeros(), moment_n_m: Vector3::zeros() }
+    }
+
+    pub(crate) fn add_at(&mut self, place_m: &Vector3<f64>, force_n: &Vector3<f64>) {
+        self.force_n += force_n;
+        self.moment_n_m += place_m.cross(force_n);
+    }
+}
+
+impl Shape {
+    /// The shape of an airframe, with all its forces scaled.
+    pub(crate) fn new(airframe: &Airframe, scale: f64) -> Self {
+        let body = &airframe.body;
+        let strip_m = body.length_m / STRIPS as f64;
+        Self {
+            axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient,
+            strip_area_m2: body.crossflow_drag_coefficient * body.diameter_m * strip_m,
+            strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
+            fins: airframe.fin_model(),
+            fin_station_m: airframe.fins.station_m,
+            fin_directions: core::array::from_fn(|i| Vector3::new(0.0, -YAW[i] * COS_30, PITCH[i] * SIN_30)),
+            nose_station_m: body.length_m,
+            scale,
+        }
+    }
+
+    /// Everything the air does.
+    pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
+        let half_density = 0.5 * self.scale * flow.density_kg_m3;
+        let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;
+        let mut load = Load::none();
+        self.add_body(&mut load, flow, half_density, &axis_m);
+        self.add_fins(&mut load, flow, half_density, configuration);
+        if configuration.parachute_area_m2 > 0.0 {
+            let place_m = axis_m(self.nose_station_m);
+            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
+            let drag_n = local * (-half_density * configuration.parachute_area_m2 * length(&local));
+            load.add_at(&place_m, &drag_n);
+        }
+        load
+    }
+
+    fn add_body(
+        &self,
+        load: &mut Load,
+        flow: &Flow,
+        half_density: f64,
+        axis_m: &impl Fn(f64) -> Vector3<f64>,
+    ) {
+        let velocity = &flow.velocity_m_s;
+        let axial_n = -half_density * self.axial_area_m2 * length(velocity) * velocity.x;
+        load.add_at(&axis_m(0.0), &Vector3::new(axial_n, 0.0, 0.0));
+        for station_m in self.strip_stations_m {
+            let place_m = axis_m(station_m);
+            let mut across = velocity + flow.rate_rad_s.cross(&place_m);
+            across.x = 0.0;
+            load.add_at(&place_m, &(across * (-half_density * self.strip_area_m2 * length(&across))));
+        }
+    }
+
+    fn add_fins(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
+        let drag = half_density * self.fins.reference_area_m2 * self.fins.drag_coefficient;
+        let lift = half_density * self.fins.reference_area_m2 * self.fins.lift_coefficient;
+        for ((outward, sine), turn) in self.fin_directions.iter().zip(configuration.fin_sines).zip(ROLL) {
+            let mut place_m = outward * self.fins.radius_m(sine) - configuration.cg_m;
+            place_m.x += self.fin_station_m;
+            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
+            let airspeed = length(&local);
+            // Drag along the local wind; lift across both the wind and the fin's own direction from the axis.
+            let force_n =
+                local * (-drag * sine * airspeed) - local.cross(outward) * (lift * sine * airspeed * turn);
+            load.add_at(&place_m, &force_n);
+        }
+    }
+}
+
+fn length(vector: &Vector3<f64>) -> f64 {
+    vector.norm_squared().sqrt()
+}

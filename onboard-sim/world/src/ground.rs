@@ -1,0 +1,172 @@
+//! The ground: flat, level, at height 0. Four legs, springs with dampers, whose feet rub; what else touches is broken.
+
+use flight::airframe::Airframe;
+use flight::rigid::RigidState;
+use nalgebra::{Rotation3, Vector3};
+
+use crate::aero::Load;
+
+/// Sliding speed below which friction fades out, m/s: a foot at rest rubs in no direction.
+const SLIDING_M_S: f64 = 0.05;
+/// Tilt from which nothing comes back, rad: 45 degrees.
+const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
+/// A vehicle slower than this, m/s and rad/s, with three feet down, for this time, s, has come to rest.
+const STILL_M_S: f64 = 0.03;
+const STILL_RAD_S: f64 = 0.05;
+const STILL_S: f64 = 0.3;
+
+/// The first contact with the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touchdown {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// The last state free of contact, a quarter of a millisecond before at most.
+    pub state: RigidState,
+    /// Vertical velocity of the centre of gravity, up, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal speed of the centre of gravity, m/s.
+    pub lateral_m_s: f64,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+    /// Size of the rotation rate, roll included, rad/s.
+    pub rate_rad_s: f64,
+    /// Size of the rotation rate across the axis (pitch and yaw), rad/s.
+    pub cross_rate_rad_s: f64,
+    /// Thrust, N.
+    pub thrust_n: f64,
+    /// Weight, N.
+    pub weight_n: f64,
+}
+
+/// How a vehicle ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Upright, or how not.
+    pub outcome: RestOutcome,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+}
+
+/// Upright, or how not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RestOutcome {
+    /// Standing on its legs.
+    Upright,
+    /// Tilted beyond 45 degrees after contact.
+    TippedOver,
+    /// Nozzle, fuselage or nose hit the ground.
+    BodyStrike,
+}
+
+/// The legs and hull of a vehicle, as places from its centre of gravity in body axes.
+#[derive(Debug, Clone)]
+pub(crate) struct Ground {
+    stiffness_n_m: f64,
+    damping_n_s_m: f64,
+    friction: f64,
+    /// Feet from the nozzle exit, m.
+    feet_m: [Vector3<f64>; 4],
+    /// Rims of nozzle end and nose from the nozzle exit, m.
+    hull_m: [Vector3<f64>; 8],
+    still_s: f64,
+}
+
+/// What touches the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Contact {
+    pub(crate) feet: usize,
+    pub(crate) hull: bool,
+}
+
+impl Contact {
+    pub(crate) fn any(self) -> bool {
+        self.feet > 0 || self.hull
+    }
+}
+
+impl Ground {
+    pub(crate) fn new(airframe: &Airframe) -> Self {
+        let (legs, body) = (&airframe.legs, &airframe.body);
+        let around = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)];
+        let ring = |station_m: f64, radius_m: f64| {
+            around.map(|(y, z)| Vector3::new(station_m, radius_m * y, radius_m * z))
+        };
+        let (tail, nose) = (ring(0.0, 0.5 * body.diameter_m), ring(body.length_m, 0.5 * body.diameter_m));
+        Self {
+            stiffness_n_m: legs.stiffness_n_m,
+            damping_n_s_m: legs.damping_n_s_m,
+            friction: legs.friction_coefficient,
+            feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
+            hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
+            still_s: 0.0,
+        }
+    }
+
+    /// Height of the lowest place of the vehicle above the ground, m.
+    pub(crate) fn clearance_m(&self, state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
+        let up_in_body = state.world_from_body.inverse_transform_vector(&Vector3::z());
+        let lowest = |places: &[Vector3<f64>]| {
+            places.iter().fold(f64::INFINITY, |low, place| low.min((place - cg_m).dot(&up_in_body)))
+        };
+        state.position_m.z + lowest(&self.feet_m).min(lowest(&self.hull_m))
+    }
+
+    /// What touches the ground.
+    pub(crate) fn contact(&self, state: &RigidState, cg_m: &Vector3<f64>) -> Contact {
+        let up_in_body = state.world_from_body.inverse_transform_vector(&Vector3::z());
+        let below = |place: &&Vector3<f64>| state.position_m.z + (**place - cg_m).dot(&up_in_body) <= 0.0;
+        Contact {
+            feet: self.feet_m.iter().filter(below).count(),
+            hull: self.hull_m.iter().any(|place| below(&place)),
+        }
+    }
+
+    /// Adds what the ground does to the feet.
+    pub(crate) fn add_load(
+        &self,
+        load: &mut Load,
+        state: &RigidState,
+        world_from_body: &Rotation3<f64>,
+        cg_m: &Vector3<f64>,
+    ) {
+        for foot_m in &self.feet_m {
+            let place_m = foot_m - cg_m;
+            let depth_m = -(state.position_m.z + (world_from_body * place_m).z);
+            if depth_m <= 0.0 {
+                continue;
+            }
+            let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
+            let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * sliding.z).max(0.0);
+            sliding.z = 0.0;
+            let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
+            let mut force_n = sliding * (-self.friction * normal_n / fading);
+            force_n.z = normal_n;
+            load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
+        }
+    }
+
+    /// Whether the vehicle's way ends here, after another time on the ground, s. A motor that still carries half the
+    /// weight has not let go.
+    pub(crate) fn outcome(
+        &mut self,
+        state: &RigidState,
+        contact: Contact,
+        thrust_over_weight: f64,
+        passed_s: f64,
+    ) -> Option<RestOutcome> {
+        if contact.hull {
+            return Some(RestOutcome::BodyStrike);
+        }
+        if state.tilt_rad() > TIPPED_RAD {
+            return Some(RestOutcome::TippedOver);
+        }
+        let still = contact.feet >= 3
+            && state.velocity_m_s.norm_squared() < STILL_M_S * STILL_M_S
+            && state.rate_rad_s.norm_squared() < STILL_RAD_S * STILL_RAD_S
+            && thrust_over_weight < 0.5;
+        self.still_s = if still { self.still_s + passed_s } else { 0.0 };
+        (self.still_s >= STILL_S).then_some(RestOutcome::Upright)
+    }
+}

@@ -1,0 +1,129 @@
+//! The landing motor as it truly burns: `T(t) = s/b T0(t/b)` for impulse scale s and burn-time scale b.
+
+use flight::thrust_curve::ThrustCurve;
+
+use crate::fault::Fault;
+use crate::truth::Truth;
+
+/// The true motor.
+#[derive(Debug, Clone)]
+pub(crate) struct Motor {
+    curve: ThrustCurve,
+    impulse_scale: f64,
+    burn_time_scale: f64,
+    ignition_delay_s: f64,
+    /// When the ignition command came, s.
+    commanded_s: Option<f64>,
+    no_light: bool,
+    out_after_s: f64,
+}
+
+impl Motor {
+    pub(crate) fn new(curve: &ThrustCurve, truth: &Truth) -> Self {
+        Self {
+            curve: curve.clone(),
+            impulse_scale: truth.impulse_scale,
+            burn_time_scale: truth.burn_time_scale,
+            ignition_delay_s: truth.ignition_delay_s,
+            commanded_s: None,
+            no_light: false,
+            out_after_s: f64::INFINITY,
+        }
+    }
+
+    /// The igniter is fired; only the first command counts.
+    pub(crate) fn ignite(&mut self, time_s: f64) {
+        self.commanded_s.get_or_insert(time_s);
+    }
+
+    /// When the thrust begins, s; `None` as long as nothing was commanded, and for a motor that does not light.
+    pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
+        self.commanded_s.filter(|_| !self.no_light).map(|commanded_s| commanded_s + self.ignition_delay_s)
+    }
+
+    /// Time on the file's curve, s; negative before the thrust begins.
+    fn curve_time_s(&self, time_s: f64) -> f64 {
+        self.thrust_begins_s().map_or(-1.0, |begins_s| (time_s - begins_s) / self.burn_time_scale)
+    }
+
+    /// Thrust at a time, N.
+    pub(crate) fn thrust_n(&self, time_s: f64) -> f64 {
+        let curve_s = self.curve_time_s(time_s);
+        if curve_s * self.burn_time_scale >= self.out_after_s {
+            return 0.0;
+        }
+        self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s)
+    }
+
+    /// Propellant burnt up to a time, kg: that which a motor gone out keeps is not counted.
+    pub(crate) fn burnt_kg(&self, time_s: f64) -> f64 {
+        self.curve.propellant_burnt_kg(self.curve_time_s(time_s).min(self.out_after_s / self.burn_time_scale))
+    }
+
+    /// Propellant burnt for each newton second, kg: mass flow over thrust.
+    pub(crate) fn flow_kg_n_s(&self) -> f64 {
+        self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
+    }
+
+    pub(crate) fn break_down(&mut self, fault: &Fault) {
+        match *fault {
+            Fault::NoLight => self.no_light = true,
+            Fault::LateLight { delay_s } => self.ignition_delay_s += delay_s.max(0.0),
+            Fault::WeakMotor { scale } => self.impulse_scale *= scale.clamp(0.01, 1.0),
+            Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
+            Fault::GimbalStuck | Fault::GimbalSlow { .. } | Fault::FinStuck { .. } => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1 s up to 40 N, 2 s level, 1 s down: 120 N s, 0.12 kg.
+    fn curve() -> ThrustCurve {
+        ThrustCurve::from_rasp("T 38 200 0 0.12 0.3 M\n1 40\n3 40\n4 0").unwrap()
+    }
+
+    fn motor(truth: &Truth) -> Motor {
+        let mut motor = Motor::new(&curve(), truth);
+        motor.ignite(10.0);
+        motor
+    }
+
+    #[test]
+    fn impulse_and_burn_time_scale_the_curve() {
+        let truth =
+            Truth { impulse_scale: 1.1, burn_time_scale: 0.8, ignition_delay_s: 0.2, ..Truth::default() };
+        let motor = motor(&truth);
+        assert!(motor.thrust_n(10.19).abs() < 1e-15);
+        assert!((motor.thrust_n(10.2 + 1.6) - 40.0 * 1.1 / 0.8).abs() < 1e-9);
+        let impulse_n_s: f64 = (0..5000).map(|i| motor.thrust_n(10.0 + 1e-3 * f64::from(i)) * 1e-3).sum();
+        assert!((impulse_n_s - 1.1 * 120.0).abs() < 1e-3, "{impulse_n_s}");
+        assert!((motor.burnt_kg(20.0) - 0.12).abs() < 1e-12);
+        assert!((motor.flow_kg_n_s() * 1.1 * 120.0 - 0.12).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_the_first_command_counts() {
+        let mut motor = motor(&Truth::default());
+        motor.ignite(11.0);
+        assert_eq!(motor.thrust_begins_s(), Some(10.15));
+    }
+
+    #[test]
+    fn faults() {
+        let broken = |fault: Fault| {
+            let mut motor = motor(&Truth { ignition_delay_s: 0.0, ..Truth::default() });
+            motor.break_down(&fault);
+            motor
+        };
+        assert!(broken(Fault::NoLight).thrust_n(12.0).abs() < 1e-15);
+        let late = broken(Fault::LateLight { delay_s: 1.0 });
+        assert!((late.thrust_n(11.5) - 20.0).abs() < 1e-9 && late.thrust_n(10.9).abs() < 1e-15);
+        assert!((broken(Fault::WeakMotor { scale: 0.5 }).thrust_n(12.0) - 20.0).abs() < 1e-9);
+        let out = broken(Fault::EarlyBurnout { after_s: 2.0 });
+        assert!((out.thrust_n(11.9) - 40.0).abs() < 1e-9 && out.thrust_n(12.1).abs() < 1e-15);
+        assert!((out.burnt_kg(20.0) - 0.06).abs() < 1e-12);
+    }
+}

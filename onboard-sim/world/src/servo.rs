@@ -1,0 +1,131 @@
+//! A servo: a pure delay, a rate limit, stops, and play between horn and load.
+
+use flight::airframe::Servo as ServoData;
+
+use crate::STEP_S;
+
+/// Steps that the delay line holds: an airframe's servo delay is 0.1 s at most.
+const LINE_STEPS: usize = 128;
+
+/// One servo and what it moves. Angles in rad.
+#[derive(Debug, Clone)]
+pub(crate) struct Servo {
+    line_rad: [f64; LINE_STEPS],
+    next: usize,
+    delay_steps: usize,
+    step_max_rad: f64,
+    half_slop_rad: f64,
+    stops_rad: (f64, f64),
+    horn_rad: f64,
+    load_rad: f64,
+    stuck: bool,
+}
+
+impl Servo {
+    /// A servo at rest at an angle, rad, between its stops, rad.
+    pub(crate) fn new(data: &ServoData, stops_rad: (f64, f64), at_rad: f64) -> Self {
+        let at_rad = at_rad.clamp(stops_rad.0, stops_rad.1);
+        let delay_steps = libm::round(data.delay_s / STEP_S) as usize;
+        Self {
+            line_rad: [at_rad; LINE_STEPS],
+            next: 0,
+            delay_steps: delay_steps.min(LINE_STEPS - 1),
+            step_max_rad: data.rate_rad_s() * STEP_S,
+            half_slop_rad: 0.5 * data.slop_rad(),
+            stops_rad,
+            horn_rad: at_rad,
+            load_rad: at_rad,
+            stuck: false,
+        }
+    }
+
+    /// Takes a command and turns for one step. A command that is no number is not taken.
+    pub(crate) fn step(&mut self, command_rad: f64) {
+        let last_rad = self.line_rad[(self.next + LINE_STEPS - 1) % LINE_STEPS];
+        self.line_rad[self.next] = if command_rad.is_nan() { last_rad } else { command_rad };
+        let delayed_rad = self.line_rad[(self.next + LINE_STEPS - self.delay_steps) % LINE_STEPS];
+        self.next = (self.next + 1) % LINE_STEPS;
+        if self.stuck {
+            return;
+        }
+        let (low_rad, high_rad) = self.stops_rad;
+        let wanted_rad = delayed_rad.clamp(low_rad, high_rad);
+        self.horn_rad += (wanted_rad - self.horn_rad).clamp(-self.step_max_rad, self.step_max_rad);
+        // The load stays where it is until the horn has taken up the play.
+        self.load_rad =
+            self.load_rad.clamp(self.horn_rad - self.half_slop_rad, self.horn_rad + self.half_slop_rad);
+    }
+
+    /// Where the load is, rad.
+    pub(crate) fn load_rad(&self) -> f64 {
+        self.load_rad
+    }
+
+    /// Stays where it is from now on.
+    pub(crate) fn stick(&mut self) {
+        self.stuck = true;
+    }
+
+    /// Turns at a share of its rate from now on.
+    pub(crate) fn slow(&mut self, scale: f64) {
+        self.step_max_rad *= scale.clamp(0.0, 1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn servo(delay_s: f64, rate_deg_s: f64, slop_deg: f64) -> Servo {
+        let data = ServoData { rate_deg_s, delay_s, slop_deg };
+        Servo::new(&data, (-0.12, 0.12), 0.0)
+    }
+
+    fn after(servo: &mut Servo, command_rad: f64, steps: usize) -> f64 {
+        for _ in 0..steps {
+            servo.step(command_rad);
+        }
+        servo.load_rad()
+    }
+
+    /// 20 ms of delay, then 100 rad/s over 1 ms steps of 0.1 rad.
+    #[test]
+    fn delay_and_rate() {
+        let mut servo = servo(0.020, 1.0_f64.to_degrees(), 0.0);
+        assert!(after(&mut servo, 0.05, 20).abs() < 1e-15);
+        assert!((after(&mut servo, 0.05, 10) - 0.010).abs() < 1e-12);
+        assert!((after(&mut servo, 0.05, 100) - 0.05).abs() < 1e-12);
+        assert!((after(&mut servo, 9.0, 300) - 0.12).abs() < 1e-12, "stop");
+    }
+
+    #[test]
+    fn play_is_lost_at_each_turn() {
+        let mut servo = servo(0.0, 1e6, 0.02_f64.to_degrees());
+        assert!((after(&mut servo, 0.05, 1) - 0.04).abs() < 1e-12);
+        assert!((after(&mut servo, 0.035, 1) - 0.04).abs() < 1e-12, "inside the play");
+        assert!((after(&mut servo, 0.0, 1) - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_stuck_servo_stays() {
+        let mut servo = servo(0.0, 1e6, 0.0);
+        let at_rad = after(&mut servo, 0.05, 1);
+        servo.stick();
+        assert!((after(&mut servo, -0.1, 50) - at_rad).abs() < 1e-15);
+    }
+
+    proptest! {
+        #[test]
+        fn any_command_stays_between_the_stops(
+            commands in proptest::collection::vec(proptest::num::f64::ANY, 1..100)
+        ) {
+            let mut servo = servo(0.005, 2000.0, 1.0);
+            for command_rad in commands {
+                servo.step(command_rad);
+                prop_assert!(servo.load_rad().abs() <= 0.12);
+            }
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The wind: a mean that grows with height, and gusts in it.
+//!
+//! The mean follows the power law over flat open country with the exponent 1/7, from its value 10 m above the
+//! ground. Gusts are those of [`gusts`].
+
+pub mod gusts;
+
+use nalgebra::Vector3;
+
+use gusts::Gusts;
+
+/// Height the mean wind is stated at, m.
+pub const REFERENCE_HEIGHT_M: f64 = 10.0;
+/// Exponent of the power law.
+const EXPONENT: f64 = 1.0 / 7.0;
+/// Below this the mean wind stays what it is here, m: within the grass the law says nothing.
+const LOWEST_M: f64 = 0.5;
+/// Height the gusts' standard states the wind at: 20 ft, m.
+const GUST_REFERENCE_HEIGHT_M: f64 = 6.096;
+
+/// The wind of one flight.
+#[derive(Debug, Clone)]
+pub struct Wind {
+    reference_m_s: f64,
+    along: Vector3<f64>,
+    across: Vector3<f64>,
+    gusts: Gusts,
+    now_m_s: Vector3<f64>,
+}
+
+impl Wind {
+    /// A wind by its mean at the reference height, m/s, where it blows to (from world x towards world y, rad), gust
+    /// intensity over the standard's, and the gusts' seed.
+    pub fn new(reference_m_s: f64, towards_rad: f64, gust_scale: f64, seed: u64) -> Self {
+        let (sin, cos) = libm::sincos(towards_rad);
+        let gust_wind_m_s = mean_m_s(reference_m_s, GUST_REFERENCE_HEIGHT_M);
+        Self {
+            reference_m_s,
+            along: Vector3::new(cos, sin, 0.0),
+            across: Vector3::new(-sin, cos, 0.0),
+            gusts: Gusts::new(gust_scale * gust_wind_m_s, seed),
+            now_m_s: Vector3::zeros(),
+        }
+    }
+
+    /// Mean wind at a height above ground, in the world, m/s.
+    pub fn mean_m_s(&self, height_m: f64) -> Vector3<f64> {
+        self.along * mean_m_s(self.reference_m_s, height_m)
+    }
+
+    /// Moves on by a length of air, m, at a height above ground, m.
+    pub(crate) fn step(&mut self, height_m: f64, path_m: f64) {
+        self.now_m_s = self.mean_m_s(height_m);
+        if self.gusts.blow() {
+            let gust = self.gusts.step(height_m, path_m);
+            self.now_m_s += self.along * gust.x + self.across * gust.y;
+            self.now_m_s.z += gust.z;
+        }
+    }
+
+    /// Mean and gusts together, in the world, m/s.
+    pub fn now_m_s(&self) -> Vector3<f64> {
+        self.now_m_s
+    }
+}
+
+fn mean_m_s(reference_m_s: f64, height_m: f64) -> f64 {
+    if reference_m_s == 0.0 {
+        return 0.0;
+    }
+    reference_m_s * libm::pow(height_m.max(LOWEST_M) / REFERENCE_HEIGHT_M, EXPONENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_follows_the_power_law_and_its_direction() {
+        let wind = Wind::new(5.0, core::f64::consts::FRAC_PI_2, 0.0, 1);
+        assert!((wind.mean_m_s(10.0) - Vector3::new(0.0, 5.0, 0.0)).norm() < 1e-12);
+        // 2^7 times the height doubles it.
+        assert!((wind.mean_m_s(1280.0).y - 10.0).abs() < 1e-9);
+        assert!((wind.mean_m_s(-3.0) - wind.mean_m_s(0.5)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn no_wind_is_none() {
+        let mut wind = Wind::new(0.0, 1.0, 1.0, 1);
+        wind.step(100.0, 0.04);
+        assert!(wind.now_m_s().norm() < 1e-300);
+    }
+}

@@ -1,0 +1,157 @@
+//! A world from data, and the data it does not take.
+
+use flight::airframe::{Airframe, AirframeError, MassModel};
+use flight::rigid::RigidState;
+use flight::thrust_curve::ThrustCurve;
+use nalgebra::Vector3;
+
+use super::World;
+use crate::aero::Shape;
+use crate::ground::Ground;
+use crate::motor::Motor;
+use crate::parachute::Parachute;
+use crate::servo::Servo;
+use crate::truth::Truth;
+use crate::wind::Wind;
+
+/// Data that make no world.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// The airframe is not sound.
+    #[error("airframe")]
+    Airframe(#[from] AirframeError),
+    /// The motor does not fit the airframe.
+    #[error(
+        "motor {motor} has {propellant_kg} kg of propellant; with it the airframe's mass of {loaded_kg} kg and its inertia \
+         leave nothing for the rest of the vehicle"
+    )]
+    Motor {
+        /// The motor's name.
+        motor: String,
+        /// Its propellant, kg.
+        propellant_kg: f64,
+        /// The airframe's loaded mass, kg.
+        loaded_kg: f64,
+    },
+    /// A true parameter is outside its range.
+    #[error("truth.{key} is {found}; {required} is accepted")]
+    Truth {
+        /// The parameter.
+        key: &'static str,
+        /// The value found.
+        found: f64,
+        /// What would be accepted.
+        required: &'static str,
+    },
+    /// The initial state is not finite, or its attitude not a rotation.
+    #[error("the initial state is {0}; finite numbers and a unit attitude are accepted")]
+    State(String),
+}
+
+impl World {
+    /// A world at the start of a flight: fins closed and gimbal centred, motor full, parachute stowed, gusts by seed.
+    ///
+    /// # Errors
+    ///
+    /// [`WorldError`] names the value that is not accepted.
+    pub fn new(
+        airframe: &Airframe,
+        motor: &ThrustCurve,
+        truth: &Truth,
+        initial: &RigidState,
+        seed: u64,
+    ) -> Result<Self, WorldError> {
+        airframe.validate()?;
+        check(truth)?;
+        if !initial.is_finite() || (initial.world_from_body.coords.norm_squared() - 1.0).abs() > 1e-6 {
+            return Err(WorldError::State(format!("{initial:?}")));
+        }
+        let mass_model = MassModel::new(&airframe.mass, motor.propellant_mass_kg()).scaled(truth.mass_scale);
+        let empty = mass_model.at(f64::INFINITY);
+        if !(mass_model.dry_mass_kg() > 0.0 && empty.pitch_inertia_kg_m2 > 0.0) {
+            return Err(WorldError::Motor {
+                motor: motor.name().to_owned(),
+                propellant_kg: motor.propellant_mass_kg(),
+                loaded_kg: airframe.mass.loaded_kg,
+            });
+        }
+        let limit_rad = airframe.gimbal.limit_rad();
+        let gimbal = || Servo::new(&airframe.gimbal.servo, (-limit_rad, limit_rad), 0.0);
+        let mut world = Self {
+            shape: Shape::new(airframe, truth.drag_scale),
+            motor: Motor::new(motor, truth),
+            gimbal: [gimbal(), gimbal()],
+            fins: fins_at(airframe, airframe.fins.closed_rad()),
+            parachute: Parachute::new(&airframe.parachute),
+            wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed),
+            ground: Ground::new(airframe),
+            steps: 0,
+            state: *initial,
+            mass: mass_model.at(0.0),
+            mass_model,
+            specific_force_m_s2: Vector3::zeros(),
+            angular_acceleration_rad_s2: Vector3::zeros(),
+            touchdown: None,
+            rest: None,
+            airframe: airframe.clone(),
+            truth: *truth,
+        };
+        world.wind.step(initial.position_m.z, 0.0);
+        Ok(world)
+    }
+
+    /// The same world with the fins at an opening angle already, rad, held between their stops.
+    #[must_use]
+    pub fn with_fins_at(mut self, opening_rad: f64) -> Self {
+        self.fins = fins_at(&self.airframe, opening_rad);
+        self
+    }
+}
+
+fn fins_at(airframe: &Airframe, opening_rad: f64) -> [Servo; 4] {
+    let stops_rad = (airframe.fins.closed_rad(), airframe.fins.open_rad());
+    core::array::from_fn(|_| Servo::new(&airframe.fins.servo, stops_rad, opening_rad))
+}
+
+fn check(truth: &Truth) -> Result<(), WorldError> {
+    let refuse = |key, found, required| Err(WorldError::Truth { key, found, required });
+    for (key, value) in [
+        ("impulse_scale", truth.impulse_scale),
+        ("burn_time_scale", truth.burn_time_scale),
+        ("mass_scale", truth.mass_scale),
+    ] {
+        if !(0.1..=10.0).contains(&value) {
+            return refuse(key, value, "0.1 to 10");
+        }
+    }
+    for (key, value) in [("drag_scale", truth.drag_scale), ("gust_scale", truth.gust_scale)] {
+        if !(0.0..=10.0).contains(&value) {
+            return refuse(key, value, "0 to 10");
+        }
+    }
+    if !(0.0..=60.0).contains(&truth.ignition_delay_s) {
+        return refuse("ignition_delay_s", truth.ignition_delay_s, "0 to 60");
+    }
+    if !(0.0..=60.0).contains(&truth.wind_m_s) {
+        return refuse("wind_m_s", truth.wind_m_s, "0 to 60");
+    }
+    if !truth.wind_towards_rad.is_finite() {
+        return refuse("wind_towards_rad", truth.wind_towards_rad, "a finite number");
+    }
+    for value in truth.thrust_misalignment_rad {
+        if !(-0.5..=0.5).contains(&value) {
+            return refuse("thrust_misalignment_rad", value, "-0.5 to 0.5");
+        }
+    }
+    for (key, value) in truth
+        .thrust_offset_m
+        .iter()
+        .map(|value| ("thrust_offset_m", *value))
+        .chain(truth.cg_offset_m.iter().map(|value| ("cg_offset_m", *value)))
+    {
+        if !(-0.1..=0.1).contains(&value) {
+            return refuse(key, value, "-0.1 to 0.1");
+        }
+    }
+    Ok(())
+}

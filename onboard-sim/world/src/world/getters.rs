@@ -1,0 +1,124 @@
+//! What can be asked of the world.
+
+use flight::airframe::{Airframe, MassProperties};
+use flight::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::rigid::RigidState;
+use nalgebra::Vector3;
+
+use super::World;
+use crate::STEP_S;
+use crate::ground::{Rest, Touchdown};
+use crate::truth::Truth;
+
+impl World {
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        self.steps as f64 * STEP_S
+    }
+
+    /// Steps since the start.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// The vehicle's state; its position is that of the centre of gravity.
+    pub fn state(&self) -> &RigidState {
+        &self.state
+    }
+
+    /// Height of the feet above the ground as if the vehicle were upright, m: nil at touchdown.
+    pub fn height_m(&self) -> f64 {
+        self.state.position_m.z - self.cg_above_feet_m()
+    }
+
+    /// From the feet up to the centre of gravity, along the axis, m.
+    pub fn cg_above_feet_m(&self) -> f64 {
+        self.airframe.above_feet_m(self.cg_m().x)
+    }
+
+    /// Mean specific force over the last step in body axes, m/s^2: what an ideal accelerometer at the centre of gravity
+    /// gathers.
+    pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
+        &self.specific_force_m_s2
+    }
+
+    /// Mean angular acceleration over the last step in body axes, rad/s^2.
+    pub fn angular_acceleration_rad_s2(&self) -> &Vector3<f64> {
+        &self.angular_acceleration_rad_s2
+    }
+
+    /// Mass, centre of gravity and inertia now.
+    pub fn mass(&self) -> &MassProperties {
+        &self.mass
+    }
+
+    /// Weight now, N.
+    pub fn weight_n(&self) -> f64 {
+        self.mass.mass_kg * STANDARD_GRAVITY_M_S2
+    }
+
+    /// Thrust now, N.
+    pub fn thrust_n(&self) -> f64 {
+        self.motor.thrust_n(self.time_s())
+    }
+
+    /// When the thrust begins or began, s; `None` before the ignition command and for a motor that does not light.
+    pub fn thrust_begins_s(&self) -> Option<f64> {
+        self.motor.thrust_begins_s()
+    }
+
+    /// Gimbal angles of the nozzle (pitch, yaw) without the thrust's misalignment, rad.
+    pub fn gimbal_rad(&self) -> [f64; 2] {
+        [0, 1].map(|axis: usize| self.gimbal[axis].load_rad())
+    }
+
+    /// Opening angles of the fins, rad.
+    pub fn fins_rad(&self) -> [f64; 4] {
+        [0, 1, 2, 3].map(|fin: usize| self.fins[fin].load_rad())
+    }
+
+    /// Wind at the vehicle, gusts included, in the world, m/s.
+    pub fn wind_m_s(&self) -> Vector3<f64> {
+        self.wind.now_m_s()
+    }
+
+    /// Velocity of the centre of gravity through the air, in the world, m/s.
+    pub fn air_velocity_m_s(&self) -> Vector3<f64> {
+        self.state.velocity_m_s - self.wind.now_m_s()
+    }
+
+    /// The air at the vehicle.
+    pub fn air(&self) -> Air {
+        Air::at_height_m(self.state.position_m.z)
+    }
+
+    /// Whether the parachute was thrown out.
+    pub fn parachute_ejected(&self) -> bool {
+        self.parachute.ejected()
+    }
+
+    /// Share of the parachute that is open, 0 to 1.
+    pub fn parachute_open_share(&self) -> f64 {
+        self.parachute.open_share()
+    }
+
+    /// The first contact with the ground, once it was.
+    pub fn touchdown(&self) -> Option<&Touchdown> {
+        self.touchdown.as_ref()
+    }
+
+    /// How the vehicle ended, once it has; from then on only time moves.
+    pub fn rest(&self) -> Option<&Rest> {
+        self.rest.as_ref()
+    }
+
+    /// The vehicle's data.
+    pub fn airframe(&self) -> &Airframe {
+        &self.airframe
+    }
+
+    /// How the true vehicle and its day differ from the data.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+}

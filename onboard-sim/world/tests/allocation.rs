@@ -1,0 +1,25 @@
+//! A step of the world does not allocate: in the air, under thrust, under the parachute and on the ground.
+#![expect(clippy::expect_used, reason = "a missing built-in vehicle is a failed test")]
+
+use core::f64::consts::FRAC_PI_2;
+
+use flight::airframe::Airframe;
+use flight::motors;
+use flight::rigid::RigidState;
+use world::{Actuators, Truth, World};
+
+#[test]
+fn steps_do_not_allocate() {
+    let airframe = Airframe::builtin("mk2").expect("built in");
+    let motor = motors::builtin(&airframe.motor).expect("built in");
+    let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
+    let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(60.0), 1).expect("sound");
+    let open = Actuators { fins_rad: [FRAC_PI_2; 4], ..Actuators::default() };
+    let allocated = allocation_counter::measure(|| {
+        world.advance(&open, 500);
+        world.advance(&Actuators { ignite: true, ..open }, 500);
+        world.advance(&Actuators { parachute: true, ..open }, 14_000);
+    });
+    assert!(world.touchdown().is_some());
+    assert_eq!(allocated.count_total, 0);
+}
