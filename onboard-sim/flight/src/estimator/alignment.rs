@@ -46,7 +46,7 @@ pub enum AlignmentError {
 pub struct PadStart {
     /// The attitude, with the heading that was given.
     pub world_from_body: UnitQuaternion<f64>,
-    /// The gyro's bias, body, rad/s: to be taken from every later sample.
+    /// The gyro's bias, body, rad/s, for [`Estimator::with_gyro_bias`](super::Estimator::with_gyro_bias).
     pub gyro_bias_rad_s: Vector3<f64>,
 }
 

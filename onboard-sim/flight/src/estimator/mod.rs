@@ -31,7 +31,7 @@ mod wind;
 
 use nalgebra::{Vector2, Vector3};
 
-pub use self::config::{EstimatorConfig, GRAVITY_M_S2, HealthLimits, StartUncertainty};
+pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GYRO_BIAS, N,
     POSITION, Row, VELOCITY, WIND,
@@ -148,6 +148,14 @@ impl Estimator {
             restarted_at_s: f64::NEG_INFINITY,
             surprised_at_s: f64::NEG_INFINITY,
         }
+    }
+
+    /// The same with a gyro bias known from the pad, body, rad/s.
+    #[must_use]
+    pub fn with_gyro_bias(mut self, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        self.nominal.gyro_bias_rad_s = gyro_bias_rad_s;
+        self.last_good = self.nominal;
+        self
     }
 
     /// End of the last frame, s.

@@ -55,6 +55,31 @@ fn hovering_stays_where_it_is() {
 }
 
 #[test]
+fn from_the_pad_a_gyro_bias_of_turn_on_size_does_not_turn_it() {
+    let bias_rad_s = Vector3::new(0.004, -0.003, 0.005);
+    let on_pad = |frame| {
+        let mut measurements = hovering(frame);
+        measurements.imu.gyro_rad_s += bias_rad_s;
+        measurements
+    };
+    let mut alignment = alignment::PadAlignment::default();
+    for frame in 1..=400 {
+        alignment.take(&on_pad(frame).imu);
+    }
+    let pad = alignment.finish(0.0).unwrap();
+    let state = RigidState { world_from_body: pad.world_from_body, ..RigidState::upright(5.0) };
+    let mut estimator = Estimator::new(&EstimatorConfig::default(), &StartUncertainty::on_pad(), 0.0, &state)
+        .with_gyro_bias(pad.gyro_bias_rad_s);
+    for frame in 1..=2000 {
+        estimator.step(&on_pad(frame), &VEHICLE);
+    }
+    let estimate = estimator.estimate();
+    assert!(estimate.health.is_good());
+    assert!(estimate.state.tilt_rad() < 1e-6, "{estimate:?}");
+    assert!((estimate.gyro_bias_rad_s - bias_rad_s).norm() < 1e-6, "{estimate:?}");
+}
+
+#[test]
 fn an_inertial_unit_gone_silent_is_bridged_and_then_doubted() {
     let mut estimator = at(5.0);
     let mut health = Vec::new();

@@ -127,8 +127,11 @@ const AIR: usize = 3;
 const SPIKE_S: f64 = 0.06;
 /// Roughness and shape errors last about so long, s: samples within it are not independent.
 const ROUGHNESS_LASTS_S: f64 = 0.1;
+/// Gusts along the nose and a lean against the wind change the air force by this share, and last about so long, s.
+const GUST_SHARE: f64 = 0.03;
+const GUST_LASTS_S: f64 = 0.5;
 /// Wander of the air scale, in one second: the flow changes with speed, lean and exhaust.
-const AIR_WALK_SQRT_S: f64 = 0.02;
+const AIR_WALK_SQRT_S: f64 = 0.01;
 /// The air teaches nothing below this force, N.
 const SMALLEST_AIR_N: f64 = 2.0;
 /// Below this share of the peak the tail-off is left alone.
@@ -281,10 +284,12 @@ impl MotorEstimate {
 
     fn learn(&mut self, sample: &MotorSample, sensitivity: Vector4<f64>, innovation_n: f64, thrust_n: f64) {
         let white_n = sample.mass_kg * self.prior.accelerometer_m_s2;
-        let rough_n =
-            self.prior.roughness_share * (thrust_n * thrust_n + sample.axial_air_force_n.powi(2)).sqrt();
-        let repeats = (ROUGHNESS_LASTS_S / self.prior.frame_s).max(1.0);
-        let noise = white_n * white_n + rough_n * rough_n * repeats;
+        let frames = |lasts_s: f64| (lasts_s / self.prior.frame_s).max(1.0);
+        let rough_n = self.prior.roughness_share * thrust_n;
+        let gust_n = GUST_SHARE * sample.axial_air_force_n;
+        let noise = white_n * white_n
+            + rough_n * rough_n * frames(ROUGHNESS_LASTS_S)
+            + gust_n * gust_n * frames(GUST_LASTS_S);
         let with = self.covariance * sensitivity;
         let variance = sensitivity.dot(&with) + noise;
         if innovation_n * innovation_n > GATE_SIGMAS * GATE_SIGMAS * variance {

@@ -2,6 +2,9 @@
 #![expect(clippy::expect_used, reason = "a test says what it expected")]
 
 mod flight;
+mod plant;
+
+use std::sync::LazyLock;
 
 use ::flight::estimator::{Doubt, Health};
 use nalgebra::Vector3;
@@ -16,9 +19,8 @@ fn fly(flights: u64, faults: fn(f64) -> SensorFaults) -> Vec<Vec<Frame>> {
     (0..flights).map(|seed| Scene { faults, ..Scene::of(seed) }.fly()).collect()
 }
 
-fn healthy(_: f64) -> SensorFaults {
-    SensorFaults::default()
-}
+/// Flights with nothing broken; several tests look at them.
+static HEALTHY: LazyLock<Vec<Vec<Frame>>> = LazyLock::new(|| fly(FLIGHTS, |_| SensorFaults::default()));
 
 fn rms(frames: &[&Frame], error: impl Fn(&Frame) -> f64) -> f64 {
     (frames.iter().map(|frame| error(frame).powi(2)).sum::<f64>() / frames.len() as f64).sqrt()
@@ -49,7 +51,7 @@ fn height_rms_m(at: &[&Frame]) -> f64 {
 
 #[test]
 fn val_chi_square_the_error_is_as_large_as_the_filter_says() {
-    let flights = fly(FLIGHTS, healthy);
+    let flights = &*HEALTHY;
     let shortest = flights.iter().map(Vec::len).min().expect("flights");
     // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard deviation of 60, and
     // 99.9 % of it lies within 3.29 of them (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking
@@ -65,9 +67,9 @@ fn val_chi_square_the_error_is_as_large_as_the_filter_says() {
 
 #[test]
 fn it_is_good_enough_to_land_by() {
-    let flights = fly(FLIGHTS, healthy);
-    let low = frames(&flights, |frame| frame.truth.position_m.z < 8.0);
-    let down = last(&flights);
+    let flights = &*HEALTHY;
+    let low = frames(flights, |frame| frame.truth.position_m.z < 8.0);
+    let down = last(flights);
     println!(
         "below 8 m: velocity {:.3} m/s, height {:.3} m, tilt {:.2} deg; at the ground: {:.3} {:.3} {:.2}",
         velocity_rms_m_s(&low),
@@ -87,7 +89,7 @@ fn it_is_good_enough_to_land_by() {
 
 #[test]
 fn the_wind_is_known_when_the_motor_is_lit_though_the_drag_is_not() {
-    let flights = fly(FLIGHTS, healthy);
+    let flights = &*HEALTHY;
     let lit: Vec<&Frame> =
         flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("lit")).collect();
     for axis in 0..2 {
@@ -99,8 +101,8 @@ fn the_wind_is_known_when_the_motor_is_lit_though_the_drag_is_not() {
 
 #[test]
 fn the_two_heights_agree_at_ignition_and_a_jump_of_one_shows() {
-    let flights = fly(FLIGHTS, healthy);
-    for frame in frames(&flights, |frame| frame.time_s > 1.0) {
+    let flights = &*HEALTHY;
+    for frame in frames(flights, |frame| frame.time_s > 1.0) {
         let apart_m = frame.estimate.heights.disagreement_m().expect("two heights");
         assert!(apart_m < 2.5, "{apart_m} m after {} s", frame.time_s);
     }
@@ -120,8 +122,8 @@ fn the_two_heights_agree_at_ignition_and_a_jump_of_one_shows() {
 
 #[test]
 fn without_satellites_in_the_last_five_seconds_it_drifts_no_further_than_it_says() {
-    let flights = fly(FLIGHTS, |time_s| SensorFaults { gnss_out: time_s > 6.9, ..SensorFaults::default() });
-    let down = last(&flights);
+    let flights = &fly(FLIGHTS, |time_s| SensorFaults { gnss_out: time_s > 6.9, ..SensorFaults::default() });
+    let down = last(flights);
     let silent_s = down.iter().map(|frame| frame.time_s - 6.9).fold(f64::INFINITY, f64::min);
     println!(
         "{silent_s:.1} s without satellites: velocity {:.2} m/s, height {:.3} m, tilt {:.2} deg",
@@ -161,7 +163,7 @@ fn an_inertial_unit_that_jumps_is_doubted_and_learnt_again() {
         },
     ];
     for jump in jumps {
-        let flights = fly(50, jump);
+        let flights = &fly(50, jump);
         let doubted = flights
             .iter()
             .filter(|frames| {
@@ -169,7 +171,7 @@ fn an_inertial_unit_that_jumps_is_doubted_and_learnt_again() {
             })
             .count();
         assert!(doubted >= 49, "doubted in {doubted} of 50");
-        let down = last(&flights);
+        let down = last(flights);
         println!("velocity {:.3} m/s, tilt {:.2} deg", velocity_rms_m_s(&down), tilt_rms_deg(&down));
         assert!(velocity_rms_m_s(&down) < 0.1, "{}", velocity_rms_m_s(&down));
         assert!(tilt_rms_deg(&down) < 1.5, "{}", tilt_rms_deg(&down));
@@ -200,4 +202,17 @@ fn a_log_of_measurements_flies_it_again_bit_for_bit() {
         thawed.step(&frame.measurements, &frame.vehicle);
     }
     assert_eq!(thawed, estimator);
+}
+
+#[test]
+fn a_frame_does_not_allocate() {
+    let scene = Scene::of(5);
+    let flown = scene.fly();
+    let mut estimator = scene.estimator();
+    let allocated = allocation_counter::measure(|| {
+        for frame in &flown {
+            estimator.step(&frame.measurements, &frame.vehicle);
+        }
+    });
+    assert_eq!(allocated.count_total, 0);
 }
