@@ -134,6 +134,24 @@ fn pitch_takes_the_room_before_roll_and_drag() {
     }
 }
 
+/// A tilt far beyond what the fins can give is given in its own direction, to a degree.
+#[test]
+fn a_tilt_that_saturates_keeps_its_direction() {
+    let allocation = allocation();
+    for wanted_n_m in [1.0, 10.0, 1000.0] {
+        for step in 0..36 {
+            let (sin, cos) = libm::sincos(f64::from(step) * core::f64::consts::TAU / 36.0);
+            let moments = Moments { roll_n_m: 0.0, pitch_n_m: wanted_n_m * cos, yaw_n_m: wanted_n_m * sin };
+            for drag_area_m2 in [0.0, 0.015, 1.0] {
+                let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2 }, 900.0);
+                let Moments { pitch_n_m, yaw_n_m, .. } = allocation.moments(900.0, kappa_rad);
+                let (along, across) = (cos * pitch_n_m + sin * yaw_n_m, cos * yaw_n_m - sin * pitch_n_m);
+                assert!(along > 0.25 && across.abs() < 0.017 * along, "{moments:?}: {pitch_n_m}, {yaw_n_m}");
+            }
+        }
+    }
+}
+
 proptest! {
     /// Whatever is asked, the fins stay between their stops.
     #[test]

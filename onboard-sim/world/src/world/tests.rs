@@ -165,3 +165,14 @@ fn val_gimbal_signs_and_arm() {
         assert!(world.angular_acceleration_rad_s2()[2 - axis].abs() < 1e-9);
     }
 }
+
+/// 5 m/s of crosswind push the bare body by 1/2 1.224 25 x 1.2 x 0.0518 m^2 = 0.95 N.
+#[test]
+fn val_hand_crosswind_on_the_bare_body() {
+    let truth = Truth { wind_m_s: 5.0, gust_scale: 0.0, ..Truth::default() };
+    let mut world = world("mk2", &truth, &RigidState::upright(10.0));
+    world.step(&Actuators::default());
+    let in_world = world.state().world_from_body * world.specific_force_m_s2();
+    let push_n = world.mass().mass_kg * in_world.x;
+    assert!((push_n - 0.951).abs() < 0.002 && in_world.y.abs() < 1e-12, "{push_n} N");
+}

@@ -1,17 +1,17 @@
 use super::*;
 
-/// MIL-F-8785C at 200 ft in 15 m/s of wind at 20 ft, worked by hand: 0.177 + 0.1646 = 0.3416; ^0.4 = 0.650642,
-/// ^1.2 = 0.275441; lengths 200 / 0.275441 = 726.11 ft and 200 ft.
+/// MIL-F-8785C at 200 ft in 15 m/s of wind at 20 ft, worked by hand: 0.177 + 0.1646 = 0.3416; ^0.4 = 0.650739,
+/// ^1.2 = 0.275565; lengths 200 / 0.275565 = 725.78 ft and 200 ft.
 #[test]
 fn val_mil_f_8785c_scales_at_200_ft() {
     let scales = GustScales::at(60.96, 15.0);
     for (found, expected) in [
         (scales.vertical_m_s, 1.5),
-        (scales.horizontal_m_s, 2.3054),
+        (scales.horizontal_m_s, 2.305_07),
         (scales.vertical_m, 60.96),
-        (scales.horizontal_m, 221.32),
+        (scales.horizontal_m, 221.22),
     ] {
-        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+        assert!((found / expected - 1.0).abs() < 3e-5, "{found} {expected}");
     }
     assert_eq!(GustScales::at(0.0, 15.0), GustScales::at(3.048, 15.0));
     assert_eq!(GustScales::at(900.0, 15.0), GustScales::at(304.8, 15.0));
