@@ -62,8 +62,8 @@ pub struct Mission {
     pub pad_altitude_m: f64,
     /// The fins steer; otherwise they stay open and equal (passive descent).
     pub steered: bool,
-    /// Lag with which the thrust scale follows what is felt, s.
-    pub motor_lag_s: f64,
+    /// Place of the lidar along the axis, ahead of the feet, m.
+    pub lidar_ahead_of_feet_m: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
     pub soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright already in that band, s.
