@@ -2,7 +2,7 @@
 //!
 //! In each of the two axes the rotation obeys `rate' = -T sin(g + e) arm / I + other` with the gimbal angle `g`, the
 //! thrust's offset `e` and what else is known to turn the vehicle. An observer follows the rate and lets the offset
-//! explain what is left (Luenberger, both poles at [`BANDWIDTH_RAD_S`]). Slop and misalignment are in `e`, and slow
+//! explain what is left (Luenberger, both poles at 8 rad/s). Slop and misalignment are in `e`, and slow
 //! moments of the air as well: to a controller they are all an offset to be steered against.
 
 /// Both poles of the observer, rad/s: slow beside the gimbal, fast beside the burn.

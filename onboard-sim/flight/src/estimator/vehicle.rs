@@ -25,7 +25,7 @@ pub struct VehicleNow {
     /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that times the
     /// dynamic pressure of the sideways wind alone.
     pub crossflow_area_m2: f64,
-    /// The landing motor is lit. Its sideways force is not known well enough to feel the wind beside it.
+    /// The igniter has been fired: the landing motor burns or may. Its sideways force is not known well enough to feel the wind beside it.
     pub motor_burning: bool,
     /// Distance of the lidar behind the centre of gravity, m.
     pub lidar_behind_cg_m: f64,
