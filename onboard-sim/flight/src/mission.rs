@@ -64,6 +64,8 @@ pub struct Mission {
     pub steered: bool,
     /// Place of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
+    /// Standard deviations of the thrust ahead that the motor is taken to be weaker than estimated.
+    pub caution_sigmas: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
     pub soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright already in that band, s.

@@ -18,6 +18,9 @@ use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
 
 /// A fin that is farther than this from its command is not there, rad.
 const FIN_THERE_RAD: f64 = 0.1;
+/// The thrust's uncertainty is looked up so far ahead, s, and never taken for more than this share.
+const CAUTION_AHEAD_S: f64 = 1.0;
+const LARGEST_CAUTION: f64 = 0.06;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -108,6 +111,12 @@ impl Pilot {
             may_burn: burning,
         };
         self.known.motor.update(&self.known.curve, &sample);
+        let ahead = self.known.motor.predict(&self.known.curve, input.time_s + CAUTION_AHEAD_S, input.time_s);
+        self.known.caution = if ahead.thrust_n > 0.0 {
+            (mission.caution_sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
+        } else {
+            0.0
+        };
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {

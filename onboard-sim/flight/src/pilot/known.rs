@@ -17,6 +17,9 @@ pub(super) struct Known {
     pub(super) mass: MassModel,
     /// Motor and scale of the air's forces, as felt.
     pub(super) motor: MotorEstimate,
+    /// How much less impulse than estimated is planned with, as a share: what turns out to be too much can be thrown
+    /// away late, what is missing cannot be had.
+    pub(super) caution: f64,
 }
 
 /// The burning vehicle of a frame.
@@ -61,7 +64,7 @@ impl Known {
     pub(super) fn burn(&self) -> Burn<'_> {
         Burn {
             curve: &self.curve,
-            impulse_scale: self.motor.impulse_scale(),
+            impulse_scale: self.motor.impulse_scale() - self.caution,
             time_scale: self.motor.burn_time_stretch(),
         }
     }

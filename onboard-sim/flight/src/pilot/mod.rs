@@ -127,6 +127,7 @@ impl Pilot {
                 mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
                 curve,
                 motor: MotorEstimate::new(&MotorPrior { frame_s, ..MotorPrior::default() }),
+                caution: 0.0,
             },
         })
     }

@@ -32,8 +32,6 @@ use crate::rigid::RigidState;
 /// Longest and shortest horizons, intervals.
 const MOST_INTERVALS: usize = 60;
 const LEAST_INTERVALS: usize = 6;
-/// A plan that ends sooner than this is flown out, s.
-const FLOWN_OUT_S: f64 = 0.12;
 
 /// How the landing burn is planned and flown.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -54,6 +52,10 @@ pub struct PoweredSettings {
     pub floor_rise_m_s: f64,
     /// How long after thrust has fallen through the weight a plan may end, s.
     pub latest_after_s: f64,
+    /// How long before touchdown a plan is inside the box but for its axial velocity, s.
+    pub settled_s: f64,
+    /// A plan that ends sooner than this is flown out, s.
+    pub flown_out_s: f64,
     /// Most final times tried in a tick.
     pub max_solves: u32,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
@@ -242,7 +244,7 @@ impl PoweredGuidance {
     pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
         let plane =
             *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
-        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < FLOWN_OUT_S) {
+        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
             return;
         }
         let wind_m_s = situation.wind_m_s.dot(&plane.along);
@@ -273,6 +275,8 @@ impl PoweredGuidance {
         let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+        let step_s = horizon_s / intervals as f64;
+        let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
         let landing = Problem {
             model: situation.model(),
             initial,
@@ -284,7 +288,7 @@ impl PoweredGuidance {
             input_weight: settings.weights.delta,
             gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
             x_final_m: settings.x_final_m,
-            final_box: Some(settings.final_box),
+            final_box: Some(FinalBox { settled_nodes, ..settings.final_box }),
             altitude_min_m: Some(0.0),
             floor_rise_m_s: settings.floor_rise_m_s,
             // How soft it can be is the plan's to say; a bound from straight-up thrust would only hide it.
