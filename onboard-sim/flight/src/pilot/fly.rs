@@ -21,6 +21,8 @@ const FIN_THERE_RAD: f64 = 0.1;
 /// The thrust's uncertainty is looked up so far ahead, s, and never taken for more than this share.
 const CAUTION_AHEAD_S: f64 = 1.0;
 const LARGEST_CAUTION: f64 = 0.06;
+/// It fades over so long before the thrust falls through the weight, s.
+const CAUTION_FADES_S: f64 = 2.0;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -113,7 +115,11 @@ impl Pilot {
         self.known.motor.update(&self.known.curve, &sample);
         let ahead = self.known.motor.predict(&self.known.curve, input.time_s + CAUTION_AHEAD_S, input.time_s);
         self.known.caution = if ahead.thrust_n > 0.0 {
-            (mission.caution_sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
+            // Nothing is thrown away late when it is late already.
+            let carried_until_s = self.known.carried_until_s().unwrap_or(0.0)
+                - self.known.burning_s(input.time_s).unwrap_or(0.0);
+            let early = (carried_until_s / CAUTION_FADES_S).clamp(0.0, 1.0);
+            early * (mission.caution_sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
         } else {
             0.0
         };

@@ -69,6 +69,11 @@ impl Known {
         }
     }
 
+    /// When thrust falls through the weight, s since it began.
+    pub(super) fn carried_until_s(&self) -> Option<f64> {
+        self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)
+    }
+
     pub(super) fn column(&self, density_kg_m3: f64) -> Column {
         let mission = &self.mission;
         let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;

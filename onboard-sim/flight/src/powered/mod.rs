@@ -41,6 +41,8 @@ pub struct PoweredSettings {
     pub interval_s: f64,
     /// Weights of the plan.
     pub weights: StateWeights,
+    /// A plan that tilts further than this is planned again with more weight on being upright, degrees.
+    pub tilt_max_deg: f64,
     /// Largest planned gimbal angle on either side, degrees; the rest of the travel is the attitude loop's.
     pub gimbal_deg: f64,
     /// Largest horizontal distance at the end, m.
@@ -67,6 +69,9 @@ pub struct PoweredSettings {
     /// Limits of the solver.
     pub solver: SolverLimits,
 }
+
+/// How much dearer a tilt becomes when a plan tilts too far.
+const UPRIGHT_DEARER: f64 = 8.0;
 
 /// What a tick must know besides the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -249,12 +254,17 @@ impl PoweredGuidance {
         }
         let wind_m_s = situation.wind_m_s.dot(&plane.along);
         let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let Some(problem) = self.pose(initial, wind_m_s, situation) else {
+        let Some(mut problem) = self.pose(initial, wind_m_s, situation) else {
             self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
             return;
         };
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
         solve_free_time_into(&problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+        if largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians() {
+            // A loop is a landing for the equations, not for a vehicle in air: ask again, upright dearer.
+            problem.landing.state_weights[2] *= UPRIGHT_DEARER;
+            solve_free_time_into(&problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
+        }
         self.take(time_s, plane, &problem, situation);
     }
 
@@ -330,7 +340,6 @@ impl PoweredGuidance {
             () => ControlLevel::BestFeasible,
         };
         let touchdown = solution.states.last().copied().unwrap_or_default();
-        let tilt = |planned: &PlanarState| (planned.theta_rad - FRAC_PI_2).abs();
         self.report = PoweredReport {
             level,
             status: solution.status,
@@ -341,7 +350,7 @@ impl PoweredGuidance {
             condition_miss: solution.condition_miss,
             touchdown_in_s: self.trial.final_time_s,
             touchdown,
-            largest_tilt_rad: solution.states.iter().map(tilt).fold(0.0, f64::max),
+            largest_tilt_rad: largest_tilt_rad(&self.trial),
         };
         if !usable {
             return;
@@ -395,6 +404,10 @@ impl PoweredGuidance {
         self.flown = None;
         self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
     }
+}
+
+fn largest_tilt_rad(plan: &FreeTimeSolution) -> f64 {
+    plan.solution.states.iter().map(|planned| (planned.theta_rad - FRAC_PI_2).abs()).fold(0.0, f64::max)
 }
 
 impl Flown {
