@@ -66,6 +66,8 @@ pub struct Mission {
     pub lidar_ahead_of_feet_m: f64,
     /// Standard deviations of the thrust ahead that the motor is taken to be weaker than estimated.
     pub caution_sigmas: f64,
+    /// How much of the fins' present opening a plan expects to last; the rest is expected to be half open.
+    pub fins_kept: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
     pub soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright already in that band, s.

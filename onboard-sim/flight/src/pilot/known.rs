@@ -113,7 +113,9 @@ impl Known {
             wind_m_s: estimate.wind_m_s.push(0.0),
             body_drag_area_m2: self.motor.air_scale() * self.body_drag_area_m2(),
             crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.motor.air_scale() * self.fin_drag_area_m2(fins_rad),
+            fin_drag_area_m2: self.motor.air_scale()
+                * (self.mission.fins_kept * self.fin_drag_area_m2(fins_rad)
+                    + 0.5 * (1.0 - self.mission.fins_kept) * self.largest_fin_drag_area_m2()),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
         }
     }
