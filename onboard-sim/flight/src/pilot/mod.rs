@@ -7,6 +7,7 @@
 mod fly;
 mod known;
 mod outlook;
+mod restart;
 
 use known::Known;
 pub use outlook::Outlook;
