@@ -150,7 +150,12 @@ impl Baseline {
         let mass = self.mass.at(self.curve.propellant_burnt_kg(burning_s));
         let state = &estimate.state;
         let height_m = state.position_m.z - self.mission.airframe.above_feet_m(mass.cg_station_m);
-        let burn = Burn { curve: &self.curve, impulse_scale: pilot.thrust_scale(), time_scale: 1.0 };
+        let motor = pilot.motor();
+        let burn = Burn {
+            curve: &self.curve,
+            impulse_scale: motor.impulse_scale(),
+            time_scale: motor.burn_time_stretch(),
+        };
         if self.controller == Controller::Oscillating {
             if self.frames.is_multiple_of(FRAMES_PER_SETTING) {
                 let most = self.largest_swing_rad;

@@ -68,10 +68,8 @@ fn the_results_depend_neither_on_threads_nor_on_shards_nor_on_a_stop() {
     assert_same(&at("one"), &at("three"));
 
     let parts = [at("part-1"), at("part-2")];
-    let flown: u64 = (1..=2)
-        .zip(&parts)
-        .map(|(index, part)| fly(&order, Shard { index, count: 2 }, 1, part))
-        .sum();
+    let flown: u64 =
+        (1..=2).zip(&parts).map(|(index, part)| fly(&order, Shard { index, count: 2 }, 1, part)).sum();
     assert_eq!(flown, FLIGHTS);
     let (store, merged) = merge(&parts, &at("merged"), |_, _, _| Ok(order.clone())).unwrap();
     results::publish(&merged, &store).unwrap();
@@ -99,7 +97,8 @@ fn read_them(out: &Path) {
     let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
     let column = |name: &str| columns.iter().position(|column| column.name() == name).unwrap();
     let [number, impulse, vertical, legs, failure, onset] =
-        ["number", "impulse_scale", "touchdown_vertical_m_s", "legs", "failure", "onset_height_m"].map(column);
+        ["number", "impulse_scale", "touchdown_vertical_m_s", "legs", "failure", "onset_height_m"]
+            .map(column);
     let mut count = 0;
     for (record, row) in reader.get_row_iter(None).unwrap().zip(&rows) {
         let record = record.unwrap();

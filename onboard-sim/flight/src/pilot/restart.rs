@@ -8,9 +8,9 @@ use crate::powered::PoweredGuidance;
 impl Pilot {
     /// What is left of a pilot that starts again at `time_s`.
     ///
-    /// Kept, as in memory that outlives the power: phase and latches, when the motor was commanded and when it was
-    /// felt, and the last estimate, which is carried on by its velocity and gravity over the time that was lost, and
-    /// believed no better than at apogee. Everything else begins anew.
+    /// Kept, as in memory that outlives the power: phase and latches, what is known of motor and drag, the last
+    /// commands, and the last estimate, which is carried on by what was last felt over the time that was lost, and
+    /// believed no better than at apogee. Estimator, outlook, plan and gimbal loop begin anew.
     #[must_use]
     pub fn restarted(&self, time_s: f64) -> Self {
         let mission = &self.known.mission;
@@ -28,20 +28,13 @@ impl Pilot {
                 Estimator::new(&mission.estimator, &uncertainty, time_s, &believed)
             },
         );
-        let mut known = self.known.clone();
-        known.drag_scale = 1.0;
         Self {
-            known,
             estimator,
-            estimate: self.estimate,
-            mode: self.mode,
-            ignited_at_s: self.ignited_at_s,
             outlook: Outlook::default(),
             powered: PoweredGuidance::new(mission.powered),
             aim_loop: AimLoop::new(mission.aim, mission.estimator.frame_s),
-            fin_share: 1.0,
-            fins_rad: self.fins_rad,
             gate_refusal: None,
+            ..self.clone()
         }
     }
 }
