@@ -4,6 +4,7 @@ use flight::estimator::{Estimate, Health, HeightSources, Measurements, Sigmas, S
 use flight::mission::{Mission, MissionError};
 use flight::phase::Phase;
 use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
+use flight::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
 use world::world::WorldError;
@@ -43,6 +44,9 @@ pub struct Flight {
     frames_down: u64,
     command: Actuators,
     input: Option<PilotInput>,
+    /// What the pilot itself wanted at the last frame.
+    piloted: Option<PilotOutput>,
+    believed: RigidState,
     output: Option<PilotOutput>,
     frame: u64,
     abort: bool,
@@ -89,6 +93,8 @@ impl Flight {
             baseline: None,
             frames_down: 0,
             input: None,
+            piloted: None,
+            believed,
             command: Actuators {
                 gimbal_rad: [0.0; 2],
                 fins_rad: [closed_rad; 4],
@@ -146,6 +152,21 @@ impl Flight {
         self.input.as_ref()
     }
 
+    /// What the pilot itself wanted at the last frame, whoever flew it.
+    pub fn piloted(&self) -> Option<&PilotOutput> {
+        self.piloted.as_ref()
+    }
+
+    /// What the flight computer believed about its state at apogee.
+    pub fn believed_at_apogee(&self) -> &RigidState {
+        &self.believed
+    }
+
+    /// The mission as flown.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
     /// Number of frames flown.
     pub fn frame(&self) -> u64 {
         self.frame
@@ -190,6 +211,7 @@ impl Flight {
             abort: core::mem::take(&mut self.abort),
         };
         let mut output = self.pilot.step(&input);
+        self.piloted = Some(output);
         if let Some(baseline) = &mut self.baseline {
             baseline.fly(input.time_s, &self.pilot, &mut output);
         }
