@@ -4,7 +4,7 @@
 //! steering by fins and the attitude loop are those of the [pilot](flight::pilot). They only do without a plan.
 //!
 //! * Open-loop timing: the height and one opening of the fins are those that bring the certified motor to rest at the
-//!   ground. The nose is held upright.
+//!   ground ([`crate::timing`]). The nose is held upright.
 //! * Oscillating gimbal: the nose swings to and fro about the vertical, which wastes thrust. The amplitude is set ten
 //!   times a second so that the predicted speed at the ground is nil (after D. Michalow, D. Alazard, L. Lustosa,
 //!   EuroGNC 2026: mean vertical thrust of a fixed-thrust motor lowered by oscillation). The height is fixed for half
@@ -63,6 +63,8 @@ impl core::str::FromStr for Controller {
     }
 }
 
+/// Share of the height of apogee that is fallen before the burn: the speed is nearly terminal by then.
+const FALL_SHARE: f64 = 0.76;
 /// Swings a second. Slow enough for the gimbal loop to follow.
 const SWING_HZ: f64 = 1.0;
 /// Share of the gimbal's travel that swinging may take; the rest keeps the balance.
@@ -105,7 +107,9 @@ impl Baseline {
         let fins = &mission.airframe.fins;
         let [closed_m2, open_m2] =
             [fins.closed_rad(), fins.open_rad()].map(|opening| mission.airframe.drag_area_m2(opening));
-        let speed_m_s = nominal_fall_speed_m_s(mission, mass.at(0.0).mass_kg, open_m2);
+        // The burn takes the last quarter of the fall, about.
+        let fallen_m = FALL_SHARE * mission.start.height_m;
+        let speed_m_s = nominal_fall_speed_m_s(mission, mass.at(0.0).mass_kg, open_m2, fallen_m);
         let mut brake = Brake {
             mass_at_ignition_kg: mass.at(0.0).mass_kg,
             gravity_m_s2: mission.gravity_m_s2,

@@ -96,11 +96,16 @@ fn smallest(least: f64, most: f64, holds: impl Fn(f64) -> bool) -> f64 {
     high
 }
 
-/// Speed, m/s, that a fall from the mission's apogee ends with, fins open.
-pub(crate) fn nominal_fall_speed_m_s(mission: &Mission, mass_kg: f64, drag_area_m2: f64) -> f64 {
+/// Speed, m/s, after a fall of `fallen_m` from the mission's apogee, fins open.
+pub(crate) fn nominal_fall_speed_m_s(
+    mission: &Mission,
+    mass_kg: f64,
+    drag_area_m2: f64,
+    fallen_m: f64,
+) -> f64 {
     let density_kg_m3 = flight::atmosphere::Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
     let terminal2 = 2.0 * mass_kg * mission.gravity_m_s2 / (density_kg_m3 * drag_area_m2);
-    let shed = libm::exp(-2.0 * mission.gravity_m_s2 * mission.start.height_m / terminal2);
+    let shed = libm::exp(-2.0 * mission.gravity_m_s2 * fallen_m / terminal2);
     libm::sqrt(terminal2 * (1.0 - shed))
 }
 

@@ -294,6 +294,7 @@ impl Flight {
             phase: self.pilot.mode().phase,
             ignited: self.pilot.ignited_at_s().is_some(),
             lit: self.world.thrust_begins_s().is_some(),
+            parachute: self.world.parachute_ejected(),
             finite: self.finite,
         };
         judge(&self.mission, &ending)

@@ -3,7 +3,7 @@
 //! * [`dispersion`]: what is uncertain about a flight and by how much, as data.
 //! * [`draw`]: one flight's truth from a seed and its number.
 //! * [`fault`]: what breaks in a flight, when, and what is expected then.
-//! * [`baseline`]: simpler controllers, to be beaten.
+//! * [`baseline`], [`timing`]: simpler controllers, to be beaten, and the height they light at.
 //! * [`fly`]: one flight, from apogee until it lies still.
 //! * [`outcome`]: what became of it, judged twice.
 //! * [`order`], [`sortie`], [`row`]: what a campaign flies, one flight of it, and that flight in a table.
@@ -31,3 +31,4 @@ pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod table;
+pub mod timing;

@@ -158,6 +158,8 @@ row! {
     ignited: bool,
     /// It was commanded while a check of the ignition gate failed. Never true.
     ignition_outside_gate: bool,
+    /// The parachute was thrown out.
+    parachute: bool,
     /// Height of the feet that was chosen for the first thrust, m, as of the command.
     chosen_onset_height_m: Option<f64>,
     /// Height of the feet at the ignition command, m.

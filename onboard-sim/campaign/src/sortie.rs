@@ -49,7 +49,7 @@ impl Sortie {
         let mut mission = order.mission.clone();
         let baseline = Baseline::new(order.controller, &mission)?;
         if let Some(baseline) = &baseline {
-            mission.ignition.fixed_height_m = Some(baseline.ignition_height_m());
+            mission.ignition.fixed_height_m.get_or_insert(baseline.ignition_height_m());
         }
         let draw = draw(&mission, &order.dispersion, order.seed, number);
         let flight = Flight::new(&mission, &order.dispersion, &draw)?.with_baseline(baseline);
@@ -143,6 +143,7 @@ impl Sortie {
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
             ignited: ignition.is_some(),
             ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
+            parachute: world.parachute_ejected(),
             chosen_onset_height_m: ignition.and_then(|ignition| ignition.chosen_onset_m),
             ignition_height_m: ignition.map(|ignition| ignition.height_m),
             onset_height_m: self.onset.map(|(height_m, _)| height_m),

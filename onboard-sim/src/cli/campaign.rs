@@ -12,7 +12,7 @@ use campaign::fault::{Expected, Scenario, TimedFault};
 use campaign::order::{Manifest, Order, Shard};
 use campaign::store::{Store, merge};
 use campaign::summary::to_text;
-use campaign::{results, run};
+use campaign::{results, run, timing};
 use clap::{Args, Subcommand};
 use flight::mission::{self, Mission};
 use protocol::log::build::build_info;
@@ -138,6 +138,9 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
     let mission_toml = text_of(&arguments.profile, mission::BUILTIN, "mission")?;
     let mut mission = Mission::from_toml(&mission_toml, &arguments.profile)?;
     mission.steered &= !arguments.passive;
+    if mission.ignition.fixed_height_m.is_none() {
+        mission.ignition.fixed_height_m = timing::fixed_height_m(arguments.controller, &mission)?;
+    }
     let dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
     let mut faults = arguments.faults.clone();
     let mut expected = None;
