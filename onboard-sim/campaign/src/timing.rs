@@ -32,7 +32,8 @@ pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Optio
     };
     let guess_m = baseline.ignition_height_m();
     let (mut low_m, mut high_m) = (guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE));
-    let inside = |low_m: f64, high_m: f64| [high_m - GOLDEN * (high_m - low_m), low_m + GOLDEN * (high_m - low_m)];
+    let inside =
+        |low_m: f64, high_m: f64| [high_m - GOLDEN * (high_m - low_m), low_m + GOLDEN * (high_m - low_m)];
     let [mut left_m, mut right_m] = inside(low_m, high_m);
     let (mut left_m_s, mut right_m_s) = (speed_m_s(left_m)?, speed_m_s(right_m)?);
     for _ in 2..FLIGHTS {
