@@ -1,5 +1,7 @@
 //! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
 
+mod cli;
+
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -35,6 +37,8 @@ enum Command {
     Fly(FlyArguments),
     /// Map where a landing inside the touchdown limits exists, over two quantities.
     Landability(LandabilityArguments),
+    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and day.
+    Campaign(cli::campaign::CampaignArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {
         /// As JSON.
@@ -114,6 +118,7 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
         Command::Landability(arguments) => map_landability(&arguments),
+        Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Paper { json } => repeat_paper(json),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => {

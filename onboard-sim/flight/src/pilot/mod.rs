@@ -4,9 +4,11 @@
 //! [`PilotOutput`]s, so a log of inputs flies the flight again. A frame is 5 ms: estimate, watch the motor, move through
 //! the [phase table](crate::phase), point fins and gimbal. Every tenth frame the outlook and the landing are planned.
 
+mod digest;
 mod fly;
 mod known;
 mod outlook;
+mod restart;
 
 use known::Known;
 pub use outlook::Outlook;
