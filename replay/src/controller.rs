@@ -24,7 +24,7 @@ impl LoggedController {
     }
 
     /// A controller whose settings change in flight, before its first tick.
-    pub fn scheduled(schedule: Schedule) -> Self {
+    pub fn scheduled(schedule: &Schedule) -> Self {
         Self { schedule: Some(schedule.clone()), ..Self::new(schedule.base()) }
     }
 

@@ -8,9 +8,10 @@
 //! * [`controller`]: the controller that a log's ticks came from.
 //! * [`mod@evaluate`]: the controller alone under other settings, on recorded inputs (open loop).
 //! * [`mod@refly`]: the flight flown again in simulation from a chosen moment (closed loop).
+//! * [`mod@sweep`]: many settings over many flights, ranked; and the smallest change that turns a verdict.
 //! * [`mod@tick`]: one tick solved again alone.
 //! * [`mod@compare`]: flights side by side, signal by signal; [`table`]: a log as tables.
-//! * [`export`] and [`mod@recover`]: into other formats, and whole again out of a damaged log.
+//! * [`export`], [`import`] and [`mod@recover`]: into other formats and from them, and whole again out of a damaged log.
 //! * [`mod@print`]: all of it as text for people, JSON for programs and JUnit XML for build servers.
 //!
 //! Everything but [`log`] and [`mod@print`] works on values: records in, reports out.
@@ -20,12 +21,14 @@ pub mod compare;
 pub mod controller;
 pub mod evaluate;
 pub mod export;
+pub mod import;
 pub mod info;
 pub mod log;
 pub mod print;
 pub mod recover;
 pub mod refly;
 pub mod settings;
+pub mod sweep;
 pub mod table;
 pub mod tick;
 pub mod verify;

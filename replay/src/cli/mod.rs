@@ -1,12 +1,15 @@
 //! The command line: what is asked, and how the answer leaves the program. One file a subcommand.
 
+mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod import;
 mod info;
 mod recover;
 mod refly;
 mod settings;
+mod sweep;
 mod tick;
 mod verify;
 
@@ -56,12 +59,18 @@ enum Question {
     /// The plant starts in the recorded state of that moment and the controller with what it remembered; nothing of
     /// the record is used afterwards. With nothing changed, a simulated flight comes out the same bit for bit.
     Refly(refly::Ask),
+    /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.
+    Sweep(sweep::Ask),
+    /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
+    Bisect(bisect::Ask),
     /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
     Compare(compare::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
     Export(export::Ask),
+    /// Makes a flight log of a ground station's .tlog: telemetry only, nothing can be re-executed.
+    Import(import::Ask),
     /// Makes a whole log of a damaged one, and says what was kept and what span is lost.
     Recover(recover::Ask),
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
@@ -99,8 +108,11 @@ impl Cli {
             Question::Evaluate(ask) => ask.run(),
             Question::Refly(ask) => ask.run(),
             Question::Tick(ask) => ask.run(),
+            Question::Sweep(ask) => ask.run(),
+            Question::Bisect(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
+            Question::Import(ask) => ask.run(),
             Question::Recover(ask) => ask.run(),
         }
     }

@@ -81,7 +81,7 @@ pub fn compare(
     let shift_s = align.shift_s(baseline, other)?;
     let names = |flown: &Flown| flown.signals.keys().cloned().collect::<Vec<String>>();
     let (ours, theirs) = (names(baseline), names(other));
-    tolerances.check_names(ours.iter().chain(&theirs))?;
+    tolerances.check_names(&ours.iter().chain(&theirs))?;
     let missing: Vec<String> =
         ours.iter().filter(|name| !other.signals.contains_key(*name)).cloned().collect();
     let added: Vec<String> =

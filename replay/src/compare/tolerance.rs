@@ -113,7 +113,7 @@ impl Tolerances {
     /// Every tolerance must fit some signal, or a misspelt one would tolerate everything.
     pub(super) fn check_names<'a>(
         &self,
-        signals: impl Iterator<Item = &'a String> + Clone,
+        signals: &(impl Iterator<Item = &'a String> + Clone),
     ) -> Result<(), ToleranceError> {
         for given in self.signals.keys() {
             if signals.clone().any(|signal| fits(given, signal)) {
@@ -157,7 +157,7 @@ mod tests {
         assert!(refusal("[signals.a]\nmax = -1.0").contains('a'));
         let signals = ["vehicle_truth.state.x_m".to_owned()];
         let tolerances = Tolerances::from_toml("[signals.\"vehicle_truth.x_m\"]\nmax = 1.0", "t").unwrap();
-        let refusal = tolerances.check_names(signals.iter()).unwrap_err().to_string();
+        let refusal = tolerances.check_names(&signals.iter()).unwrap_err().to_string();
         assert!(refusal.contains("the nearest is `vehicle_truth.state.x_m`"), "{refusal}");
     }
 }

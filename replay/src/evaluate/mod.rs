@@ -119,7 +119,7 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     }
     let schedule = Schedule::new(recording.profile_toml()?, settings)?;
     let limits = TouchdownLimits::from_profile(&recording.profile()?);
-    let mut controller = LoggedController::scheduled(schedule);
+    let mut controller = LoggedController::scheduled(&schedule);
     let mut ticks = Vec::new();
     for tick in recording.replayable_ticks()? {
         let again = controller.run_again(tick)?;

@@ -8,6 +8,7 @@ mod info;
 mod junit;
 mod recover;
 mod refly;
+mod sweep;
 mod tick;
 mod verify;
 
@@ -17,6 +18,7 @@ pub use info::print_info;
 pub use junit::{JunitCase, JunitOutcome, print_junit};
 pub use recover::print_recovery;
 pub use refly::print_refly;
+pub use sweep::{print_bisect, print_sweep, print_sweep_csv};
 pub use tick::print_tick;
 pub use verify::{print_verify, verify_case};
 

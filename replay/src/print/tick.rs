@@ -47,7 +47,7 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
         writeln!(
             output,
             "         the warm start saves {} iterations; costs differ by {:.3e}, first inputs by {:.3e} rad",
-            cold.iterations as i64 - warm.iterations as i64,
+            cold.iterations.cast_signed() - warm.iterations.cast_signed(),
             (warm.cost - cold.cost).abs(),
             (warm.gimbal_rad - cold.gimbal_rad).abs()
         )?;

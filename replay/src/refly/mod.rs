@@ -148,15 +148,15 @@ pub fn refly_flight(
     let schedule = Schedule::new(toml, &options.settings)?;
     let start = start::find(recording, ticks, options)?;
 
-    let believed = schedule.base().clone();
-    let mut controller = LoggedController::scheduled(schedule);
+    let believed = schedule.base();
+    let mut controller = LoggedController::scheduled(&schedule);
     let before: Vec<v1::ControllerTick> =
         ticks.iter().take(start.index).map(|tick| controller.run_again(tick)).collect::<Result<_, _>>()?;
     let seed = options.seed.or_else(|| recording.seed()).unwrap_or(0);
     let dispersed = draw(&plant_profile, seed);
-    let limits = TouchdownLimits::from_profile(&believed);
+    let limits = TouchdownLimits::from_profile(believed);
     let mut simulation =
-        Simulation::new(&believed, &plant_profile, &dispersed, controller, &start, options.law)?;
+        Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
     let flown = ReflownFlight { before, ..simulation.fly(&limits) };
 
     let (commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);

@@ -84,7 +84,7 @@ impl TableReader {
     }
 
     fn rows_of<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry) -> Vec<Row> {
-        let time = Cell::Integer(stamped.log_time_ns as i64);
+        let time = Cell::Integer(stamped.log_time_ns.cast_signed());
         match &stamped.entry {
             Entry::Event(event) => {
                 let columns = [("level", Kind::Integer), ("name", Kind::Text), ("message", Kind::Text)];
