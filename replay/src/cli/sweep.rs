@@ -1,6 +1,6 @@
 //! `replay sweep`.
 
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -101,12 +101,14 @@ impl Ask {
     }
 }
 
-/// Some twenty times in all, and at the end.
+/// On a terminal some twenty times in all; elsewhere only at the end.
 fn show(Progress { done, jobs }: Progress) {
-    if done == jobs || done.is_multiple_of((jobs / 20).max(1)) {
-        let end = if done == jobs { "\n" } else { "" };
+    let mut output = std::io::stderr();
+    let ended = done == jobs;
+    if ended || (output.is_terminal() && done.is_multiple_of((jobs / 20).max(1))) {
+        let end = if ended { "\n" } else { "" };
         // Talk goes to standard error; nobody may be listening.
-        let _ = write!(std::io::stderr(), "\rreplay: {done} of {jobs} flights{end}");
+        let _ = write!(output, "\rreplay: {done} of {jobs} flights{end}");
     }
 }
 

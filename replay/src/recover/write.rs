@@ -120,14 +120,16 @@ impl Rescue {
 
     /// The writer, made with this library's name if there is none yet.
     fn writer(&mut self, library: &str) -> mcap::McapResult<&mut Writer> {
-        if let State::Waiting(file) = std::mem::replace(&mut self.state, State::Gone) {
-            let writer = mcap::WriteOptions::new()
-                .compression(Some(mcap::Compression::Lz4))
-                .chunk_size(Some(CHUNK_BYTES))
-                .library(library)
-                .create(BufWriter::new(file))?;
-            self.state = State::Writing(Box::new(writer));
-        }
+        self.state = match std::mem::replace(&mut self.state, State::Gone) {
+            State::Waiting(file) => State::Writing(Box::new(
+                mcap::WriteOptions::new()
+                    .compression(Some(mcap::Compression::Lz4))
+                    .chunk_size(Some(CHUNK_BYTES))
+                    .library(library)
+                    .create(BufWriter::new(file))?,
+            )),
+            other => other,
+        };
         match &mut self.state {
             State::Writing(writer) => Ok(writer),
             // Only a failed creation leaves nothing, and its error ended the recovery.

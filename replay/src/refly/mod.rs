@@ -28,8 +28,11 @@ use tick_log::TickLogError;
 use crate::controller::LoggedController;
 use crate::info::VerdictFacts;
 use crate::log::{Recording, RecordingError};
-use crate::settings::{Schedule, Setting, SettingError, profile_toml_with, profile_with};
+use crate::settings::{Schedule, Setting, SettingError, profile_with};
 use simulation::Simulation;
+
+/// The log's run fact with the settings of the plant alone, in a flight flown again.
+const RUN_PLANT_SETTINGS: &str = "plant_settings";
 
 /// Which law flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -144,7 +147,7 @@ pub fn refly_flight(
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
     let toml = recording.profile_toml()?;
     let ticks = recording.replayable_ticks()?;
-    let plant_profile = plant_profile(toml, options)?;
+    let plant_profile = plant_profile(recording, options)?;
     let schedule = Schedule::new(toml, &options.settings)?;
     let start = start::find(recording, ticks, options)?;
 
@@ -183,14 +186,17 @@ pub fn refly_flight(
     Ok((report, flown))
 }
 
-fn plant_profile(toml: &str, options: &ReflyOptions) -> Result<Profile, ReflyError> {
+/// What is true: the flown profile, what a flight flown again before had its plant changed by, and the settings.
+fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profile, ReflyError> {
     if let Some(timed) = options.plant_settings.iter().find(|setting| setting.at_s.is_some()) {
         return Err(ReflyError::TimedPlant { setting: timed.to_string() });
     }
-    let from_the_beginning: Vec<Setting> =
-        options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-    let both = profile_toml_with(toml, &from_the_beginning)?;
-    Ok(profile_with(&both, &options.plant_settings)?)
+    let recorded = recording.head.run.get(RUN_PLANT_SETTINGS).map(String::as_str).unwrap_or_default();
+    let mut settings =
+        recorded.split_whitespace().map(str::parse).collect::<Result<Vec<Setting>, SettingError>>()?;
+    settings.extend(options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned());
+    settings.extend(options.plant_settings.iter().cloned());
+    Ok(profile_with(recording.profile_toml()?, &settings)?)
 }
 
 /// How many ticks command the same as the recorded ones, and by how much the others differ at most, rad.

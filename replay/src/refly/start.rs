@@ -114,7 +114,7 @@ pub(super) fn find(
         return Err(refused(format!("the state at tick {} is not finite", input.tick)));
     }
     let four = |angles: &Vec<f64>| <[f64; 4]>::try_from(angles.as_slice()).ok();
-    // A waiting vehicle is recorded once a second only; its servos are where the tick before commanded them.
+    // The fins get at a tick what the one before commanded; and a waiting vehicle is recorded once a second only.
     let before = index.checked_sub(1).and_then(|before| four(&ticks.get(before)?.output.fin_command_rad));
     Ok(Start {
         index,
@@ -122,7 +122,7 @@ pub(super) fn find(
         plant,
         gimbal_rad: near.map_or(input.gimbal_applied_rad, |truth| truth.gimbal_actual_rad),
         fins_rad: near.and_then(|truth| four(&truth.fin_actual_rad)).or(before).unwrap_or([0.0; 4]),
-        fins_commanded_rad: near.and_then(|truth| four(&truth.fin_commanded_rad)).or(before),
+        fins_commanded_rad: before,
         state: StartState {
             tick: input.tick,
             time_s: input.time_s,

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 
-use super::{ReflownFlight, ReflyOptions, ReflyReport};
+use super::{RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
 use crate::log::Recording;
 use crate::settings::{Setting, profile_toml_with};
 
@@ -62,7 +62,9 @@ fn header(recording: &Recording, options: &ReflyOptions, report: &ReflyReport) -
     run.insert("reflown_from".to_owned(), report.file.clone());
     run.insert("reflown_at_tick".to_owned(), report.start.tick.to_string());
     run.insert("settings".to_owned(), report.settings.join(" "));
-    run.insert("plant_settings".to_owned(), report.plant_settings.join(" "));
+    let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
+    let plant = before.split_whitespace().chain(report.plant_settings.iter().map(String::as_str));
+    run.insert(RUN_PLANT_SETTINGS.to_owned(), plant.collect::<Vec<_>>().join(" "));
     if let Some(seed) = options.seed {
         run.insert("seed".to_owned(), seed.to_string());
     }

@@ -7,3 +7,6 @@ mod divergence;
 mod flown;
 mod foreign;
 mod obstacles;
+mod simulated;
+mod tables;
+mod what_if;
