@@ -12,6 +12,7 @@
 //! * [`mod@tick`]: one tick solved again alone.
 //! * [`mod@compare`]: flights side by side, signal by signal; [`table`]: a log as tables.
 //! * [`export`], [`import`] and [`mod@recover`]: into other formats and from them, and whole again out of a damaged log.
+//! * [`mod@report`]: a flight as one page of HTML.
 //! * [`mod@print`]: all of it as text for people, JSON for programs and JUnit XML for build servers.
 //!
 //! Everything but [`log`] and [`mod@print`] works on values: records in, reports out.
@@ -27,6 +28,7 @@ pub mod log;
 pub mod print;
 pub mod recover;
 pub mod refly;
+pub mod report;
 pub mod settings;
 pub mod sweep;
 pub mod table;

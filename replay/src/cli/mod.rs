@@ -8,6 +8,7 @@ mod import;
 mod info;
 mod recover;
 mod refly;
+mod report;
 mod settings;
 mod sweep;
 mod tick;
@@ -67,6 +68,8 @@ enum Question {
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
     Compare(compare::Ask),
+    /// Writes a flight as one HTML page with its pictures inside: no script, no network.
+    Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
     Export(export::Ask),
     /// Makes a flight log of a ground station's .tlog: telemetry only, nothing can be re-executed.
@@ -111,6 +114,7 @@ impl Cli {
             Question::Sweep(ask) => ask.run(),
             Question::Bisect(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
+            Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
             Question::Import(ask) => ask.run(),
             Question::Recover(ask) => ask.run(),
