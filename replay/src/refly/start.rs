@@ -68,6 +68,9 @@ pub(super) struct Start {
 /// A record of the plant this close to a tick is of the same moment, s.
 const SAME_MOMENT_S: f64 = 1e-4;
 
+/// Vehicle time up to which a simulation starts: a day, s.
+const LONGEST_S: f64 = 86_400.0;
+
 pub(super) fn find(
     recording: &Recording,
     ticks: &[v1::ControllerTick],
@@ -99,6 +102,12 @@ pub(super) fn find(
         return Err(refused(format!(
             "tick {} is in {phase}; the simulation starts in LAND_ARMED, IGNITION or POWERED",
             input.tick
+        )));
+    }
+    if !(0.0..=LONGEST_S).contains(&input.time_s) {
+        return Err(refused(format!(
+            "tick {} is at {} s; the simulation starts between 0 and {LONGEST_S} s",
+            input.tick, input.time_s
         )));
     }
     let near = recording.truth.iter().find(|truth| (truth.time_s - input.time_s).abs() < SAME_MOMENT_S);

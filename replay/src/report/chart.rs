@@ -6,7 +6,7 @@ const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;
-const TOP: f64 = 40.0;
+const TOP: f64 = 52.0;
 const BOTTOM: f64 = 36.0;
 /// Points drawn of one line; more than there are pixels nobody sees.
 const POINTS_MAX: usize = 1200;
@@ -149,7 +149,7 @@ impl Chart {
                     "<path class=\"mark\" d=\"M{at:.1} {top}V{bottom}\"/><text x=\"{:.1}\" y=\"{:.1}\" \
                  text-anchor=\"{anchor}\">{}</text>\n",
                     at + shift,
-                    top + 11.0,
+                    top - 5.0,
                     escaped(word)
                 ),
             );
@@ -226,6 +226,8 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let bounds = values.fold(None, |bounds: Option<(f64, f64)>, value| {
         Some(bounds.map_or((value, value), |(from, to)| (from.min(value), to.max(value))))
     });
+    // Numbers so far apart that their difference is no number cannot be drawn.
+    let bounds = bounds.filter(|(from, to)| (to - from).is_finite());
     bounds.map(|(from, to)| if to - from > 1e-12 { (from, to) } else { (from - 0.5, to + 0.5) })
 }
 

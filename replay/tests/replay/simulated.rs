@@ -1,6 +1,6 @@
 //! Flights flown by the simulated vehicle, with the logs that it writes itself.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use onboard_sim::fly::{FlyOptions, Speed, fly, load_profile, log_header};
@@ -66,9 +66,4 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulate
     runtime.block_on(fly(options, stopped)).unwrap();
     recorder.finish().unwrap();
     Simulated { directory, log }
-}
-
-/// The text of a file.
-pub(crate) fn text_of(path: &Path) -> String {
-    std::fs::read_to_string(path).unwrap()
 }

@@ -14,7 +14,11 @@ use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Outcome, verify};
 
 use crate::flown::WHOLE;
-use crate::simulated::{DISPERSED, NOMINAL, Simulated, WITH_FRAMES, text_of};
+use crate::simulated::{DISPERSED, NOMINAL, Simulated, WITH_FRAMES};
+
+fn read_text(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap()
+}
 
 fn flown(flight: &Simulated) -> Flown {
     Flown::open(&flight.log).unwrap()
@@ -115,7 +119,7 @@ fn export(flight: &Simulated, format: TableFormat, name: &str) -> std::path::Pat
 #[test]
 fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     let directory = export(&NOMINAL, TableFormat::Csv, "csv");
-    let text = text_of(&directory.join("controller_tick.csv"));
+    let text = read_text(&directory.join("controller_tick.csv"));
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| names.iter().position(|known| *known == name).unwrap();
@@ -136,8 +140,8 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
         count += 1;
     }
     assert_eq!(count, recording.ticks.len());
-    assert!(text_of(&directory.join("events.csv")).contains("phase "));
-    assert_eq!(text_of(&directory.join("verdict_limits.csv")).lines().count(), 7);
+    assert!(read_text(&directory.join("events.csv")).contains("phase "));
+    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 7);
 }
 
 #[test]

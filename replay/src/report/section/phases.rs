@@ -58,12 +58,17 @@ fn strip(flight: &Flight, spans: &[crate::info::PhaseSpan]) -> String {
             format_args!(
                 "<text x=\"{left:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{} {:.2} s</text>\n",
                 escaped(&span.phase),
-                flight.axis_s(span.from_s)
+                rounded(flight.axis_s(span.from_s))
             ),
         );
     }
     svg.push_str("</svg></figure>\n");
     svg + &format!("<p class=\"muted\">Times in {}.</p>\n", flight.axis_name())
+}
+
+/// To hundredths, without a negative nought.
+fn rounded(time_s: f64) -> f64 {
+    (100.0 * time_s).round() / 100.0 + 0.0
 }
 
 /// What is asked first after a flight.

@@ -1,5 +1,6 @@
 //! Where each tick thought that the vehicle would touch down, against where it did.
 
+use flight::controller::ControlLevel;
 use flight::phase::Phase;
 use protocol::log::v1::ControllerTick;
 
@@ -14,7 +15,7 @@ pub(super) fn html(flight: &Flight) -> String {
         .ticks
         .iter()
         .filter(|tick| phase_of(tick.input.phase).is_some_and(Phase::is_landing))
-        .filter(|tick| tick.output.predicted_touchdown.time_from_now_s > 0.0)
+        .filter(|tick| tick.output.level != u32::from(ControlLevel::Idle.index()))
         .collect();
     if planned.is_empty() {
         return paragraph("The log has no predictions.");
