@@ -56,11 +56,17 @@ fn logs() -> Vec<PathBuf> {
 
 #[test]
 #[ignore = "needs Python packages: see tests/outside/setup.sh"]
-fn logs_are_read_by_the_mcap_library_and_pass_its_doctor() {
+fn logs_are_read_by_mcap_and_pass_pymcap_doctor_and_rerun_check() {
     for log in logs() {
         let read = said(outside("python").arg(script("read_mcap.py")).arg(&log));
         assert!(read.contains("/vehicle/truth "), "{read}");
         said(outside("pymcap-cli").arg("doctor").arg(&log));
+        let checked = said(outside("rerun").args(["mcap", "check"]).arg(&log));
+        assert!(
+            checked.lines().any(|line| line.starts_with("ok ") && line.contains("/vehicle/truth")),
+            "{checked}"
+        );
+        assert!(!checked.lines().any(|line| line.starts_with("error")), "{checked}");
         let recording = replay::log::Recording::open(&log).unwrap();
         assert!(read.contains(&format!("/controller/tick {}\n", recording.ticks.len())), "{read}");
         let command_rad = recording.ticks.last().unwrap().output.gimbal_command_rad;

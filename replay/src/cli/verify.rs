@@ -1,12 +1,13 @@
 //! `replay verify`.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
-use replay::print::{print_json, print_junit, print_verify, verify_case};
+use replay::log::LogError;
+use replay::print::{JunitCase, JunitOutcome, print_json, print_junit, print_verify, verify_case};
 use replay::verify::{Outcome, VerifyReport, verify};
 
 use super::{Answer, answer, say, warn_of_damage};
@@ -24,42 +25,74 @@ pub(super) struct Ask {
     junit: bool,
 }
 
+/// What became of one log.
+type Verified<'a> = (&'a Path, Result<VerifyReport, LogError>);
+
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
-        let mut reports = Vec::new();
+        let mut answers: Vec<Verified> = Vec::new();
         for file in &self.files {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            let report = verify(file)?;
+            let verified = verify(file);
             let took = started.elapsed();
-            warn_of_damage(&report.file, report.damage.as_deref());
-            warn_of_build(&report);
-            say_speed(&report, took);
-            reports.push(report);
+            match &verified {
+                Ok(report) => {
+                    warn_of_damage(&report.file, report.damage.as_deref());
+                    warn_of_build(report);
+                    say_speed(report, took);
+                }
+                // One log that cannot be read must not hide what the others say.
+                Err(error) if self.files.len() > 1 => say(&format!("{error}")),
+                Err(_) => {}
+            }
+            answers.push((file, verified));
         }
-        answer(|output| self.print(&reports, output))?;
-        Ok(Answer::Verified(worst(&reports)))
+        if let [(_, Err(_))] = answers.as_slice()
+            && let Some((_, Err(error))) = answers.pop()
+        {
+            return Err(error.into());
+        }
+        answer(|output| self.print(&answers, output))?;
+        Ok(Answer::Verified(worst(&answers)))
     }
 
-    fn print(&self, reports: &[VerifyReport], output: &mut impl Write) -> std::io::Result<()> {
-        match reports {
-            _ if self.junit => print_junit("verify", reports.iter().map(verify_case).collect(), output),
-            [report] if self.json => print_json(report, output),
+    fn print(&self, answers: &[Verified], output: &mut impl Write) -> std::io::Result<()> {
+        if self.junit {
+            return print_junit("verify", answers.iter().map(case).collect(), output);
+        }
+        let reports: Vec<&VerifyReport> =
+            answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).collect();
+        match reports.as_slice() {
+            [report] if self.json && answers.len() == 1 => print_json(report, output),
             _ if self.json => print_json(&reports, output),
             _ => reports.iter().try_for_each(|report| print_verify(report, output)),
         }
     }
 }
 
+fn case((path, verified): &Verified) -> JunitCase {
+    match verified {
+        Ok(report) => verify_case(report),
+        Err(error) => JunitCase {
+            name: format!("verify {}", path.display()),
+            outcome: JunitOutcome::Error { message: error.to_string() },
+        },
+    }
+}
+
 /// A difference found outweighs a log that gives no answer, and that an identical one.
-fn worst(reports: &[VerifyReport]) -> Outcome {
+fn worst(answers: &[Verified]) -> Outcome {
+    let outcome = |verified: &Result<VerifyReport, LogError>| {
+        verified.as_ref().map_or(Outcome::NotReplayable, |report| report.outcome)
+    };
     let rank = |outcome: Outcome| match outcome {
         Outcome::Identical => 0,
         Outcome::IdenticalReadablePart => 1,
         Outcome::NotReplayable => 2,
         Outcome::Diverged => 3,
     };
-    let outcomes = reports.iter().map(|report| report.outcome);
+    let outcomes = answers.iter().map(|(_, verified)| outcome(verified));
     outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Outcome::NotReplayable)
 }
 

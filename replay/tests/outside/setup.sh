@@ -4,4 +4,4 @@
 # outside_readers -- --ignored
 set -eu
 python3 -m venv "$1"
-"$1/bin/pip" install --quiet mcap mcap-protobuf-support pymcap-cli pandas polars pyarrow pymavlink
+"$1/bin/pip" install --quiet mcap mcap-protobuf-support pymcap-cli pandas polars pyarrow pymavlink rerun-sdk==0.36.3

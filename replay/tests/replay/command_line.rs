@@ -8,29 +8,29 @@ use tempfile::TempDir;
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::foreign::foreign_mcap;
 
-struct Files {
-    directory: TempDir,
+pub(crate) struct Files {
+    pub(crate) directory: TempDir,
 }
 
 impl Files {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { directory: tempfile::tempdir().unwrap() }
     }
 
-    fn file(&self, bytes: &[u8]) -> PathBuf {
+    pub(crate) fn file(&self, bytes: &[u8]) -> PathBuf {
         let path = self.directory.path().join("flight.mcap");
         std::fs::write(&path, bytes).unwrap();
         path
     }
 }
 
-fn replay(question: &str, file: &PathBuf) -> Command {
+pub(crate) fn replay(question: &str, file: &PathBuf) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_replay"));
     command.arg(question).arg(file);
     command
 }
 
-fn run(command: &mut Command) -> (i32, String, String) {
+pub(crate) fn run(command: &mut Command) -> (i32, String, String) {
     let Output { status, stdout, stderr } = command.output().unwrap();
     (status.code().unwrap(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
 }
@@ -160,123 +160,4 @@ fn help_lists_the_exit_codes() {
     assert_eq!(code, 0);
     assert!(stdout.contains("Exit codes:"), "{stdout}");
     assert!(stdout.contains("\n  1  verify: some tick differs"), "{stdout}");
-}
-
-#[test]
-fn several_logs_are_verified_at_once_and_the_worst_decides() {
-    let files = Files::new();
-    let good = files.file(&WHOLE.bytes);
-    let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[6].output.gimbal_command_rad = 0.25;
-    let bad = files.directory.path().join("bad <&>.mcap");
-    std::fs::write(&bad, write_log(&ticks, &Recipe::default()).bytes).unwrap();
-    let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--junit"));
-    assert_eq!(code, 1);
-    assert!(stdout.contains("tests=\"2\" skipped=\"0\" failures=\"1\" errors=\"0\""), "{stdout}");
-    // The hand-flown log ends a hair below the ground, which the simulation does not.
-    assert!(stdout.contains("verdict: would CHANGE: recorded NOT LANDED"), "{stdout}");
-    assert!(
-        stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_command_rad"),
-        "{stdout}"
-    );
-    let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--json"));
-    let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-    assert_eq!((code, reports.as_array().unwrap().len()), (1, 2));
-    assert_eq!(reports[1]["growth"]["steps"][0]["tick"], 6);
-    assert_eq!(reports[1]["growth"]["peak"]["tick"], 6);
-}
-
-/// The record claims another command; this build, flying on from there, lands as the vehicle did.
-#[test]
-fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
-    let recording = crate::simulated::NOMINAL.recording();
-    let path = crate::simulated::NOMINAL.beside("forged.mcap");
-    let options = replay::refly::ReflyOptions::default();
-    let (report, mut flight) = replay::refly::refly_flight(&recording, &options).unwrap();
-    flight.ticks[20].record.output.gimbal_command_rad = 0.2;
-    replay::refly::write_log(&path, &recording, &options, &report, &flight).unwrap();
-    let (code, stdout, _) = run(&mut replay("verify", &path));
-    assert_eq!(code, 1);
-    assert!(stdout.contains("how it grows"), "{stdout}");
-    assert!(
-        stdout.contains("verdict: would not change: recorded LANDED, flown on by this build from tick"),
-        "{stdout}"
-    );
-    // A weak motor that the record knows of is weak again when it is flown on.
-    let weak = replay::refly::ReflyOptions {
-        plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],
-        ..options
-    };
-    let (report, mut flight) = replay::refly::refly_flight(&recording, &weak).unwrap();
-    flight.ticks[20].record.output.gimbal_command_rad = 0.2;
-    let path = crate::simulated::NOMINAL.beside("crashed.mcap");
-    replay::refly::write_log(&path, &recording, &weak, &report, &flight).unwrap();
-    let (_, stdout, _) = run(&mut replay("verify", &path));
-    assert!(stdout.contains("verdict: would not change: recorded NOT LANDED"), "{stdout}");
-}
-
-#[test]
-fn a_comparison_exits_1_outside_its_tolerance() {
-    let nominal = &crate::simulated::NOMINAL;
-    let dispersed = &crate::simulated::DISPERSED;
-    let (code, stdout, _) = run(replay("compare", &nominal.log).arg(&nominal.log));
-    assert_eq!(code, 0, "{stdout}");
-    assert!(stdout.contains("**Within tolerance.**"), "{stdout}");
-    let tolerances = nominal.beside("tolerances.toml");
-    std::fs::write(&tolerances, "[signals.\"vehicle_truth.state.x_m\"]\nmax = 1e-6\n").unwrap();
-    let compare = |flag: Option<&str>| {
-        let mut command = replay("compare", &nominal.log);
-        command.arg(&dispersed.log).arg("--tolerances").arg(&tolerances).args(flag);
-        run(&mut command)
-    };
-    let (code, stdout, _) = compare(None);
-    assert_eq!(code, 1);
-    assert!(stdout.contains("| vehicle_truth.state.x_m |") && stdout.contains("**EXCEEDED**"), "{stdout}");
-    let (code, stdout, _) = compare(Some("--junit"));
-    assert_eq!(code, 1);
-    assert!(stdout.contains("failures=\"1\"") && stdout.contains("vehicle_truth.state.x_m"), "{stdout}");
-    let (code, stdout, _) = compare(Some("--json"));
-    let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-    assert_eq!((code, found[0]["align"].as_str()), (1, Some("ignition")));
-    std::fs::write(&tolerances, "[signals.\"vehicle_truth.stat.x_m\"]\nmax = 1e-6\n").unwrap();
-    let (code, _, stderr) = compare(None);
-    assert_eq!(code, 2);
-    assert!(stderr.contains("the nearest is `vehicle_truth.state.x_m`"), "{stderr}");
-}
-
-#[test]
-fn each_loop_says_which_it_is_and_unknown_names_exit_2() {
-    let log = &crate::simulated::NOMINAL.log;
-    for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
-        let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75"]));
-        assert_eq!(code, 0);
-        assert!(stdout.contains(kind), "{stdout}");
-        let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75", "--json"]));
-        let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-        assert!(code == 0 && report["kind"].as_str().unwrap().starts_with(kind));
-        let (code, stdout, stderr) = run(replay(question, log).args(["--set", "nmpc.wieghts.w=75"]));
-        assert_eq!((code, stdout.as_str()), (2, ""));
-        assert!(stderr.contains("did you mean `nmpc.weights.w`?"), "{stderr}");
-    }
-    let settings = crate::simulated::NOMINAL.beside("settings.toml");
-    std::fs::write(&settings, "nmpc.weights.w = 75\n").unwrap();
-    let (_, from_file, _) = run(replay("evaluate", log).arg("--settings").arg(&settings).arg("--csv"));
-    let (_, from_flag, _) = run(replay("evaluate", log).args(["--set", "nmpc.weights.w=75", "--csv"]));
-    assert_eq!(from_file, from_flag);
-}
-
-/// A sweep on two threads, and one on a processor without fused multiply-add, say the same as one on one thread.
-#[test]
-fn a_sweep_says_the_same_on_any_processor_and_any_number_of_threads() {
-    let log = &crate::simulated::DISPERSED.log;
-    let sweep = |jobs: &str, tunables: &str| {
-        let mut command = replay("sweep", log);
-        command.args(["--vary", "nmpc.weights.w=50:110:3", "--vary-plant", "plant.thrust_scale=0.99,1.0"]);
-        command.args(["--csv", "--jobs", jobs]).env("GLIBC_TUNABLES", tunables);
-        run(&mut command)
-    };
-    let (code, one, stderr) = sweep("1", "");
-    assert_eq!((code, one.lines().count()), (0, 7), "{stderr}");
-    assert_eq!(sweep("2", "").1, one);
-    assert_eq!(sweep("2", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4").1, one);
 }
