@@ -19,7 +19,11 @@ pub(super) struct Ask {
     /// What falls together; on ignition if both flights have one and this is left out, else on vehicle time.
     #[arg(long, value_enum)]
     align: Option<AlignOn>,
-    /// Tolerances, a TOML file: [signals."NAME"] rms and max, and verdict, missing, added.
+    /// Tolerances, a TOML file.
+    ///
+    /// [signals."NAME"] with rms and max in the signal's own unit, where a * at the end of NAME fits any rest; and
+    /// before that `verdict = false` to let the verdicts differ, `missing = N` and `added = N` to limit how many
+    /// signals only one flight may have.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.

@@ -32,11 +32,14 @@ pub enum RecordingError {
     },
     /// Nothing to re-execute.
     #[error(
-        "{name}: has no controller ticks from tick 0 on: this question needs the log of the vehicle or of the demonstration"
+        "{name}: has no controller ticks from tick 0 on: {}",
+        unreadable.as_deref().unwrap_or("this question needs the log of the vehicle or of the demonstration")
     )]
     NoTicks {
         /// The file.
         name: String,
+        /// Why some record could not be read, if that is the reason.
+        unreadable: Option<String>,
     },
     /// Nothing to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
@@ -75,6 +78,8 @@ pub struct Recording {
     pub verdict: Option<v1::LandingVerdict>,
     /// What ended the reading early.
     pub damage: Option<String>,
+    /// Why the first record that this build cannot read could not be read.
+    pub unreadable: Option<String>,
 }
 
 impl Recording {
@@ -105,7 +110,10 @@ impl Recording {
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
                 Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
                 Entry::Verdict(verdict) => recording.verdict = Some(*verdict),
-                Entry::RawFrame | Entry::Operator | Entry::Unreadable { .. } | Entry::Other => {}
+                Entry::Unreadable { reason } => {
+                    recording.unreadable.get_or_insert(reason);
+                }
+                Entry::RawFrame | Entry::Operator | Entry::Other => {}
             }
             recording.check_length()?;
         }
@@ -138,7 +146,9 @@ impl Recording {
     pub fn replayable_ticks(&self) -> Result<&[v1::ControllerTick], RecordingError> {
         match self.ticks.get(..self.ticks_unbroken) {
             Some(ticks) if !ticks.is_empty() => Ok(ticks),
-            _ => Err(RecordingError::NoTicks { name: self.name.clone() }),
+            _ => {
+                Err(RecordingError::NoTicks { name: self.name.clone(), unreadable: self.unreadable.clone() })
+            }
         }
     }
 
