@@ -61,10 +61,11 @@ fn header(recording: &Recording, options: &ReflyOptions, report: &ReflyReport) -
     let mut run: BTreeMap<String, String> = recording.head.run.clone();
     run.insert("reflown_from".to_owned(), report.file.clone());
     run.insert("reflown_at_tick".to_owned(), report.start.tick.to_string());
-    run.insert("settings".to_owned(), report.settings.join(" "));
+    run.insert("reflown_with".to_owned(), report.settings.join(" "));
     let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
     let plant = before.split_whitespace().chain(report.plant_settings.iter().map(String::as_str));
     run.insert(RUN_PLANT_SETTINGS.to_owned(), plant.collect::<Vec<_>>().join(" "));
+    run.retain(|_, fact| !fact.is_empty());
     if let Some(seed) = options.seed {
         run.insert("seed".to_owned(), seed.to_string());
     }

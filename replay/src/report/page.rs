@@ -25,10 +25,11 @@ p, ul { margin: 6px 0; max-width: 80ch; }
 table { border-collapse: collapse; margin: 8px 0; }
 th, td { text-align: left; padding: 4px 12px 4px 0; border-bottom: 1px solid var(--grid); vertical-align: middle; }
 th { color: var(--muted); font-weight: 600; }
+td { white-space: nowrap; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); gap: 12px; }
-figure { margin: 0; background: var(--card); border-radius: 6px; padding: 8px; }
-figure.full { grid-column: 1 / -1; }
+figure { margin: 0; overflow-x: auto; background: var(--card); border-radius: 6px; padding: 8px; }
+figure.full { grid-column: 1 / -1; } figure.full svg { min-width: 640px; }
 svg { display: block; width: 100%; height: auto; }
 svg text { fill: var(--muted); font: 11px system-ui, sans-serif; }
 svg .title { fill: var(--fg); font-size: 13px; font-weight: 600; }
