@@ -9,9 +9,9 @@ use protocol::dialect::{ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, MavCmd, TD_
 use protocol::identity::GROUND;
 use protocol::text::Reassembler;
 
-use super::streams::STANDARD;
 use super::*;
 use crate::scatter::draw;
+use crate::streams::STANDARD;
 use crate::vehicle::{DeadlinePolicy, LogState};
 
 struct Bench {
@@ -39,7 +39,7 @@ impl Bench {
             for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            sent.extend(self.endpoint.poll(&self.vehicle.snapshot()));
+            sent.extend(self.endpoint.poll(&self.vehicle, &self.vehicle.snapshot()));
         }
         sent
     }
@@ -313,3 +313,5 @@ proptest! {
         prop_assert!(bench.vehicle.phase() == Phase::PadIdle);
     }
 }
+
+mod questions;
