@@ -15,7 +15,7 @@ use protocol::dialect::{
     AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
     TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
-use protocol::frame::{Encoder, Frame};
+use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
@@ -37,6 +37,8 @@ const MAX_KNOWN: usize = 16;
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
     encoder: Encoder,
+    /// What a signature adds to every frame, bytes; 0 without a key.
+    signature_len: usize,
     streams: Streams,
     /// Answers and texts that wait to be sent.
     urgent: Vec<Frame>,
@@ -64,6 +66,7 @@ impl VehicleEndpoint {
     pub fn new() -> Self {
         Self {
             encoder: Encoder::new(VEHICLE),
+            signature_len: 0,
             streams: Streams::standard(),
             urgent: Vec::new(),
             requested: VecDeque::new(),
@@ -75,6 +78,11 @@ impl VehicleEndpoint {
             say_rejected_after_s: 0.0,
             known: BTreeSet::new(),
         }
+    }
+
+    /// The same where every frame will be signed, and is longer for it.
+    pub fn signed() -> Self {
+        Self { signature_len: SIGNATURE_LEN, streams: Streams::signed(), ..Self::new() }
     }
 
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
@@ -158,7 +166,7 @@ impl VehicleEndpoint {
         self.last_poll_s = now_s;
         let mut frames = std::mem::take(&mut self.urgent);
         for message_id in self.streams.due(now_s) {
-            let pending: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
+            let pending = self.bytes_of(&frames);
             // The heartbeat is what the ground believes us alive by: it is never held back.
             if self.credit_bytes < pending as f64 && message_id != HEARTBEAT_DATA::ID {
                 continue;
@@ -168,18 +176,22 @@ impl VehicleEndpoint {
             }
             self.streams.on_sent(message_id, now_s);
         }
-        let mut sent: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
+        let mut sent = self.bytes_of(&frames);
         // What was asked for comes after what the crew lives by.
         while self.credit_bytes >= sent as f64
             && let Some(message) = self.next_requested(vehicle)
         {
             let frame = self.encoder.encode(&message);
-            sent += frame.as_bytes().len();
+            sent += frame.as_bytes().len() + self.signature_len;
             frames.push(frame);
         }
         // A flood of commands, each answered, must not silence telemetry for longer than a burst.
         self.credit_bytes = (self.credit_bytes - sent as f64).max(-BURST_BYTES);
         frames
+    }
+
+    fn bytes_of(&self, frames: &[Frame]) -> usize {
+        frames.iter().map(|frame| frame.as_bytes().len() + self.signature_len).sum()
     }
 
     fn on_command(&mut self, request: &CommandRequest, vehicle: &mut Vehicle) {

@@ -7,12 +7,15 @@ use protocol::dialect::{
     TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
+use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
 
 /// Bytes around a payload: header and checksum.
 const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are nought and therefore cut.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
+/// Default rates are at most this where frames are signed, Hz: a signature is as long as a short message.
+const SIGNED_RATE_MAX_HZ: f64 = 6.0;
 /// Slowest interval that can be asked for, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
@@ -61,7 +64,7 @@ pub const STANDARD: [Standard; 16] = [
 #[derive(Debug, Clone, Copy)]
 struct Stream {
     message_id: u32,
-    payload_len: usize,
+    frame_len: usize,
     /// `None`: off unless asked for.
     default_interval_s: Option<f64>,
     /// `None`: switched off.
@@ -71,7 +74,7 @@ struct Stream {
 
 impl Stream {
     fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
-        interval_s.map_or(0.0, |interval_s| (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s)
+        interval_s.map_or(0.0, |interval_s| self.frame_len as f64 / interval_s)
     }
 }
 
@@ -81,13 +84,25 @@ pub struct Streams(Vec<Stream>);
 impl Streams {
     /// Every standard message at its default rate.
     pub fn standard() -> Self {
-        let streams = STANDARD.iter().enumerate().map(|(place, standard)| Stream {
-            message_id: standard.message_id,
-            payload_len: standard.payload_len,
-            default_interval_s: (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz),
-            interval_s: (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz),
-            // Spread, so that the slow ones do not all fall into the same instant.
-            due_s: 0.02 * place as f64,
+        Self::of(0, f64::INFINITY)
+    }
+
+    /// The same where every frame carries a signature: the fastest are slowed down, so that the radio's budget holds.
+    pub fn signed() -> Self {
+        Self::of(SIGNATURE_LEN, SIGNED_RATE_MAX_HZ)
+    }
+
+    fn of(signature_len: usize, rate_max_hz: f64) -> Self {
+        let streams = STANDARD.iter().enumerate().map(|(place, standard)| {
+            let interval_s = (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
+            Stream {
+                message_id: standard.message_id,
+                frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
+                default_interval_s: interval_s,
+                interval_s,
+                // Spread, so that the slow ones do not all fall into the same instant.
+                due_s: 0.02 * place as f64,
+            }
         });
         Self(streams.collect())
     }

@@ -20,8 +20,8 @@ pub use framer::{Framer, FramerCounters};
 const MAGIC: u8 = 0xFD;
 const HEADER_LEN: usize = 10;
 const CRC_LEN: usize = 2;
-/// Link id, six bytes of timestamp, six of hash.
-pub(crate) const SIGNATURE_LEN: usize = 13;
+/// What a signature adds to a frame: link id, six bytes of timestamp, six of hash.
+pub const SIGNATURE_LEN: usize = 13;
 const INCOMPAT_SIGNED: u8 = 0x01;
 /// Hands a key over in the clear.
 const SETUP_SIGNING_ID: u32 = 256;

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::RADIO_STATUS_DATA;
 use protocol::frame::FramerCounters;
 use protocol::identity::Address;
 use protocol::link::{LinkFigures, LinkStats, SourceFigures};
@@ -11,6 +12,9 @@ use protocol::signing::SigningCounters;
 pub const AMBER_AFTER: Duration = Duration::from_millis(1_500);
 /// Without a heartbeat for this long the link is lost.
 pub const RED_AFTER: Duration = Duration::from_millis(3_500);
+
+/// What a radio said of itself is shown for this long.
+pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
 /// Whether the vehicle is heard. Only its heartbeat counts: a radio that reports about itself is not
 /// the vehicle.
@@ -59,6 +63,8 @@ pub struct Link {
     pub reports: Vec<LinkReport>,
     /// What signatures let in and kept out; `None` without a key.
     pub signing: Option<SigningCounters>,
+    /// What a radio last said about itself, and when. It says nothing about the vehicle.
+    pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
     /// The link that the last frame came over, where there are several.
     pub(crate) heard_over: Option<usize>,
     /// What framing threw away.

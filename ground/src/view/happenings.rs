@@ -7,6 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::theme::{Role, Theme};
 use crate::model::Model;
+use crate::model::link::RADIO_FRESH;
 
 /// Columns before an event's text: time, speaker, mark.
 const BEFORE_TEXT: usize = 18;
@@ -107,7 +108,8 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), Role::Caution));
     let round_trip = span(format!("  rtt {round_trip}"), Role::Plain);
     let sent = span(format!("  tx {:.0} B/s", figures.tx_bytes_s), Role::Plain);
-    for more in refused.into_iter().chain([round_trip, sent]) {
+    let radio = radio(model, now).map(|words| span(words, Role::Plain));
+    for more in refused.into_iter().chain([round_trip]).chain(radio).chain([sent]) {
         used += more.width();
         if used > columns {
             break;
@@ -115,6 +117,22 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         spans.push(more);
     }
     Line::from(spans)
+}
+
+/// What a radio says of itself: signal and noise, here and at the other end, in its own units.
+fn radio(model: &Model, now: Duration) -> Option<String> {
+    let (radio, at) = model.link.radio.as_ref()?;
+    let fresh = now.saturating_sub(*at) < RADIO_FRESH;
+    fresh.then(|| {
+        let [rssi, remote, noise, remote_noise] =
+            [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(known);
+        format!("  rssi {rssi}/{remote} noise {noise}/{remote_noise}")
+    })
+}
+
+/// 255 says that it is not known.
+fn known(value: u8) -> String {
+    if value == u8::MAX { "--".to_owned() } else { value.to_string() }
 }
 
 /// Several links to one vehicle: what is left of the loss, and each link by itself as far as there is room.
@@ -128,6 +146,10 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         ),
         log(model, theme),
     ];
+    if let Some(refused) = model.link.signing.map(|signing| signing.rejected()).filter(|refused| *refused > 0)
+    {
+        spans.push(Span::styled(format!("  refused {refused}"), theme.style(Role::Caution)));
+    }
     let mut used: usize = spans.iter().map(Span::width).sum();
     for report in &model.link.reports {
         let kind = report.name.split(':').next().unwrap_or_default();
@@ -144,6 +166,9 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
             break;
         }
         spans.push(span);
+    }
+    if let Some(words) = radio(model, now).filter(|words| used + words.len() <= columns) {
+        spans.push(Span::styled(words, theme.style(Role::Plain)));
     }
     Line::from(spans)
 }

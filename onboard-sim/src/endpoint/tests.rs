@@ -110,6 +110,23 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
 }
 
 #[test]
+fn signatures_fit_the_radio_too() {
+    let total = Streams::signed().bytes_s();
+    assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
+    let mut bench = Bench { endpoint: VehicleEndpoint::signed(), ..Bench::new() };
+    bench.run(1.0);
+    let sent = bench.run(10.0);
+    let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + SIGNATURE_LEN).sum();
+    assert!(bytes as f64 <= 10.0 * f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{bytes} B in 10 s");
+    for (message_id, expected) in
+        [(HEARTBEAT_DATA::ID, 10), (TD_FLIGHT_STATUS_DATA::ID, 50), (ATTITUDE_QUATERNION_DATA::ID, 60)]
+    {
+        let found = count(&sent, message_id);
+        assert!(found.abs_diff(expected) <= 1, "message {message_id}: {found} of {expected}");
+    }
+}
+
+#[test]
 fn arming_is_answered_and_seen_in_the_heartbeat() {
     let mut bench = Bench::new();
     assert_eq!(bench.ask(400, 1.0, 0.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);

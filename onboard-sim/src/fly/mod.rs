@@ -231,7 +231,8 @@ pub async fn fly_observed(
     vehicle.pull_pin();
     let mut links =
         Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
-    let mut endpoint = VehicleEndpoint::new();
+    let mut endpoint =
+        if options.key_file.is_some() { VehicleEndpoint::signed() } else { VehicleEndpoint::new() };
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
