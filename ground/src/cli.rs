@@ -18,9 +18,14 @@ use crate::exit;
 #[derive(Debug, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP)]
 pub struct Cli {
-    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT or serial:DEVICE:BAUD.
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
     #[arg(long, value_name = "LINK")]
-    pub connect: Option<Endpoint>,
+    pub connect: Vec<Endpoint>,
+
+    /// Sign every frame with this key, and believe nothing that is not signed with it. `onboard-sim keygen` makes one.
+    #[arg(long, value_name = "FILE", requires = "connect")]
+    pub key: Option<PathBuf>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
@@ -94,7 +99,7 @@ impl FromStr for Seconds {
 impl Cli {
     /// Whether the flight is started without a hand.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
-        self.auto || (self.connect.is_none() && !interactive)
+        self.auto || (self.connect.is_empty() && !interactive)
     }
 }
 
@@ -111,9 +116,17 @@ mod tests {
     #[test]
     fn help_names_every_option_and_exit_code() {
         let help = Cli::command().render_long_help().to_string();
-        for word in
-            ["--connect", "--log", "--profile", "--seed", "--speed", "--auto", "--headless", "--timeout-s"]
-        {
+        for word in [
+            "--connect",
+            "--key",
+            "--log",
+            "--profile",
+            "--seed",
+            "--speed",
+            "--auto",
+            "--headless",
+            "--timeout-s",
+        ] {
             assert!(help.contains(word), "{word}");
         }
         assert!(help.contains(exit::HELP));

@@ -14,6 +14,7 @@ use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, 
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
@@ -44,6 +45,12 @@ enum Command {
         /// As JSON.
         #[arg(long)]
         json: bool,
+    },
+    /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
+    Keygen {
+        /// The file; an existing one is not overwritten.
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
     },
     /// List the built-in profiles, or print one as a file to start from.
     Profiles {
@@ -81,9 +88,13 @@ struct FlyArguments {
     /// Built-in profile or TOML file.
     #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
     profile: String,
-    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT or serial:DEVICE:BAUD; may be given more than once.
+    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once.
     #[arg(long, value_name = "LINK")]
     mavlink: Vec<Endpoint>,
+    /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// Log to write (MCAP). An existing file is not overwritten.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -120,6 +131,10 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Landability(arguments) => map_landability(&arguments),
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Paper { json } => repeat_paper(json),
+        Command::Keygen { file } => {
+            KeyFile::create(&file)?;
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -205,6 +220,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         profile,
         auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
         links: arguments.mavlink,
+        key_file: arguments.key,
         recorder: recorder.clone(),
         seed: arguments.seed,
         speed: arguments.speed,
@@ -276,6 +292,9 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
             1e3 * worst_s,
             summary.solve_times.missed()
         )?;
+    }
+    if let Some([median, p99, worst]) = summary.lateness.quantiles() {
+        writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
     match &summary.outcome {
         Outcome::Landed => writeln!(out, "LANDED inside every limit")?,

@@ -11,6 +11,7 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::key_file::KeyFile;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
@@ -46,9 +47,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
 
 async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
     let clock = Clock::start();
-    let demo_options = match cli.connect {
-        None => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
-        Some(_) => None,
+    let demo_options = match &cli.connect[..] {
+        [] => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
+        _ => None,
     };
     let header = match &demo_options {
         Some(options) => options.log_header(clock.start_unix_ns()),
@@ -59,22 +60,32 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         },
     };
     // The demonstration takes any free port, so that it runs beside a real ground station.
-    let endpoint = cli.connect.clone().unwrap_or_else(|| Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+    let mut endpoints = cli.connect.clone();
+    if endpoints.is_empty() {
+        endpoints.push(Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+    }
+    let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
     let recorder = log::open(cli.log.as_ref(), &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let mut wire = Wire::open(endpoint, recorder.clone(), log_time.clone()).await?;
+    let mut wire = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await?;
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
-            Some(start_demo(options, wire.endpoint(), recorder.clone(), vehicle_clock)?)
+            Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
         }
         _ => None,
     };
     let auto = cli.starts_by_itself(interactive);
+    let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
     let mut model = Model::new(Settings {
-        link_name: wire.endpoint().to_string(),
-        link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
+        link_name: links.join(" and "),
+        // Of several links, each has its own.
+        link_capacity_bytes_s: wire
+            .endpoints()
+            .next()
+            .filter(|_| links.len() == 1)
+            .and_then(Endpoint::capacity_bytes_s),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         auto,
         interactive,
@@ -83,6 +94,7 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
     let output = if interactive { Output::Screen(Screen::open()?) } else { Output::Lines(Lines::new()) };
     let mut station = Station { clock, log_time, recorder, demo, output };
     let ran = station.run(&mut model, &mut wire).await;
+    wire.remember();
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
@@ -93,12 +105,12 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
 
 fn start_demo(
     options: &DemoOptions,
-    listening: &Endpoint,
+    listening: Option<&Endpoint>,
     recorder: Option<Recorder>,
     log_clock: LogClock,
 ) -> anyhow::Result<Demo> {
-    let Endpoint::UdpIn(address) = listening else {
-        anyhow::bail!("the demonstration listens on UDP, not on {listening}");
+    let Some(Endpoint::UdpIn(address)) = listening else {
+        anyhow::bail!("the demonstration listens on UDP, not on {listening:?}");
     };
     Demo::start(options, Endpoint::UdpOut(address.clone()), recorder, log_clock)
         .context("starting the simulator")
@@ -139,9 +151,11 @@ impl Station {
                 received = wire.receive() => wire.take(received),
             };
             let mut quit = false;
-            for msg in msgs {
-                // A tick alone changes nothing that must be seen before the next second.
-                if msg != Msg::Tick {
+            // The links' state is told with the clock, so that it is never older than a tick.
+            let report = msgs.contains(&Msg::Tick).then(|| wire.report());
+            for msg in report.into_iter().chain(msgs) {
+                // Time and statistics alone change nothing that must be seen before the next second.
+                if !matches!(msg, Msg::Tick | Msg::Links { .. }) {
                     self.output.mark_changed();
                 }
                 quit |= self.step(model, wire, msg);
