@@ -31,6 +31,11 @@ pub(super) const fn pair(row: usize, column: usize) -> usize {
     row * (9 - row) / 2 + column
 }
 
+/// Sign of `w sin(theta)` in the horizontal velocity, by which the printed equations differ.
+pub(super) const fn lateral_sign(printed: bool) -> f64 {
+    if printed { -1.0 } else { 1.0 }
+}
+
 /// Below this speed (m/s) the drag's derivatives, which have no limit at rest, count as zero.
 const REST_SPEED_M_S: f64 = 1e-9;
 
@@ -45,8 +50,6 @@ pub(super) struct Constants {
     pub(super) lateral_drag_per_m: f64,
     pub(super) crossflow_per_m: f64,
     pub(super) gravity_m_s2: f64,
-    /// Sign of `w sin(theta)` in the horizontal velocity; -1 in the printed equations.
-    pub(super) lateral: f64,
     pub(super) printed: bool,
 }
 
@@ -62,7 +65,6 @@ impl Constants {
             lateral_drag_per_m: params.lateral_drag_per_m,
             crossflow_per_m: params.crossflow_per_m,
             gravity_m_s2: params.gravity_m_s2,
-            lateral: if printed { -1.0 } else { 1.0 },
             printed,
         }
     }
@@ -169,6 +171,8 @@ pub(super) struct Stage {
     pub(super) q: Lanes,
     pub(super) x_dot: Lanes,
     pub(super) z_dot: Lanes,
+    pub(super) u_dot: Lanes,
+    pub(super) w_dot: Lanes,
     /// Derivative of the drag's acceleration by u and w.
     pub(super) drag_u: Lanes,
     pub(super) drag_w: Lanes,
@@ -186,11 +190,11 @@ pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 /// Share of half a squared step by which the pitch acceleration moves a stage's pitch.
 pub(super) const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
 
-/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`. `ACROSS`
-/// tells whether the air [pushes across](Constants::pushed_across) the body.
+/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`. `PRINTED` and
+/// `ACROSS` tell which equations they are: [`Constants::printed`], [`Constants::pushed_across`].
 #[inline(always)]
 #[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
-pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
+pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>(
     c: &Constants,
     points: &Points,
     block: &mut Block,
@@ -209,6 +213,8 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
         q: q0,
         x_dot: Lanes::ZERO,
         z_dot: Lanes::ZERO,
+        u_dot: Lanes::ZERO,
+        w_dot: Lanes::ZERO,
         drag_u: Lanes::ZERO,
         drag_w: Lanes::ZERO,
         across_u: Lanes::ZERO,
@@ -217,53 +223,81 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
         across: Lanes::ZERO,
     }; 4];
     let (mut x_sum, mut z_sum, mut u_sum, mut w_sum) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-    let (mut u, mut w) = (u0, w0);
-    for i in 0..4 {
-        let theta = th0 + (q0 * AHEAD[i] + turn_acc * (0.5 * h * TURNED[i])) * h;
-        let q = q0 + turn_acc * (h * AHEAD[i]);
-        let (sin, cos) = theta.sin_cos();
-        let squared = u * u + w * w;
-        let (drag, drag_u, drag_w, along, across);
-        let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-        if c.printed {
-            drag = squared * drag_per_m;
-            drag_u = u * (drag_per_m * 2.0);
-            drag_w = w * (drag_per_m * 2.0);
-            (along, across) = (Lanes::ZERO, Lanes::ZERO);
-        } else {
-            let speed = squared.sqrt();
-            let inverse = speed.reciprocal_above(REST_SPEED_M_S);
-            along = u * inverse;
-            across = w * inverse;
-            drag = speed * u * -drag_per_m;
-            drag_u = (speed + u * along) * -drag_per_m;
-            drag_w = u * across * -drag_per_m;
-            if ACROSS {
-                let aside = w.abs();
-                across_acc = -((lateral_drag * speed + crossflow * aside) * w);
-                across_u = -(lateral_drag * (u * across));
-                across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
+    // Written out by a macro: left as a loop, the compiler keeps it one, and multiplies by the zeros of its tables.
+    macro_rules! stage {
+        ($i:literal) => {{
+            const I: usize = $i;
+            let (u, w) = if I == 0 {
+                (u0, w0)
+            } else {
+                let Stage { u_dot, w_dot, .. } = stages[(I + 3) % 4];
+                (u0 + u_dot * (h * AHEAD[I]), w0 + w_dot * (h * AHEAD[I]))
+            };
+            let (theta, q) = if I == 0 {
+                (th0, q0)
+            } else {
+                let theta = th0 + (q0 * AHEAD[I] + turn_acc * (0.5 * h * TURNED[I])) * h;
+                (theta, q0 + turn_acc * (h * AHEAD[I]))
+            };
+            let (sin, cos) = theta.sin_cos();
+            let squared = u * u + w * w;
+            let (drag, drag_u, drag_w, along, across);
+            let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
+            if PRINTED {
+                drag = squared * drag_per_m;
+                drag_u = u * (drag_per_m * 2.0);
+                drag_w = w * (drag_per_m * 2.0);
+                (along, across) = (Lanes::ZERO, Lanes::ZERO);
+            } else {
+                let speed = squared.sqrt();
+                let inverse = speed.reciprocal_above(REST_SPEED_M_S);
+                along = u * inverse;
+                across = w * inverse;
+                drag = speed * u * -drag_per_m;
+                drag_u = (speed + u * along) * -drag_per_m;
+                drag_w = u * across * -drag_per_m;
+                if ACROSS {
+                    let aside = w.abs();
+                    across_acc = -((lateral_drag * speed + crossflow * aside) * w);
+                    across_u = -(lateral_drag * (u * across));
+                    across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
+                }
             }
-        }
-        let lateral = w * c.lateral;
-        let x_dot = u * cos + lateral * sin;
-        let z_dot = u * sin - lateral * cos;
-        let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
-        let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
-        if ACROSS {
-            w_dot += across_acc;
-        }
-        x_sum += x_dot * WEIGHTS[i];
-        z_sum += z_dot * WEIGHTS[i];
-        u_sum += u_dot * WEIGHTS[i];
-        w_sum += w_dot * WEIGHTS[i];
-        stages[i] =
-            Stage { sin, cos, u, w, q, x_dot, z_dot, drag_u, drag_w, across_u, across_w, along, across };
-        if i < 3 {
-            u = u0 + u_dot * (h * AHEAD[i + 1]);
-            w = w0 + w_dot * (h * AHEAD[i + 1]);
-        }
+            let lateral = w * lateral_sign(PRINTED);
+            let x_dot = u * cos + lateral * sin;
+            let z_dot = u * sin - lateral * cos;
+            let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
+            let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
+            if ACROSS {
+                w_dot += across_acc;
+            }
+            x_sum += x_dot * WEIGHTS[I];
+            z_sum += z_dot * WEIGHTS[I];
+            u_sum += u_dot * WEIGHTS[I];
+            w_sum += w_dot * WEIGHTS[I];
+            stages[I] = Stage {
+                sin,
+                cos,
+                u,
+                w,
+                q,
+                x_dot,
+                z_dot,
+                u_dot,
+                w_dot,
+                drag_u,
+                drag_w,
+                across_u,
+                across_w,
+                along,
+                across,
+            };
+        }};
     }
+    stage!(0);
+    stage!(1);
+    stage!(2);
+    stage!(3);
     block.after = [
         x0 + x_sum * h,
         z0 + z_sum * h,
@@ -278,40 +312,47 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
     let mut pulled = [lt, lu, lw, lq, Lanes::ZERO];
     let mut slope_adjoints = [[Lanes::ZERO; 5]; 4];
     let mut later = [Lanes::ZERO; 4];
-    for i in (0..4).rev() {
-        let stage = &stages[i];
-        let weight = WEIGHTS[i] * h;
-        let (kx, kz) = (lx * weight, lz * weight);
-        let (mut kt, mut ku, mut kw, mut kq) = (lt * weight, lu * weight, lw * weight, lq * weight);
-        if i < 3 {
-            let along = AHEAD[i + 1] * h;
-            kt += later[TH] * along;
-            ku += later[U] * along;
-            kw += later[W] * along;
-            kq += later[Q] * along;
-        }
-        let heading = kx * stage.cos + kz * stage.sin;
-        let sideways = (kx * stage.sin - kz * stage.cos) * c.lateral;
-        later = [
-            kz * stage.x_dot - kx * stage.z_dot - (ku * stage.cos + kw * stage.sin) * c.gravity_m_s2,
-            heading + ku * stage.drag_u + kw * stage.q,
-            sideways + ku * (stage.drag_w - stage.q),
-            kt - ku * stage.w + kw * stage.u,
-        ];
-        if ACROSS {
-            later[U] += kw * stage.across_u;
-            later[W] += kw * stage.across_w;
-        }
-        pulled[TH] += later[TH];
-        pulled[U] += later[U];
-        pulled[W] += later[W];
-        pulled[Q] += later[Q];
-        pulled[D] += ku * side - kw * push + kq * turn_acc_d;
-        slope_adjoints[i] = [kx, kz, ku, kw, kq];
+    macro_rules! back {
+        ($i:literal) => {{
+            const I: usize = $i;
+            let stage = &stages[I];
+            let weight = WEIGHTS[I] * h;
+            let (kx, kz) = (lx * weight, lz * weight);
+            let (mut kt, mut ku, mut kw, mut kq) = (lt * weight, lu * weight, lw * weight, lq * weight);
+            if I < 3 {
+                let along = AHEAD[(I + 1) & 3] * h;
+                kt += later[TH] * along;
+                ku += later[U] * along;
+                kw += later[W] * along;
+                kq += later[Q] * along;
+            }
+            let heading = kx * stage.cos + kz * stage.sin;
+            let sideways = (kx * stage.sin - kz * stage.cos) * lateral_sign(PRINTED);
+            later = [
+                kz * stage.x_dot - kx * stage.z_dot - (ku * stage.cos + kw * stage.sin) * c.gravity_m_s2,
+                heading + ku * stage.drag_u + kw * stage.q,
+                sideways + ku * (stage.drag_w - stage.q),
+                kt - ku * stage.w + kw * stage.u,
+            ];
+            if ACROSS {
+                later[U] += kw * stage.across_u;
+                later[W] += kw * stage.across_w;
+            }
+            pulled[TH] += later[TH];
+            pulled[U] += later[U];
+            pulled[W] += later[W];
+            pulled[Q] += later[Q];
+            pulled[D] += ku * side - kw * push + kq * turn_acc_d;
+            slope_adjoints[I] = [kx, kz, ku, kw, kq];
+        }};
     }
+    back!(3);
+    back!(2);
+    back!(1);
+    back!(0);
     block.pulled = pulled;
     if DERIVATIVES {
-        differentiate::<ACROSS>(c, &held, &stages, &slope_adjoints, block);
+        differentiate::<PRINTED, ACROSS>(c, &held, &stages, &slope_adjoints, block);
     }
 }
 

@@ -13,6 +13,8 @@
 //! stage, is positive throughout.
 #![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
+use pulp::{Arch, NullaryFnOnce};
+
 use super::interval::{Block, DIRECTIONS, pair};
 use super::iterate::Iterate;
 use super::lanes::LANES;
@@ -134,6 +136,38 @@ pub(super) struct Sweep {
     share: f64,
 }
 
+/// The backward sweep, in the widest vectors that the machine has.
+struct Backward<'a> {
+    sweep: &'a mut Sweep,
+    iterate: &'a Iterate,
+    step_s: f64,
+}
+
+impl NullaryFnOnce for Backward<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.sweep.eliminate(self.iterate, self.step_s)
+    }
+}
+
+/// The forward sweep, in the same.
+struct Forward<'a> {
+    sweep: &'a mut Sweep,
+    iterate: &'a Iterate,
+    step_s: f64,
+}
+
+impl NullaryFnOnce for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.sweep.substitute(self.iterate, self.step_s);
+    }
+}
+
 impl Sweep {
     /// Makes room for a problem; allocates only if none was ever as long.
     pub(super) fn resize(&mut self, intervals: usize) {
@@ -149,6 +183,18 @@ impl Sweep {
     /// The backward sweep with a share of the dynamics' curvature; whether the inertia is right.
     pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, share: f64) -> bool {
         self.share = share;
+        Arch::new().dispatch(Backward { sweep: self, iterate, step_s })
+    }
+
+    /// The forward sweep: states, inputs, and then the costates, backwards again.
+    pub(super) fn forward(&mut self, iterate: &Iterate, step_s: f64) {
+        Arch::new().dispatch(Forward { sweep: self, iterate, step_s });
+    }
+
+    /// [`backward`](Self::backward) in the vectors of the function it is inlined into.
+    #[inline(always)]
+    pub(super) fn eliminate(&mut self, iterate: &Iterate, step_s: f64) -> bool {
+        let share = self.share;
         let count = self.inputs.len();
         let mut p = [[0.0; 6]; 6];
         for (i, weight) in self.weights[count].iter().enumerate() {
@@ -244,8 +290,9 @@ impl Sweep {
         curvature * self.inputs[k] + slope + bent + pulled
     }
 
-    /// The forward sweep: states, inputs, and then the costates, backwards again.
-    pub(super) fn forward(&mut self, iterate: &Iterate, step_s: f64) {
+    /// [`forward`](Self::forward) in the vectors of the function it is inlined into.
+    #[inline(always)]
+    pub(super) fn substitute(&mut self, iterate: &Iterate, step_s: f64) {
         let count = self.inputs.len();
         let mut dx = [0.0; 6];
         self.states[0] = dx;
