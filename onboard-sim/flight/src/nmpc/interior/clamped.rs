@@ -22,7 +22,7 @@
 //! did. `sides` has the parts of a step.
 
 use super::Workspace;
-use super::interval::Constants;
+use super::block::Constants;
 use super::solver::{CURVATURE_SHARES, Outcome};
 use crate::nmpc::{Problem, SolveStatus};
 

@@ -4,7 +4,8 @@
 use pulp::{Arch, NullaryFnOnce};
 
 use super::barrier::{Elastic, Limits};
-use super::interval::{Block, Constants, Points, blocks_for, evaluate};
+use super::block::{Block, Constants, Points, blocks_for};
+use super::interval::evaluate;
 use super::lanes::LANES;
 use crate::nmpc::Problem;
 use crate::nmpc::problem::Condition;

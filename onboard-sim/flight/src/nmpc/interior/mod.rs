@@ -16,7 +16,7 @@
 //!
 //! # Steps of an iteration
 //!
-//! 1. `interval`, `tangent`: `F`, its derivatives `A_k`, `b_k`, and the second derivative of `lambda_{k+1}' F_k`, all
+//! 1. `block`, `interval`, `tangent`: `F`, its derivatives `A_k`, `b_k`, and the second derivative of `lambda_{k+1}' F_k`, all
 //!    nodes, several at once in vector registers (`lanes`).
 //! 2. `residual`: stop if the optimality conditions hold; lower the barrier `mu` if its problem is solved.
 //! 3. `newton`: slacks and limit multipliers eliminated, which leaves diagonal terms at the nodes.
@@ -46,6 +46,7 @@
 //!   2020: fixed-size stage kernels.
 
 mod barrier;
+mod block;
 mod clamped;
 mod filter;
 mod interval;
@@ -56,6 +57,7 @@ mod layers;
 mod newton;
 mod residual;
 mod riccati;
+mod rows;
 mod sides;
 mod solver;
 mod start;

@@ -1,8 +1,8 @@
 //! The main loop.
 
 use super::barrier::Elastic;
+use super::block::Constants;
 use super::filter::{Filter, Measures};
-use super::interval::Constants;
 use super::iterate::Iterate;
 use super::newton::{Fractions, Newton};
 use super::residual::Residual;

@@ -4,7 +4,7 @@
 //! weighted by its adjoint) (tangent): the step is a composition in which only `f` is nonlinear.
 #![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
-use super::interval::{
+use super::block::{
     AHEAD, Block, Constants, D, DIRECTIONS, Held, PAIRS, Q, Stage, TH, TURNED, U, W, WEIGHTS, lateral_sign,
     pair,
 };

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
-use super::interval::{Block, Constants, DIRECTIONS, Points, evaluate, pair};
+use super::block::{Block, Constants, DIRECTIONS, Points, pair};
+use super::interval::evaluate;
 use super::lanes::{LANES, Lanes};
 use super::*;
 use crate::dynamics::{ModelKind, PlanarModel, PlanarState};

@@ -1,7 +1,7 @@
 //! A solve from an earlier solution.
 
 use super::Workspace;
-use super::interval::Constants;
+use super::block::Constants;
 use super::solver::{LAST_BARRIER, Outcome};
 use super::start;
 use crate::nmpc::{Problem, SolveStatus, WarmStart};
