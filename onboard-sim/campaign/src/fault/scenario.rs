@@ -74,7 +74,7 @@ pub const EXPECTATIONS: &[Expectation] = &[
         Expected::Inhibit,
         "satellites contradict the estimate: the gate stays shut",
     ),
-    expectation("fin-stuck:2@descent+2", Expected::Land, "three fins are enough to steer"),
+    expectation("fin-stuck:2@descent+2", Expected::Degrade, "three fins steer, and cannot stop all roll"),
     expectation("gimbal-slow:0.3@ignition", Expected::Degrade, "the loop is slower than it was tuned for"),
     expectation("gimbal-stuck@powered+0.5", Expected::Degrade, "thrust brakes, nothing steers"),
     expectation("no-light@0", Expected::Inhibit, "no thrust within half a second latches the inhibit"),
