@@ -1,8 +1,8 @@
 //! From the plant's state to the screen's model: how old a value is when the ground knows it.
 //!
 //! `cargo bench -p e2e --bench latency`. A landing is flown in real time by the vehicle's own run loop; the ground's
-//! own links and model receive it. At each controller tick the vehicle's state is noted with the time; the message that
-//! carries that state is found in the ground by its time since boot. Both clocks are this process's one.
+//! own links and model receive it. At each controller tick the time is noted, and the state that a message carries is
+//! dated from the tick before it by the message's time since boot. Both clocks are this process's one.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -21,6 +21,9 @@ use protocol::transport::Endpoint;
 use tokio::sync::watch;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
+/// In flight the controller ticks this often, ms.
+const TICK_MS: u32 = 100;
+
 /// When each tick was, by milliseconds since boot.
 type Ticks = Arc<Mutex<BTreeMap<u32, Instant>>>;
 
@@ -103,14 +106,21 @@ async fn receive(listening: Endpoint, vehicle: Endpoint) -> Result<Vec<Duration>
                 }
             }
             let known_at = now();
-            let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(was_at) = boot_ms.and_then(|boot_ms| ticks.get(&boot_ms)) {
-                latencies.push(known_at.saturating_duration_since(*was_at));
+            if let Some(was_at) = boot_ms.and_then(|boot_ms| state_was_at(&ticks, boot_ms)) {
+                latencies.push(known_at.saturating_duration_since(was_at));
             }
         }
     }
     vehicle.join().map_err(|_panic| "the vehicle's thread has panicked")??;
     Ok(latencies)
+}
+
+/// When the state of this time since boot was: counted from the controller tick before it, in real time.
+fn state_was_at(ticks: &Ticks, boot_ms: u32) -> Option<Instant> {
+    let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
+    let (tick_ms, tick_at) = ticks.range(..=boot_ms).next_back()?;
+    let since_ms = boot_ms - tick_ms;
+    (since_ms < TICK_MS).then(|| *tick_at + Duration::from_millis(u64::from(since_ms)))
 }
 
 fn report(name: &str, mut latencies: Vec<Duration>) -> std::io::Result<()> {

@@ -50,7 +50,7 @@ impl Frame {
 
     /// Message id.
     pub fn message_id(&self) -> u32 {
-        u32::from_le_bytes([self.bytes[7], self.bytes[8], self.bytes[9], 0])
+        self.view().message_id()
     }
 
     /// The payload as sent: trailing zeros may be cut.
@@ -118,8 +118,43 @@ impl Frame {
     /// # Errors
     /// A field holds a value that the dialect does not define.
     pub fn decode(&self) -> Result<MavMessage, DecodeError> {
-        MavMessage::parse(MavlinkVersion::V2, self.message_id(), self.payload())
-            .map_err(|error| DecodeError { message_id: self.message_id(), reason: error.to_string() })
+        self.view().decode()
+    }
+
+    fn view(&self) -> FrameView<'_> {
+        FrameView { bytes: &self.bytes }
+    }
+}
+
+/// A frame where it stands in a [`Framer`]'s buffer, for whoever only decodes it: nothing is copied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameView<'a> {
+    bytes: &'a [u8],
+}
+
+impl FrameView<'_> {
+    /// Message id.
+    #[inline]
+    pub fn message_id(&self) -> u32 {
+        u32::from_le_bytes([self.bytes[7], self.bytes[8], self.bytes[9], 0])
+    }
+
+    /// The typed message.
+    ///
+    /// # Errors
+    /// A field holds a value that the dialect does not define.
+    #[inline]
+    pub fn decode(&self) -> Result<MavMessage, DecodeError> {
+        let payload = &self.bytes[HEADER_LEN..HEADER_LEN + usize::from(self.bytes[1])];
+        match MavMessage::parse(MavlinkVersion::V2, self.message_id(), payload) {
+            Ok(message) => Ok(message),
+            Err(error) => Err(DecodeError { message_id: self.message_id(), reason: error.to_string() }),
+        }
+    }
+
+    /// The frame itself, to keep.
+    pub fn to_frame(&self) -> Frame {
+        Frame { bytes: self.bytes.to_vec() }
     }
 }
 
@@ -137,6 +172,7 @@ pub struct DecodeError {
 ///
 /// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so the seed
 /// alone cannot tell.
+#[inline]
 fn crc_extra(message_id: u32) -> Option<u8> {
     match MavMessage::extra_crc(message_id) {
         0 if MavMessage::default_message_from_id(message_id).is_none() => None,

@@ -1,6 +1,8 @@
 //! Bytes in any chunking to checked frames.
 
-use super::{CRC_LEN, Frame, HEADER_LEN, INCOMPAT_SIGNED, MAGIC, SIGNATURE_LEN, crc_extra};
+use std::ops::Range;
+
+use super::{CRC_LEN, Frame, FrameView, HEADER_LEN, INCOMPAT_SIGNED, MAGIC, SIGNATURE_LEN, crc_extra};
 
 /// What a [`Framer`] has seen, kept and thrown away.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -78,23 +80,39 @@ impl Framer {
 
     /// The next whole frame, or `None` until more bytes arrive.
     pub fn next_frame(&mut self) -> Option<Frame> {
+        self.next_view().map(|view| view.to_frame())
+    }
+
+    /// As [`Framer::next_frame`], without a copy.
+    #[inline]
+    pub fn next_view(&mut self) -> Option<FrameView<'_>> {
+        let found = self.find()?;
+        Some(FrameView { bytes: &self.buffer[found] })
+    }
+
+    /// Where the next whole frame stands; it counts as taken.
+    #[inline]
+    fn find(&mut self) -> Option<Range<usize>> {
         loop {
             let candidate = &self.buffer[self.start..];
-            let Some(skipped) = candidate.iter().position(|byte| *byte == MAGIC) else {
-                self.counters.garbage_bytes += candidate.len() as u64;
-                self.start = self.buffer.len();
-                return None;
-            };
-            self.counters.garbage_bytes += skipped as u64;
-            self.start += skipped;
+            // A frame follows a frame, as a rule.
+            if candidate.first() != Some(&MAGIC) {
+                let Some(skipped) = candidate.iter().position(|byte| *byte == MAGIC) else {
+                    self.counters.garbage_bytes += candidate.len() as u64;
+                    self.start = self.buffer.len();
+                    return None;
+                };
+                self.counters.garbage_bytes += skipped as u64;
+                self.start += skipped;
+            }
             match examine(&self.buffer[self.start..]) {
                 Candidate::Incomplete if !self.ended => return None,
                 Candidate::Incomplete => self.counters.cut_short += 1,
                 Candidate::Whole(len) => {
-                    let bytes = self.buffer[self.start..self.start + len].to_vec();
+                    let from = self.start;
                     self.start += len;
                     self.counters.frames += 1;
-                    return Some(Frame { bytes });
+                    return Some(from..self.start);
                 }
                 Candidate::BadCrc => self.counters.crc_errors += 1,
                 Candidate::UnknownId => self.counters.unknown_ids += 1,
@@ -115,6 +133,7 @@ enum Candidate {
 }
 
 /// Looks at bytes that begin with a start marker.
+#[inline]
 fn examine(candidate: &[u8]) -> Candidate {
     let signature_len = match candidate {
         [_, _, flags, ..] if flags & !INCOMPAT_SIGNED != 0 => return Candidate::UnknownFlags,
