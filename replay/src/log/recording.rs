@@ -113,7 +113,11 @@ impl Recording {
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
-                Entry::RawFrame | Entry::Operator | Entry::Other => {}
+                Entry::PilotStart(_)
+                | Entry::PilotTick(_)
+                | Entry::RawFrame
+                | Entry::Operator
+                | Entry::Other => {}
             }
             recording.check_length()?;
         }
