@@ -85,7 +85,7 @@ fn write(start: Option<&PilotStart>, ticks: &[PilotTick], profile_toml: Option<&
     let header = LogHeader { profile_toml: profile_toml.map(str::to_owned), ..LogHeader::default() };
     let mut writer = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     if let Some(start) = start {
-        writer.write(&Record::PilotStart(Box::new(start.clone())), 0).unwrap();
+        writer.write(&Record::PilotStart(Box::new(*start)), 0).unwrap();
     }
     for tick in ticks {
         writer.write(&Record::PilotTick(Box::new(tick.clone())), tick.input.frame * FRAME_NS).unwrap();
