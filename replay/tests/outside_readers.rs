@@ -82,7 +82,7 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
     let files = export_tables(&mut log, TableFormat::Parquet, &directory).unwrap();
     let recording = NOMINAL.recording();
     let last = recording.truth.last().unwrap();
-    for (column, value) in [("state.x_m", last.state.x_m), ("fin_2_actual_rad", last.fin_actual_rad[1])] {
+    for (column, value) in [("state.x_m", last.state.x_m), ("fin_actual_2_rad", last.fin_actual_rad[1])] {
         let path = directory.join("vehicle_truth.parquet");
         let columns = files.iter().find(|file| file.path == path).unwrap().columns;
         let read = said(outside("python").arg(script("read_tables.py")).arg(&path).arg(column));

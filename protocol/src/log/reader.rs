@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Read;
+use std::sync::Arc;
 
 use mcap::records::Record as McapRecord;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -21,6 +22,8 @@ pub struct LogChannel {
     pub message_encoding: String,
     /// Name of the schema; empty without one.
     pub schema_name: String,
+    /// The schema itself; of a `protobuf` channel a serialised `google.protobuf.FileDescriptorSet`.
+    pub schema: Arc<[u8]>,
     /// For raw frames: `link`, `endpoint`, `dialect`.
     pub metadata: BTreeMap<String, String>,
 }
@@ -86,7 +89,7 @@ pub struct LogReader<R: Read> {
     input: R,
     parser: LinearReader,
     bytes_read: u64,
-    schemas: BTreeMap<u16, String>,
+    schemas: BTreeMap<u16, (String, Arc<[u8]>)>,
     channels: BTreeMap<u16, LogChannel>,
     saw_data_end: bool,
     damage: Option<Damage>,
@@ -200,16 +203,21 @@ impl<R: Read> LogReader<R> {
     fn take(&mut self, record: McapRecord<'static>) -> Option<LogItem> {
         match record {
             McapRecord::Header(header) => Some(LogItem::Library(header.library)),
-            McapRecord::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
+            McapRecord::Schema { header, data } => {
+                // Every chunk may repeat it; what is known is kept.
+                let known = self.schemas.get(&header.id);
+                if known.is_none_or(|(name, known)| *name != header.name || **known != *data) {
+                    self.schemas.insert(header.id, (header.name, Arc::from(data.as_ref())));
+                }
                 None
             }
             McapRecord::Channel(channel) => {
-                let schema_name = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let (schema_name, schema) = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
                 let known = LogChannel {
                     topic: channel.topic,
                     message_encoding: channel.message_encoding,
                     schema_name,
+                    schema,
                     metadata: channel.metadata,
                 };
                 self.channels.insert(channel.id, known);

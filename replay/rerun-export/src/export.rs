@@ -123,7 +123,12 @@ impl<'a> Export<'a> {
                     self.done.unreadable += 1;
                     self.done.first_unreadable.get_or_insert(reason);
                 }
-                Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
+                Entry::PilotStart(_)
+                | Entry::PilotTick(_)
+                | Entry::RawFrame
+                | Entry::Operator
+                | Entry::Event(_)
+                | Entry::Other => {}
             }
         }
         self.events_until(u64::MAX)?;

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use flight::mission::Mission;
 use flight::profile::Profile;
 use protocol::log::reader::Damage;
 use protocol::log::v1;
 use serde::Serialize;
 
 use super::{ChannelFacts, PhaseTimeline, TickFacts};
-use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts};
+use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts, TickRanges};
 
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,6 +36,8 @@ pub struct Info {
     pub channels: Vec<ChannelFacts>,
     /// The controller's ticks.
     pub ticks: Option<TickFacts>,
+    /// The frames of the flight computer from apogee to touchdown.
+    pub frames: Option<FrameFacts>,
     /// The phases, from each source that tells them, the vehicle first.
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
@@ -54,6 +57,28 @@ pub struct Grade {
     pub level: GradeLevel,
     /// Why.
     pub reason: String,
+}
+
+/// The frames of the flight computer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FrameFacts {
+    /// The lowest number.
+    pub first: u64,
+    /// The highest number.
+    pub last: u64,
+    /// Gaps between them, which restarts of the computer leave, and losses.
+    pub gaps: usize,
+    /// How often a number came that was there already.
+    pub repeated: u64,
+    /// There is a record of how the computer was let go.
+    pub start: bool,
+}
+
+impl FrameFacts {
+    pub(super) fn of(frames: &TickRanges, start: bool) -> Option<Self> {
+        let (first, last) = frames.bounds()?;
+        Some(Self { first, last, gaps: frames.gaps().count(), repeated: frames.repeated(), start })
+    }
 }
 
 /// How much can be done with a log.
@@ -80,6 +105,23 @@ impl GradeLevel {
 }
 
 impl Grade {
+    pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
+        let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
+        match profile {
+            _ if !frames.start => numeric("no record of how the flight computer was let go"),
+            None => numeric("no attachment profile.toml to build the flight computer from"),
+            Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
+            Some(ProfileFacts { name, .. }) => {
+                let FrameFacts { first, last, gaps, .. } = frames;
+                let name = name.as_deref().unwrap_or_default();
+                let reason = format!(
+                    "frames {first} to {last} of the flight computer with {gaps} gaps, its start and its mission {name}"
+                );
+                Self { level: GradeLevel::BitExact, reason }
+            }
+        }
+    }
+
     pub(super) fn of(
         ticks: Option<&TickFacts>,
         profile: Option<&ProfileFacts>,
@@ -125,11 +167,18 @@ pub struct ProfileFacts {
 impl ProfileFacts {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
-            Ok(text) => Profile::from_toml(text, "profile.toml").map_err(|error| error.to_string()),
+            Ok(text) => Profile::from_toml(text, "profile.toml")
+                .map(|profile| (profile.name, profile.summary))
+                .or_else(|error| {
+                    // The other kind of profile; if it is neither, the first says why.
+                    Mission::from_toml(text, "profile.toml")
+                        .map(|mission| (mission.name, mission.summary))
+                        .map_err(|_neither| error.to_string())
+                }),
             Err(error) => Err(error.to_string()),
         };
         Some(match parsed {
-            Ok(profile) => Self { name: Some(profile.name), summary: Some(profile.summary), problem: None },
+            Ok((name, summary)) => Self { name: Some(name), summary: Some(summary), problem: None },
             Err(problem) => Self { name: None, summary: None, problem: Some(problem) },
         })
     }

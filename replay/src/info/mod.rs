@@ -6,7 +6,9 @@ mod phases;
 mod ticks;
 
 pub use channels::ChannelFacts;
-pub use facts::{Completeness, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit};
+pub use facts::{
+    Completeness, FrameFacts, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit,
+};
 pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
 pub use ticks::{Named, SolveTimes, TickFacts};
 
@@ -15,7 +17,7 @@ use std::path::Path;
 
 use protocol::log::v1;
 
-use crate::log::{Entry, FlightLog, LogError, SummaryFacts, summary_of};
+use crate::log::{Entry, FlightLog, LogError, SummaryFacts, TickRanges, summary_of};
 use channels::ChannelCounter;
 use phases::PhaseTracker;
 use ticks::TickCounter;
@@ -60,6 +62,9 @@ struct Seen {
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
     verdict: Option<v1::LandingVerdict>,
+    /// The flight computer was let go on record.
+    pilot_start: bool,
+    frames: TickRanges,
     unreadable: Option<String>,
 }
 
@@ -80,6 +85,11 @@ impl Seen {
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
+            Entry::PilotStart(_) => self.pilot_start = true,
+            Entry::PilotTick(tick) => {
+                self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
+                self.frames.insert(tick.input.frame);
+            }
             Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
         }
     }
@@ -96,7 +106,11 @@ impl Seen {
         Info {
             file: log.name().to_owned(),
             size_bytes: None,
-            grade: Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
+            grade: match FrameFacts::of(&self.frames, self.pilot_start) {
+                Some(frames) => Grade::of_frames(&frames, profile.as_ref()),
+                None => Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
+            },
+            frames: FrameFacts::of(&self.frames, self.pilot_start),
             library: head.library.clone(),
             build: head.build.clone(),
             build_comparison: head.compare_build(),

@@ -3,12 +3,12 @@
 use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
-    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
-    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_VERDICT,
+    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
+    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_VERDICT,
 };
-use protocol::log::v1;
+use protocol::log::{flight_v1, v1};
 
-use super::schema::{PACKAGE, complaint};
+use super::schema::{PACKAGE, PACKAGE_FLIGHT, complaint};
 
 /// A record and where it stands in the log.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,10 @@ pub struct StampedEntry {
 pub enum Entry {
     /// A controller tick.
     Tick(Box<v1::ControllerTick>),
+    /// What the flight computer believed when it was let go.
+    PilotStart(Box<flight_v1::PilotStart>),
+    /// A frame of the flight computer from apogee to touchdown.
+    PilotTick(Box<flight_v1::PilotTick>),
     /// The simulated plant.
     Truth(Box<v1::PlantTruth>),
     /// The landing verdict.
@@ -64,6 +68,8 @@ impl Entry {
         };
         match channel.topic.as_str() {
             TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
+            TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
+            TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
             TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
             TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
             TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
@@ -84,7 +90,8 @@ fn decoded<M: Message + Default>(
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    let accepted = format!("{PACKAGE}.{message_name}");
+    let package = if message_name.starts_with("Pilot") { PACKAGE_FLIGHT } else { PACKAGE };
+    let accepted = format!("{package}.{message_name}");
     if channel.schema_name != accepted {
         // Another program may use the same topic name.
         return if channel.schema_name.starts_with("touchdown.") {

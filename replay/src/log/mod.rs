@@ -16,7 +16,7 @@ pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 pub use recording::{Recording, RecordingError};
-pub(crate) use schema::{described, tick_descriptor};
+pub(crate) use schema::{pilot_descriptor, tick_descriptor};
 pub(crate) use summary::chunk_offsets;
 pub use summary::{SummaryFacts, summary_of};
 pub use tick_order::{Ordered, TickOrder};

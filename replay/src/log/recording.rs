@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use flight::mission::Mission;
 use flight::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::v1;
@@ -113,7 +114,11 @@ impl Recording {
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
-                Entry::RawFrame | Entry::Operator | Entry::Other => {}
+                Entry::PilotStart(_)
+                | Entry::PilotTick(_)
+                | Entry::RawFrame
+                | Entry::Operator
+                | Entry::Other => {}
             }
             recording.check_length()?;
         }
@@ -171,8 +176,17 @@ impl Recording {
     /// # Errors
     /// There is none, or it is not one of this build.
     pub fn profile(&self) -> Result<Profile, RecordingError> {
-        Profile::from_toml(self.profile_toml()?, "profile.toml").map_err(|error| {
-            RecordingError::ProfileUnusable { name: self.name.clone(), reason: error.to_string() }
+        let text = self.profile_toml()?;
+        Profile::from_toml(text, "profile.toml").map_err(|error| {
+            let reason = match Mission::from_toml(text, "profile.toml") {
+                Ok(mission) => format!(
+                    "{} is a mission from apogee, and this question knows the planar landing alone; info, verify, \
+                     export and compare know both",
+                    mission.name
+                ),
+                Err(_neither) => error.to_string(),
+            };
+            RecordingError::ProfileUnusable { name: self.name.clone(), reason }
         })
     }
 

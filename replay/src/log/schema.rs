@@ -6,22 +6,29 @@ use std::sync::LazyLock;
 use prost_reflect::{
     Cardinality, DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMessage as _, Value,
 };
-use protocol::log::DESCRIPTORS_V1;
+use protocol::log::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
 
 /// Package of the log's own records.
 pub(super) const PACKAGE: &str = "touchdown.log.v1";
 
-static POOL: LazyLock<DescriptorPool> =
-    LazyLock::new(|| DescriptorPool::decode(DESCRIPTORS_V1).unwrap_or_default());
+/// Package of the records of the flight from apogee.
+pub(super) const PACKAGE_FLIGHT: &str = "touchdown.flight.v1";
+
+static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
+    let mut pool = DescriptorPool::decode(DESCRIPTORS_V1).unwrap_or_default();
+    // What cannot be added is missing, which the crate's tests would see.
+    let _ = pool.decode_file_descriptor_set(DESCRIPTORS_FLIGHT_V1);
+    pool
+});
 
 /// Describes a controller tick. `None` cannot happen as long as the crate's tests pass.
 pub(crate) fn tick_descriptor() -> Option<MessageDescriptor> {
     POOL.get_message_by_name("touchdown.log.v1.ControllerTick")
 }
 
-/// Describes a record of the log's own package by its full name; `None` for any other.
-pub(crate) fn described(full_name: &str) -> Option<MessageDescriptor> {
-    full_name.starts_with(PACKAGE).then(|| POOL.get_message_by_name(full_name))?
+/// Describes a frame of the flight computer.
+pub(crate) fn pilot_descriptor() -> Option<MessageDescriptor> {
+    POOL.get_message_by_name("touchdown.flight.v1.PilotTick")
 }
 
 /// What keeps a record from being understood exactly: a missing or an unknown field.
@@ -70,7 +77,7 @@ mod tests {
         for name in ["ControllerTick", "PlantTruth", "LandingVerdict", "Telemetry", "OperatorAction"] {
             assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
         }
-        assert!(tick_descriptor().is_some());
+        assert!(tick_descriptor().is_some() && pilot_descriptor().is_some());
     }
 
     #[test]

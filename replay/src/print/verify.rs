@@ -93,14 +93,14 @@ fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
     shown.sort_by_key(|step| step.tick);
     shown.dedup_by_key(|step| step.tick);
     for step in shown {
+        let touchdown = step.touchdown_m.map_or_else(|| "-".to_owned(), |metres| format!("{metres:.3e} m"));
         let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
         writeln!(
             output,
-            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {:>10.3e} m  {ulps} ULP in {}",
+            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {touchdown:>12}  {ulps} ULP in {}",
             step.tick,
             step.time_s,
             step.gimbal_rad,
-            step.touchdown_m,
             counted(step.fields_different as u64, "field")
         )?;
     }

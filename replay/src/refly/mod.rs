@@ -145,6 +145,7 @@ pub fn refly_flight(
     recording: &Recording,
     options: &ReflyOptions,
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+    recording.profile()?;
     let toml = recording.profile_toml()?;
     let ticks = recording.replayable_ticks()?;
     let plant_profile = plant_profile(recording, options)?;

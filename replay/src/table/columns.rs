@@ -1,9 +1,15 @@
 //! The columns of a table, from a record's description.
 
-use prost_reflect::{FieldDescriptor, Kind as FieldKind, MessageDescriptor};
+use prost_reflect::{
+    DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor, ReflectMessage as _, Value,
+};
 
-/// A vehicle has four fins, and the log lists their angles.
-const FINS: usize = 4;
+/// A list this long has a column an element; a longer one, as a plan's nodes, has none.
+const LIST_MAX: usize = 8;
+
+/// Units at the end of a field's name, the longest first.
+const UNITS: [&str; 12] =
+    ["_rad_s2", "_rad_s", "_m_s2", "_m_s", "_kg_m2", "_bytes", "_rad", "_deg", "_kg", "_m", "_n", "_s"];
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,11 +57,12 @@ impl TableShape {
         }
     }
 
-    /// The table of a kind of record, and where its columns' values stand, without the time.
-    pub(super) fn of_record(name: &str, descriptor: &MessageDescriptor) -> (Self, Vec<Place>) {
+    /// The table of a kind of record, and where its columns' values stand, without the time. Lists are taken to be as
+    /// long as in this first record.
+    pub(super) fn of_record(name: &str, first: &DynamicMessage) -> (Self, Vec<Place>) {
         let mut shape = Self::new(name, &[]);
         let mut places = Vec::new();
-        walk(descriptor, &mut Vec::new(), &mut |column, place| {
+        walk(&first.descriptor(), Some(first), &mut Vec::new(), &mut |column, place| {
             shape.columns.push(column);
             places.push(place);
         });
@@ -71,22 +78,31 @@ pub(super) fn table_name(topic: &str) -> String {
 
 fn walk(
     descriptor: &MessageDescriptor,
+    record: Option<&DynamicMessage>,
     above: &mut Vec<FieldDescriptor>,
     take: &mut impl FnMut(Column, Place),
 ) {
+    // A schema may hold itself; no record does so more often than this.
+    if above.len() > LIST_MAX {
+        return;
+    }
     for field in descriptor.fields() {
         above.push(field.clone());
         let name = above.iter().map(|field| field.name().to_owned()).collect::<Vec<_>>().join(".");
-        match (field.kind(), kind_of(&field)) {
-            (FieldKind::Message(inner), _) if !field.is_list() => walk(&inner, above, take),
-            (_, Some(kind)) if !field.is_list() => {
-                take(Column { name, kind }, Place { fields: above.clone(), element: None });
+        let value = record.map(|record| record.get_field(&field).into_owned());
+        match (field.kind(), kind_of(&field), value) {
+            (FieldKind::Message(inner), _, value) if !field.is_list() && !field.is_map() => {
+                let below = value.as_ref().and_then(|value| value.as_message());
+                walk(&inner, below, above, take);
             }
-            (_, Some(kind)) if field.name().starts_with("fin_") => {
-                for fin in 0..FINS {
-                    let place = Place { fields: above.clone(), element: Some(fin) };
-                    take(Column { name: fin_name(&name, fin), kind }, place);
+            (_, Some(kind), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
+                for element in 0..items.len() {
+                    let place = Place { fields: above.clone(), element: Some(element) };
+                    take(Column { name: element_name(&name, element), kind }, place);
                 }
+            }
+            (_, Some(kind), _) if !field.is_list() => {
+                take(Column { name, kind }, Place { fields: above.clone(), element: None });
             }
             _ => {}
         }
@@ -94,12 +110,10 @@ fn walk(
     }
 }
 
-/// `fin_command_rad` of fin 2 is `fin_2_command_rad`: the unit stays at the end.
-fn fin_name(name: &str, fin: usize) -> String {
-    match name.rsplit_once("fin_") {
-        Some((before, what)) => format!("{before}fin_{}_{what}", fin + 1),
-        None => format!("{name}_{}", fin + 1),
-    }
+/// The second element of `fin_command_rad` is `fin_command_2_rad`: the unit stays at the end.
+fn element_name(name: &str, element: usize) -> String {
+    let unit = UNITS.into_iter().find(|unit| name.ends_with(unit)).unwrap_or_default();
+    format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
 }
 
 fn kind_of(field: &FieldDescriptor) -> Option<Kind> {
@@ -118,5 +132,22 @@ fn kind_of(field: &FieldDescriptor) -> Option<Kind> {
         | FieldKind::Bool => Some(Kind::Integer),
         FieldKind::String => Some(Kind::Text),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_elements_number_stands_before_its_unit() {
+        for (name, second) in [
+            ("output.fin_command_rad", "output.fin_command_2_rad"),
+            ("gimbal_rad_s", "gimbal_2_rad_s"),
+            ("position_m", "position_2_m"),
+            ("counts", "counts_2"),
+        ] {
+            assert_eq!(element_name(name, 1), second);
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! A log's records as rows, streamed.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::io::Read;
 
-use prost_reflect::{DynamicMessage, Value};
+use prost_reflect::{DescriptorPool, DynamicMessage, FieldDescriptor, MessageDescriptor, Value};
+use protocol::log::reader::LogChannel;
 use protocol::log::record::{TOPIC_EVENTS, TOPIC_VERDICT};
 use protocol::log::v1;
 
 use super::columns::{Kind, Place, TableShape, table_name};
-use crate::log::{Entry, FlightLog, LogError, StampedEntry, described};
+use crate::log::{Entry, FlightLog, LogError, StampedEntry};
 
 /// A value of a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,10 +49,17 @@ pub struct Row {
 #[derive(Default)]
 pub struct TableReader {
     shapes: Vec<TableShape>,
-    /// By channel: its table, and where in its records the values stand.
-    channels: BTreeMap<u16, Option<(usize, Vec<Place>)>>,
+    /// By channel; `None` for records that are not ours.
+    channels: BTreeMap<u16, Option<Known>>,
     limits: Option<usize>,
     events: Option<usize>,
+}
+
+/// What is known of a channel's records.
+struct Known {
+    table: usize,
+    descriptor: MessageDescriptor,
+    places: Vec<Place>,
 }
 
 impl TableReader {
@@ -97,7 +106,7 @@ impl TableReader {
                 ];
                 vec![Row { table, cells }]
             }
-            Entry::Unreadable { .. } | Entry::RawFrame | Entry::Other => Vec::new(),
+            Entry::RawFrame => Vec::new(),
             Entry::Verdict(verdict) => {
                 let mut rows = self.limits_of(verdict, &time);
                 rows.extend(self.record(log, stamped, time));
@@ -107,23 +116,29 @@ impl TableReader {
         }
     }
 
-    /// A record of the log's own package.
+    /// A record of a package of ours, as the log itself describes it.
     fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
         let channel = log.channel(stamped.channel_id)?;
-        let descriptor = described(&channel.schema_name)?;
         let shapes = &mut self.shapes;
-        let known = self.channels.entry(stamped.channel_id).or_insert_with(|| {
-            let (shape, places) = TableShape::of_record(&table_name(&channel.topic), &descriptor);
-            // Two channels of one topic share a table.
-            let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
-                shapes.push(shape);
-                shapes.len() - 1
-            });
-            Some((table, places))
-        });
-        let (table, places) = known.as_ref()?;
-        let message = DynamicMessage::decode(descriptor, stamped.data.as_slice()).ok()?;
-        let values = places.iter().map(|place| value_at(&message, place));
+        let known = match self.channels.entry(stamped.channel_id) {
+            Occupied(entry) => entry.into_mut(),
+            Vacant(entry) => {
+                let known = described(channel).and_then(|descriptor| {
+                    let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
+                    let (shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
+                    // Two channels of one topic share a table.
+                    let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
+                        shapes.push(shape);
+                        shapes.len() - 1
+                    });
+                    Some(Known { table, descriptor, places })
+                });
+                entry.insert(known)
+            }
+        };
+        let Known { table, descriptor, places } = known.as_ref()?;
+        let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
+        let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
         Some(Row { table: *table, cells: std::iter::once(time).chain(values).collect() })
     }
 
@@ -167,8 +182,8 @@ fn place_of(
     })
 }
 
-fn value_at(message: &DynamicMessage, place: &Place) -> Cell {
-    let Some((field, inner)) = place.fields.split_first() else {
+fn value_at(message: &DynamicMessage, fields: &[FieldDescriptor], element: Option<usize>) -> Cell {
+    let Some((field, inner)) = fields.split_first() else {
         return Cell::Absent;
     };
     if field.supports_presence() && !message.has_field(field) {
@@ -176,12 +191,19 @@ fn value_at(message: &DynamicMessage, place: &Place) -> Cell {
     }
     let value = message.get_field(field);
     match value.as_ref() {
-        Value::Message(message) => {
-            value_at(message, &Place { fields: inner.to_vec(), element: place.element })
-        }
-        Value::List(items) => place.element.and_then(|at| items.get(at)).map_or(Cell::Absent, cell_of),
+        Value::Message(message) => value_at(message, inner, element),
+        Value::List(items) => element.and_then(|at| items.get(at)).map_or(Cell::Absent, cell_of),
         value => cell_of(value),
     }
+}
+
+/// Describes a channel's records from the schema that the log carries; `None` for records that are not ours.
+fn described(channel: &LogChannel) -> Option<MessageDescriptor> {
+    if channel.message_encoding != "protobuf" || !channel.schema_name.starts_with("touchdown.") {
+        return None;
+    }
+    let pool = DescriptorPool::decode(channel.schema.as_ref()).ok()?;
+    pool.get_message_by_name(&channel.schema_name)
 }
 
 fn cell_of(value: &Value) -> Cell {

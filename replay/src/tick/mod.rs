@@ -127,8 +127,8 @@ pub struct PathPoint {
 /// # Errors
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
-    let ticks = recording.replayable_ticks()?;
     let profile = recording.profile()?;
+    let ticks = recording.replayable_ticks()?;
     let place = usize::try_from(number).ok().filter(|place| *place < ticks.len()).ok_or_else(|| {
         TickError::NoTick { name: recording.name.clone(), tick: number, last: ticks.len() as u64 - 1 }
     })?;

@@ -2,10 +2,8 @@
 
 use std::fmt;
 
-use prost_reflect::{DynamicMessage, ReflectMessage as _, Value};
+use prost_reflect::{DynamicMessage, MessageDescriptor, ReflectMessage as _, Value};
 use serde::{Serialize, Serializer};
-
-use crate::log::tick_descriptor;
 
 /// A field in which a recorded and a recomputed tick differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,9 +106,13 @@ fn rank(number: f64) -> u64 {
     if bits & SIGN == 0 { bits | SIGN } else { !bits }
 }
 
-/// Every field in which two encoded controller ticks differ, in the record's order.
-pub fn differences(recorded: &[u8], recomputed: &[u8]) -> Vec<FieldDifference> {
-    let decoded = |bytes: &[u8]| DynamicMessage::decode(tick_descriptor()?, bytes).ok();
+/// Every field in which two encoded records of a kind differ, in the record's order.
+pub fn differences(
+    descriptor: Option<&MessageDescriptor>,
+    recorded: &[u8],
+    recomputed: &[u8],
+) -> Vec<FieldDifference> {
+    let decoded = |bytes: &[u8]| DynamicMessage::decode(descriptor?.clone(), bytes).ok();
     let mut found = Vec::new();
     if let (Some(a), Some(b)) = (decoded(recorded), decoded(recomputed)) {
         compare_messages("", &a, &b, &mut found);
@@ -165,6 +167,7 @@ mod tests {
     use protocol::log::v1;
 
     use super::*;
+    use crate::log::tick_descriptor;
 
     #[test]
     fn neighbours_are_one_apart_across_zero_and_up_to_infinity() {
@@ -193,7 +196,7 @@ mod tests {
                 tick.output.gimbal_command_rad = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
                 tick.encode_to_vec()
             };
-            let found = differences(&tick(a), &tick(b));
+            let found = differences(tick_descriptor().as_ref(), &tick(a), &tick(b));
             if tick(a) == tick(b) {
                 prop_assert!(found.is_empty());
             } else {
@@ -210,7 +213,8 @@ mod tests {
         longer.output.fin_command_rad = vec![1.0, 2.0];
         let mut shorter = longer.clone();
         shorter.output.fin_command_rad.pop();
-        let found = differences(&longer.encode_to_vec(), &shorter.encode_to_vec());
+        let descriptor = tick_descriptor();
+        let found = differences(descriptor.as_ref(), &longer.encode_to_vec(), &shorter.encode_to_vec());
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].path, "output.fin_command_rad.len");
         assert_eq!(found[0].recorded, FieldValue::Integer(2));

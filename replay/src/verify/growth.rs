@@ -1,9 +1,6 @@
 //! How a divergence grows from tick to tick.
 
-use protocol::log::v1;
 use serde::Serialize;
-
-use super::difference::FieldDifference;
 
 /// Differing ticks kept one by one.
 const STEPS_KEPT: usize = 200;
@@ -19,8 +16,8 @@ pub struct GrowthStep {
     pub fields_different: usize,
     /// How far the gimbal commands are apart, rad.
     pub gimbal_rad: f64,
-    /// How far the predicted touchdowns are apart, m.
-    pub touchdown_m: f64,
+    /// How far the predicted touchdowns are apart, m; `None` if the record has none.
+    pub touchdown_m: Option<f64>,
     /// The most representable numbers that lie between two values of one field.
     pub worst_ulps: Option<u64>,
 }
@@ -38,24 +35,7 @@ pub struct Growth {
 
 impl Growth {
     /// Notes a differing tick.
-    pub(super) fn note(
-        &mut self,
-        recorded: &v1::ControllerTick,
-        again: &v1::ControllerTick,
-        fields: &[FieldDifference],
-    ) {
-        let touchdown = |tick: &v1::ControllerTick| {
-            (tick.output.predicted_touchdown.state.x_m, tick.output.predicted_touchdown.state.z_m)
-        };
-        let (then, now) = (touchdown(recorded), touchdown(again));
-        let step = GrowthStep {
-            tick: recorded.input.tick,
-            time_s: recorded.input.time_s,
-            fields_different: fields.len(),
-            gimbal_rad: (recorded.output.gimbal_command_rad - again.output.gimbal_command_rad).abs(),
-            touchdown_m: libm::hypot(then.0 - now.0, then.1 - now.1),
-            worst_ulps: fields.iter().filter_map(|field| field.ulps).max(),
-        };
+    pub(super) fn note(&mut self, step: GrowthStep) {
         if self.steps.len() < STEPS_KEPT {
             self.steps.push(step);
         }

@@ -4,6 +4,9 @@
 //! compares every field of what it decides (and the digest of what it remembers) with the record. Measured times
 //! are not compared.
 //!
+//! The log of a flight from apogee to touchdown holds frames of the whole flight computer; they are verified in the same
+//! way, from what it believed when it was let go.
+//!
 //! The controller remembers its plan, so a tick can be re-executed only if every tick before it can: at a gap the
 //! comparison ends, and the report says so.
 //!
@@ -13,12 +16,15 @@
 mod consequence;
 mod difference;
 mod growth;
+mod pilot;
 mod report;
+mod tally;
 mod verifier;
 
 pub use consequence::Consequence;
 pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
 pub use growth::{Growth, GrowthStep};
+pub use pilot::{FrameError, PilotVerifier};
 pub use report::{Divergence, Obstacle, Outcome, VerifyReport};
 pub use verifier::Verifier;
 
@@ -26,6 +32,8 @@ use std::io::Read;
 use std::path::Path;
 
 use flight::profile::Profile;
+
+use tally::Tally;
 
 use crate::log::{Entry, FlightLog, Head, LogError, Ordered, Recording, TickOrder};
 
@@ -61,6 +69,7 @@ pub fn verify_log<R: Read>(
 ) -> Result<VerifyReport, LogError> {
     let mut order = TickOrder::new();
     let mut verifier = None;
+    let mut pilot = None;
     let mut found = Found::default();
     while let Some(stamped) = log.next_entry()? {
         match stamped.entry {
@@ -80,6 +89,24 @@ pub fn verify_log<R: Read>(
                 }
                 found.advance(&mut order, verifier.as_mut(), false);
             }
+            Entry::PilotStart(start) => match text_of(log, &whole_head)? {
+                Ok(mission) => match PilotVerifier::new(&mission, &start) {
+                    Ok(verifier) => pilot = Some(verifier),
+                    Err(error) => {
+                        found.obstacle = Some(Obstacle::ProfileUnreadable { reason: error.to_string() });
+                    }
+                },
+                Err(obstacle) => found.obstacle = Some(obstacle),
+            },
+            Entry::PilotTick(tick) => {
+                found.ticks += 1;
+                if found.obstacle.is_none() {
+                    found.obstacle = match &mut pilot {
+                        Some(pilot) => pilot.check(&tick).err().map(Obstacle::Frame),
+                        None => Some(Obstacle::NoStart),
+                    };
+                }
+            }
             Entry::Unreadable { reason } => {
                 found.unreadable.get_or_insert(reason);
             }
@@ -87,7 +114,9 @@ pub fn verify_log<R: Read>(
         }
     }
     found.advance(&mut order, verifier.as_mut(), true);
-    Ok(found.into_report(log, verifier))
+    // One flight has one computer; its frames stand for the ticks inside them.
+    let tally = pilot.map(|pilot| pilot.tally).or(verifier.map(|verifier| verifier.tally));
+    Ok(found.into_report(log, tally))
 }
 
 /// What came up on the way through a log.
@@ -122,7 +151,7 @@ impl Found {
         }
     }
 
-    fn into_report<R: Read>(self, log: &FlightLog<R>, verifier: Option<Verifier>) -> VerifyReport {
+    fn into_report<R: Read>(self, log: &FlightLog<R>, tally: Option<Tally>) -> VerifyReport {
         let obstacle = match (self.obstacle, self.unreadable) {
             // An unreadable tick leaves a gap; what made it unreadable says more than the gap.
             (None | Some(Obstacle::Gap { .. } | Obstacle::BeginningMissing { .. }), Some(reason)) => {
@@ -134,7 +163,7 @@ impl Found {
         VerifyReport::new(
             log.name().to_owned(),
             self.ticks,
-            verifier,
+            tally,
             obstacle,
             log.damage().map(ToString::to_string),
             log.head().compare_build(),
@@ -146,6 +175,16 @@ fn profile_of<R: Read>(
     log: &FlightLog<R>,
     whole_head: &impl Fn() -> Result<Head, LogError>,
 ) -> Result<Result<Profile, Obstacle>, LogError> {
+    Ok(text_of(log, whole_head)?.and_then(|text| {
+        Profile::from_toml(&text, "profile.toml")
+            .map_err(|error| Obstacle::ProfileUnreadable { reason: error.to_string() })
+    }))
+}
+
+fn text_of<R: Read>(
+    log: &FlightLog<R>,
+    whole_head: &impl Fn() -> Result<Head, LogError>,
+) -> Result<Result<String, Obstacle>, LogError> {
     let found = match &log.head().profile_toml {
         Some(found) => Some(found.clone()),
         None => whole_head()?.profile_toml,
@@ -153,7 +192,6 @@ fn profile_of<R: Read>(
     Ok(match found {
         None => Err(Obstacle::NoProfile),
         Some(Err(error)) => Err(Obstacle::ProfileUnreadable { reason: error.to_string() }),
-        Some(Ok(text)) => Profile::from_toml(&text, "profile.toml")
-            .map_err(|error| Obstacle::ProfileUnreadable { reason: error.to_string() }),
+        Some(Ok(text)) => Ok(text),
     })
 }

@@ -6,7 +6,8 @@ use tick_log::TickLogError;
 use super::consequence::Consequence;
 use super::difference::FieldDifference;
 use super::growth::Growth;
-use super::verifier::Verifier;
+use super::pilot::FrameError;
+use super::tally::Tally;
 use crate::log::BuildComparison;
 
 /// The answer.
@@ -70,6 +71,12 @@ pub enum Obstacle {
         /// Why.
         reason: String,
     },
+    /// Frames of a flight computer, and nothing that says how it was let go.
+    #[error("it has frames of the flight computer and no record /pilot/start before them to begin from")]
+    NoStart,
+    /// A frame cannot be given to this build's flight computer.
+    #[error("{0}")]
+    Frame(#[from] FrameError),
     /// An input has no meaning in this build.
     #[error("{0}")]
     Input(#[from] TickLogError),
@@ -136,13 +143,13 @@ impl VerifyReport {
     pub(super) fn new(
         file: String,
         ticks_recorded: u64,
-        verifier: Option<Verifier>,
+        tally: Option<Tally>,
         obstacle: Option<Obstacle>,
         damage: Option<String>,
         build: BuildComparison,
     ) -> Self {
-        let (counts, first_divergence, growth) =
-            verifier.map(|verifier| (verifier.counts, verifier.first, verifier.growth)).unwrap_or_default();
+        let counts = tally.unwrap_or_default();
+        let (first_divergence, growth) = (counts.divergence, counts.growth);
         let outcome = if first_divergence.is_some() {
             Outcome::Diverged
         } else if obstacle.is_some() {

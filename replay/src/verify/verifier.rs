@@ -2,44 +2,20 @@
 
 use flight::phase::Phase;
 use flight::profile::Profile;
-use prost::Message as _;
+use prost_reflect::MessageDescriptor;
 use protocol::log::v1;
 use tick_log::TickLogError;
 
-use super::difference::differences;
-use super::growth::Growth;
-use super::report::Divergence;
+use super::tally::{Moment, Tally};
 use crate::controller::LoggedController;
-
-/// Fields of the first diverged tick that are kept.
-const FIELDS_KEPT: usize = 32;
+use crate::log::tick_descriptor;
 
 /// Re-executes ticks and compares them; ticks must come in order, from the first one on.
 #[derive(Debug)]
 pub struct Verifier {
     controller: LoggedController,
-    recorded: Vec<u8>,
-    recomputed: Vec<u8>,
-    pub(super) counts: Counts,
-    pub(super) first: Option<Divergence>,
-    pub(super) growth: Growth,
-}
-
-/// What has been compared so far.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Counts {
-    pub(super) ticks: u64,
-    pub(super) ticks_different: u64,
-    pub(super) fields_different: u64,
-    pub(super) first: Option<Moment>,
-    pub(super) last: Option<Moment>,
-}
-
-/// A tick and its vehicle time.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    pub(super) tick: u64,
-    pub(super) time_s: f64,
+    descriptor: Option<MessageDescriptor>,
+    pub(super) tally: Tally,
 }
 
 impl Verifier {
@@ -47,11 +23,8 @@ impl Verifier {
     pub fn new(profile: &Profile) -> Self {
         Self {
             controller: LoggedController::new(profile),
-            recorded: Vec::new(),
-            recomputed: Vec::new(),
-            counts: Counts::default(),
-            first: None,
-            growth: Growth::default(),
+            descriptor: tick_descriptor(),
+            tally: Tally::default(),
         }
     }
 
@@ -61,41 +34,25 @@ impl Verifier {
     /// The recorded input cannot be given to this build's controller.
     pub fn check(&mut self, tick: &v1::ControllerTick) -> Result<(), TickLogError> {
         let again = self.controller.run_again(tick)?;
-        encode_into(tick, &mut self.recorded);
-        encode_into(&again, &mut self.recomputed);
-
-        self.counts.ticks += 1;
-        let moment = Moment { tick: tick.input.tick, time_s: tick.input.time_s };
-        self.counts.first.get_or_insert(moment);
-        self.counts.last = Some(moment);
-        if self.recorded != self.recomputed {
-            let mut fields = differences(&self.recorded, &self.recomputed);
-            self.counts.ticks_different += 1;
-            self.counts.fields_different += fields.len() as u64;
-            self.growth.note(tick, &again, &fields);
-            if self.first.is_none() {
-                let fields_different = fields.len();
-                fields.truncate(FIELDS_KEPT);
-                self.first = Some(Divergence {
-                    tick: tick.input.tick,
-                    time_s: tick.input.time_s,
-                    phase: phase_name(tick.input.phase),
-                    fields_different,
-                    fields,
-                });
-            }
-        }
+        let moment =
+            Moment { tick: tick.input.tick, time_s: tick.input.time_s, phase: phase_name(tick.input.phase) };
+        self.tally.compare(moment, self.descriptor.as_ref(), (tick, &again), || apart(tick, &again));
         Ok(())
     }
 }
 
-/// The controller has taken the input, so the phase is a known one.
-fn phase_name(number: u32) -> &'static str {
-    u8::try_from(number).ok().and_then(Phase::from_index).map_or("unknown", Phase::name)
+/// How far gimbal commands, rad, and predicted touchdowns, m, are apart.
+fn apart(recorded: &v1::ControllerTick, again: &v1::ControllerTick) -> (f64, Option<f64>) {
+    let end = |tick: &v1::ControllerTick| {
+        let state = &tick.output.predicted_touchdown.state;
+        (state.x_m, state.z_m)
+    };
+    let (then, now) = (end(recorded), end(again));
+    let gimbal_rad = (recorded.output.gimbal_command_rad - again.output.gimbal_command_rad).abs();
+    (gimbal_rad, Some(libm::hypot(then.0 - now.0, then.1 - now.1)))
 }
 
-fn encode_into(tick: &v1::ControllerTick, bytes: &mut Vec<u8>) {
-    bytes.clear();
-    bytes.reserve(tick.encoded_len());
-    tick.encode_raw(bytes);
+/// The controller has taken the input, so the phase is a known one.
+pub(super) fn phase_name(number: u32) -> &'static str {
+    u8::try_from(number).ok().and_then(Phase::from_index).map_or("unknown", Phase::name)
 }

@@ -10,6 +10,7 @@ mod foreign;
 mod limits;
 mod obstacles;
 mod pages;
+mod pilot;
 mod recovery;
 mod simulated;
 mod tables;

@@ -60,6 +60,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulate
         exit_when_safed: true,
         deadline_policy: DeadlinePolicy::Observe,
         log_clock: None,
+        key_file: None,
     };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let (_stop, stopped) = watch::channel(false);

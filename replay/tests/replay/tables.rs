@@ -124,7 +124,7 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     let (gimbal, u, fin) = (
         column("output.gimbal_command_rad"),
         column("input.state.u_m_s"),
-        column("output.fin_4_command_rad"),
+        column("output.fin_command_4_rad"),
     );
     let recording = NOMINAL.recording();
     let mut count = 0;

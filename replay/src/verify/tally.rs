@@ -1,0 +1,85 @@
+//! Records compared, whatever kind they are of.
+
+use prost::Message;
+use prost_reflect::MessageDescriptor;
+
+use super::difference::{FieldDifference, differences};
+use super::growth::{Growth, GrowthStep};
+use super::report::Divergence;
+
+/// Fields of the first diverged tick that are kept.
+const FIELDS_KEPT: usize = 32;
+
+/// What has been compared so far.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    pub(super) ticks: u64,
+    pub(super) ticks_different: u64,
+    pub(super) fields_different: u64,
+    pub(super) first: Option<Moment>,
+    pub(super) last: Option<Moment>,
+    pub(super) divergence: Option<Divergence>,
+    pub(super) growth: Growth,
+    recorded: Vec<u8>,
+    recomputed: Vec<u8>,
+}
+
+/// A tick, its vehicle time and its phase.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    pub(super) tick: u64,
+    pub(super) time_s: f64,
+    pub(super) phase: &'static str,
+}
+
+impl Tally {
+    /// Compares a record with what was computed again. `apart` says how far gimbal commands, rad, and predicted
+    /// touchdowns, m, are apart.
+    pub(super) fn compare<M: Message>(
+        &mut self,
+        moment: Moment,
+        descriptor: Option<&MessageDescriptor>,
+        (recorded, again): (&M, &M),
+        apart: impl FnOnce() -> (f64, Option<f64>),
+    ) {
+        encode_into(recorded, &mut self.recorded);
+        encode_into(again, &mut self.recomputed);
+        self.ticks += 1;
+        self.first.get_or_insert(moment);
+        self.last = Some(moment);
+        if self.recorded != self.recomputed {
+            let fields = differences(descriptor, &self.recorded, &self.recomputed);
+            self.differs(moment, fields, apart());
+        }
+    }
+
+    fn differs(
+        &mut self,
+        moment: Moment,
+        mut fields: Vec<FieldDifference>,
+        (gimbal_rad, touchdown_m): (f64, Option<f64>),
+    ) {
+        let Moment { tick, time_s, phase } = moment;
+        let fields_different = fields.len();
+        self.ticks_different += 1;
+        self.fields_different += fields_different as u64;
+        self.growth.note(GrowthStep {
+            tick,
+            time_s,
+            fields_different,
+            gimbal_rad,
+            touchdown_m,
+            worst_ulps: fields.iter().filter_map(|field| field.ulps).max(),
+        });
+        if self.divergence.is_none() {
+            fields.truncate(FIELDS_KEPT);
+            self.divergence = Some(Divergence { tick, time_s, phase, fields_different, fields });
+        }
+    }
+}
+
+fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
+    bytes.clear();
+    bytes.reserve(record.encoded_len());
+    record.encode_raw(bytes);
+}

@@ -1,0 +1,157 @@
+//! Logs of the flight computer from apogee on: its frames are executed again, over restarts, bit for bit.
+
+use std::io::{Cursor, Read as _, Seek as _};
+use std::sync::LazyLock;
+
+use flight::estimator::{ImuSample, Measurements, StartUncertainty};
+use flight::mission::Mission;
+use flight::pilot::{Pilot, PilotInput, Sensed};
+use flight::rigid::RigidState;
+use nalgebra::{UnitQuaternion, Vector3};
+use protocol::log::flight_v1::{PilotStart, PilotTick};
+use protocol::log::record::Record;
+use protocol::log::writer::{LogHeader, LogWriter};
+use replay::info::{GradeLevel, Info, info_of};
+use replay::log::FlightLog;
+use replay::verify::{Obstacle, Outcome};
+use tick_log::pilot::{state_to_log, tick_to_log};
+
+use crate::flown::verify_bytes;
+
+const MISSION: &str = "mk2";
+const FRAME_NS: u64 = 5_000_000;
+/// The computer is dead in these frames.
+const DEAD: std::ops::RangeInclusive<u64> = 120..=131;
+
+struct Fall {
+    start: PilotStart,
+    ticks: Vec<PilotTick>,
+}
+
+fn mission_toml() -> &'static str {
+    let (_, text) = flight::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap();
+    text
+}
+
+/// Two seconds of falling with sensors that feel nothing, and a restart on the way.
+static FALL: LazyLock<Fall> = LazyLock::new(|| {
+    let mission = Mission::from_toml(mission_toml(), "test").unwrap();
+    let believed = RigidState {
+        position_m: Vector3::new(0.0, 0.0, 120.0),
+        velocity_m_s: Vector3::new(2.0, 0.0, 0.0),
+        world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -1.2),
+        rate_rad_s: Vector3::zeros(),
+    };
+    let mut pilot = Pilot::at_apogee(&mission, 0.0, &believed, &StartUncertainty::at_apogee()).unwrap();
+    let mut ticks = Vec::new();
+    for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
+        if frame == DEAD.end() + 1 {
+            pilot = pilot.restarted((frame - 1) as f64 * 5.0 * 1e-3);
+        }
+        let time_s = frame as f64 * 5.0 * 1e-3;
+        let imu = ImuSample {
+            gyro_rad_s: Vector3::new(0.0, 0.01, 0.0),
+            specific_force_m_s2: Vector3::new(0.02 * time_s, 0.0, 0.01),
+        };
+        let falling_m = believed.position_m.z - 0.5 * 9.81 * time_s * time_s;
+        let measured = Measurements {
+            imu,
+            pressure_altitude_m: frame.is_multiple_of(4).then_some(falling_m),
+            gnss: None,
+            lidar_range_m: None,
+        };
+        let input = PilotInput {
+            frame,
+            time_s,
+            sensed: Sensed::Measured(measured),
+            fins_rad: [0.3; 4],
+            contact: false,
+            igniter_continuity: true,
+            abort: false,
+        };
+        let output = pilot.step(&input);
+        ticks.push(tick_to_log(&input, &output, pilot.digest()));
+    }
+    let start = PilotStart {
+        time_s: 0.0,
+        believed: state_to_log(&believed),
+        steered: mission.steered,
+        fixed_ignition_height_m: mission.ignition.fixed_height_m,
+    };
+    Fall { start, ticks }
+});
+
+fn write(start: Option<&PilotStart>, ticks: &[PilotTick], profile_toml: Option<&str>) -> Vec<u8> {
+    let header = LogHeader { profile_toml: profile_toml.map(str::to_owned), ..LogHeader::default() };
+    let mut writer = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
+    if let Some(start) = start {
+        writer.write(&Record::PilotStart(Box::new(*start)), 0).unwrap();
+    }
+    for tick in ticks {
+        writer.write(&Record::PilotTick(Box::new(tick.clone())), tick.input.frame * FRAME_NS).unwrap();
+    }
+    let mut written = writer.finish().unwrap();
+    let mut bytes = Vec::new();
+    written.rewind().unwrap();
+    written.read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+fn described(bytes: &[u8]) -> Info {
+    info_of(&mut FlightLog::read("test.mcap".to_owned(), bytes).unwrap(), || None).unwrap()
+}
+
+#[test]
+fn frames_are_identical_over_a_restart() {
+    let bytes = write(Some(&FALL.start), &FALL.ticks, Some(mission_toml()));
+    let report = verify_bytes(&bytes).unwrap();
+    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+    assert_eq!(report.ticks_identical, FALL.ticks.len() as u64);
+    assert_eq!(report.span, Some((1, 400)));
+    let info = described(&bytes);
+    assert_eq!(info.grade.level, GradeLevel::BitExact, "{}", info.grade.reason);
+    assert_eq!(info.profile.unwrap().name.as_deref(), Some(MISSION));
+    let frames = info.frames.unwrap();
+    assert_eq!((frames.first, frames.last, frames.gaps, frames.start), (1, 400, 1, true));
+    assert!(!info.phases.is_empty());
+}
+
+#[test]
+fn one_changed_bit_is_found_at_its_frame() {
+    let mut ticks = FALL.ticks.clone();
+    let place = ticks.iter().position(|tick| tick.input.frame == 200).unwrap();
+    let command_rad = &mut ticks[place].output.fins_rad[2];
+    *command_rad = f64::from_bits(command_rad.to_bits() ^ 1);
+    let report = verify_bytes(&write(Some(&FALL.start), &ticks, Some(mission_toml()))).unwrap();
+    assert_eq!((report.outcome, report.ticks_different), (Outcome::Diverged, 1));
+    let first = report.first_divergence.unwrap();
+    assert_eq!((first.tick, first.fields_different), (200, 1));
+    assert_eq!(first.fields[0].path, "output.fins_rad[2]");
+    assert_eq!(first.fields[0].ulps, Some(1));
+    // A lost frame is taken for a restart, after which nothing is as it was.
+    let mut lost = FALL.ticks.clone();
+    lost.remove(50);
+    let report = verify_bytes(&write(Some(&FALL.start), &lost, Some(mission_toml()))).unwrap();
+    assert_eq!(report.outcome, Outcome::Diverged);
+    assert_eq!(report.first_divergence.unwrap().tick, 52);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let refused = |bytes: Vec<u8>| {
+        let report = verify_bytes(&bytes).unwrap();
+        assert_eq!(report.outcome, Outcome::NotReplayable);
+        report.obstacle.unwrap()
+    };
+    assert_eq!(refused(write(None, &FALL.ticks, Some(mission_toml()))), Obstacle::NoStart);
+    assert_eq!(refused(write(Some(&FALL.start), &FALL.ticks, None)), Obstacle::NoProfile);
+    let planar = flight::profile::Profile::builtin_toml("paper-calibrated");
+    let reason = refused(write(Some(&FALL.start), &FALL.ticks, planar)).to_string();
+    assert!(reason.contains("profile.toml"), "{reason}");
+    let mut twice = FALL.ticks.clone();
+    twice.push(twice[twice.len() - 1].clone());
+    let reason = refused(write(Some(&FALL.start), &twice, Some(mission_toml()))).to_string();
+    assert!(reason.contains("frame 400 comes after frame 400"), "{reason}");
+    let info = described(&write(None, &FALL.ticks, Some(mission_toml())));
+    assert_eq!(info.grade.level, GradeLevel::Numeric);
+}
