@@ -1,19 +1,24 @@
 //! Where the nose is to point, and the loop that turns it there with the gimbal.
 //!
 //! The landing planner thinks in tenths of a second; this loop closes at every frame. It is a second-order law on the
-//! angle between the nose and its aim, in body axes, so that roll does not matter, with two additions that a real
+//! angle between the nose and its aim, in body axes, so that roll does not matter, with three additions that a real
 //! nozzle needs:
 //!
 //! * What has been commanded and has not moved the vehicle yet is predicted (Smith's predictor, with the frames that
 //!   servo and linkage need), or the loop would have to be several times softer.
 //! * The acceleration that the model does not explain (air, a crooked nozzle, a shifted centre of gravity) is
 //!   estimated and countered (a disturbance observer).
+//! * A linkage has play: at each reversal the horn must cross it before the nozzle moves, so the command crosses it at
+//!   once.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
+
+/// A wanted nozzle angle that moved less than this is no reversal, rad.
+const REVERSAL_RAD: f64 = 2e-4;
 
 /// Where the nose is to point and how it is to turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,6 +73,8 @@ pub struct AimGains {
     pub disturbance_time_s: f64,
     /// Largest disturbance believed, rad/s^2.
     pub disturbance_max_rad_s2: f64,
+    /// Play of the linkage that is crossed at a reversal, degrees.
+    pub play_deg: f64,
 }
 
 /// The loop and what it remembers.
@@ -80,6 +87,9 @@ pub struct AimLoop {
     under_way_rad_s2: [[f64; 2]; MAX_LATENCY_FRAMES],
     rate_before_rad_s: Option<[f64; 2]>,
     disturbance_rad_s2: [f64; 2],
+    /// Where the nozzle should be, and on which side of it the horn is.
+    nozzle_rad: [f64; 2],
+    side: [f64; 2],
 }
 
 impl AimLoop {
@@ -94,6 +104,8 @@ impl AimLoop {
             under_way_rad_s2: [[0.0; 2]; MAX_LATENCY_FRAMES],
             rate_before_rad_s: None,
             disturbance_rad_s2: [0.0; 2],
+            nozzle_rad: [0.0; 2],
+            side: [0.0; 2],
         }
     }
 
@@ -147,10 +159,21 @@ impl AimLoop {
                 let sine = (-wanted_rad_s2 / turning_rad_s2).clamp(-1.0, 1.0);
                 command[axis] = libm::asin(sine).clamp(-limit_rad, limit_rad);
                 commanded_rad_s2[axis] = -turning_rad_s2 * libm::sin(command[axis]);
+                command[axis] = self.across_the_play_rad(axis, command[axis]).clamp(-limit_rad, limit_rad);
             }
         }
         self.remember(commanded_rad_s2);
         command
+    }
+
+    /// The horn's angle that brings the nozzle to an angle, from the side it is to be pushed from.
+    fn across_the_play_rad(&mut self, axis: usize, nozzle_rad: f64) -> f64 {
+        let moved_rad = nozzle_rad - self.nozzle_rad[axis];
+        if moved_rad.abs() > REVERSAL_RAD {
+            self.side[axis] = moved_rad.signum();
+            self.nozzle_rad[axis] = nozzle_rad;
+        }
+        nozzle_rad + 0.5 * self.gains.play_deg.to_radians() * self.side[axis]
     }
 
     /// Compares what was felt with what was commanded for then.
@@ -186,6 +209,7 @@ mod tests {
         latency_s: 0.03,
         disturbance_time_s: 0.1,
         disturbance_max_rad_s2: 20.0,
+        play_deg: 0.0,
     };
 
     #[test]

@@ -24,6 +24,10 @@ const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 pub struct DescentGains {
     /// Largest angle of attack asked for, degrees.
     pub lean_max_deg: f64,
+    /// Largest angle of attack asked for when the motor lights: the gate wants the vehicle nearly upright, degrees.
+    pub lean_at_ignition_deg: f64,
+    /// Time before the ignition from which the lean is taken back, s.
+    pub lean_fades_s: f64,
     /// Natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,
     /// Its damping ratio.
@@ -49,8 +53,14 @@ pub struct DescentSituation {
     pub drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
-    /// Time until the vehicle should be at rest over the pad, s.
-    pub time_to_go_s: f64,
+    /// Drag area of the fins, m^2, times their distance ahead of the centre of gravity, m: what turns the nose back
+    /// into the wind, m^3.
+    pub fin_restoring_m3: f64,
+    /// Distance of the body's middle behind the centre of gravity, m: there its crossflow acts, and turns the nose
+    /// away from the wind.
+    pub body_behind_cg_m: f64,
+    /// Time until the vehicle should be at rest over the pad, s; `None` while it is not known.
+    pub time_to_go_s: Option<f64>,
 }
 
 /// What the fins are asked for.
@@ -67,7 +77,7 @@ pub struct DescentDemand {
 impl DescentGains {
     /// The horizontal acceleration wanted, m/s^2, in the world.
     fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
-        let time_s = situation.time_to_go_s.max(self.time_to_go_min_s);
+        let time_s = situation.time_to_go_s.unwrap_or(0.0).max(self.time_to_go_min_s);
         let wanted = state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
         Vector3::new(wanted.x, wanted.y, 0.0)
     }
@@ -97,11 +107,17 @@ impl DescentGains {
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
+        // What holds the wanted lean against the air: the loop alone is far softer than the weathercock.
+        let wanted_lean = error - turn_to_aim_rad(&state.world_from_body, &upstream);
+        let held_n_m = dynamic_pressure_pa
+            * (situation.fin_restoring_m3
+                - situation.crossflow_area_m2 * situation.body_behind_cg_m * libm::sin(wanted_lean.norm()));
         let frequency = self.natural_frequency_rad_s;
         let turn = |error: f64, rate: f64| {
             inertia * (frequency * frequency * error - 2.0 * self.damping * frequency * rate)
         };
-        let moment_n_m = Vector3::new(roll_n_m, turn(error.y, rate.y), turn(error.z, rate.z));
+        let moment_n_m = Vector3::new(roll_n_m, turn(error.y, rate.y), turn(error.z, rate.z))
+            + Vector3::new(0.0, wanted_lean.y, wanted_lean.z) * held_n_m;
         DescentDemand { moment_n_m, dynamic_pressure_pa, nose_in_world }
     }
 
@@ -119,13 +135,20 @@ impl DescentGains {
         let carried_m_s2 = Vector3::new(carried_m_s2.x, carried_m_s2.y, 0.0);
         let wanted_m_s2 = self.steering_m_s2(state, situation) - carried_m_s2;
         let across = wanted_m_s2 - upstream * wanted_m_s2.dot(upstream);
-        let most = libm::tan(self.lean_max_deg.to_radians());
-        let sine = libm::sin(self.lean_max_deg.to_radians());
+        let (sine, cosine) = libm::sincos(self.lean_max_deg.to_radians());
+        let most = sine / cosine;
         // Linear in the lean and true at its limit: the square root would have an infinite slope at nothing.
         let per_lean_m_s2 = per_mass * situation.crossflow_area_m2 * sine * sine / most;
         let lean = across / per_lean_m_s2.max(1e-6);
+        let most = libm::tan(self.lean_allowed_rad(situation.time_to_go_s));
         let length = lean.norm();
         if length > most { lean * (most / length) } else { lean }
+    }
+
+    /// The largest lean at a time before the ignition, rad; all of it while that time is not known.
+    fn lean_allowed_rad(&self, time_to_go_s: Option<f64>) -> f64 {
+        let share = time_to_go_s.map_or(1.0, |time_s| (time_s / self.lean_fades_s - 0.5).clamp(0.0, 1.0));
+        (self.lean_at_ignition_deg + share * (self.lean_max_deg - self.lean_at_ignition_deg)).to_radians()
     }
 }
 
@@ -136,6 +159,8 @@ mod tests {
     fn gains() -> DescentGains {
         DescentGains {
             lean_max_deg: 14.0,
+            lean_at_ignition_deg: 6.0,
+            lean_fades_s: 1.5,
             natural_frequency_rad_s: 3.0,
             damping: 0.8,
             roll_decay_per_s: 3.0,
@@ -151,7 +176,9 @@ mod tests {
             wind_m_s: Vector3::zeros(),
             drag_area_m2: 0.031,
             crossflow_area_m2: 0.0622,
-            time_to_go_s: 5.0,
+            fin_restoring_m3: 0.0061,
+            body_behind_cg_m: 0.05,
+            time_to_go_s: Some(5.0),
         }
     }
 

@@ -316,7 +316,10 @@ impl Pilot {
             wind_m_s: estimate.wind_m_s.push(0.0),
             drag_area_m2: self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(&self.fins_rad),
             crossflow_area_m2: self.known.crossflow_area_m2(),
-            time_to_go_s: self.outlook.ignition.command_in_s.unwrap_or(0.0),
+            fin_restoring_m3: self.known.fin_drag_area_m2(&self.fins_rad)
+                * (fins.station_m - mass.cg_station_m),
+            body_behind_cg_m: mass.cg_station_m - 0.5 * self.known.airframe().body.length_m,
+            time_to_go_s: self.outlook.ignition.command_in_s,
         };
         let demand =
             self.known.mission.descent.demand(&estimate.state, &situation, self.known.mission.steered);

@@ -64,11 +64,19 @@ pub struct PoweredSettings {
     pub landing_miss: f64,
     /// Decay rate of the velocity across the plane, 1/s.
     pub across_decay_per_s: f64,
+    /// Push towards the pad across the plane for each metre, 1/s^2.
+    pub across_homing_per_s2: f64,
     /// Largest lean across the plane, degrees.
     pub across_lean_max_deg: f64,
     /// Limits of the solver.
     pub solver: SolverLimits,
 }
+
+/// Homing across the plane ends so long before touchdown, s, and never counts more than so many metres.
+const HOMING_ENDS_S: f64 = 1.5;
+const HOMING_MOST_M: f64 = 6.0;
+/// Largest lean that holds a plan that is flown out to its velocity, rad.
+const END_LEAN_MAX_RAD: f64 = 0.05;
 
 /// How much dearer a tilt becomes when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
@@ -247,8 +255,9 @@ impl PoweredGuidance {
 
     /// Plans the landing from a state at a time.
     pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
-        let plane =
-            *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
+        let plane = *self.plane.get_or_insert_with(|| {
+            Plane::choose(&state.position_m, &state.velocity_m_s, &situation.wind_m_s)
+        });
         if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
             return;
         }
@@ -392,8 +401,25 @@ impl PoweredGuidance {
             return Aim::at(nose / nose.norm());
         };
         let (theta_rad, q_rad_s, turning_rad_s2) = flown.elevation(time_s);
+        let left_s = flown.left_s(time_s);
+        // Across the plane the pad is approached while there is time.
+        let homing = self.settings.across_homing_per_s2
+            * ((left_s - HOMING_ENDS_S) / HOMING_ENDS_S).clamp(0.0, 1.0)
+            * state.position_m.dot(&flown.plane.across).clamp(-HOMING_MOST_M, HOMING_MOST_M);
+        let along = &flown.plane.along;
+        // A plan flown out to its end is held to its velocity.
+        let along_rad = if left_s < self.settings.flown_out_s {
+            let astray_m_s =
+                state.velocity_m_s.dot(along) - flown.along_m_s(time_s, situation.wind_m_s.dot(along));
+            level_m_s2(-decay * astray_m_s).clamp(-END_LEAN_MAX_RAD, END_LEAN_MAX_RAD)
+        } else {
+            0.0
+        };
+        let across = libm::tan(level_m_s2(
+            -decay * state.velocity_m_s.dot(&flown.plane.across) - air_m_s2.dot(&flown.plane.across) - homing,
+        ));
         Aim {
-            nose_in_world: flown.plane.nose(theta_rad, lean(&flown.plane.across)),
+            nose_in_world: flown.plane.nose(theta_rad - along_rad, across),
             rate_in_world_rad_s: flown.plane.turning(q_rad_s),
             acceleration_in_world_rad_s2: flown.plane.turning(turning_rad_s2),
         }
@@ -413,6 +439,24 @@ fn largest_tilt_rad(plan: &FreeTimeSolution) -> f64 {
 impl Flown {
     fn left_s(&self, time_s: f64) -> f64 {
         self.begins_s + self.plan.final_time_s - time_s
+    }
+
+    /// Planned velocity over the ground along the plane at a time, m/s; at rest after the plan's end.
+    fn along_m_s(&self, time_s: f64, wind_m_s: f64) -> f64 {
+        let solution = &self.plan.solution;
+        let since = (time_s - self.begins_s).max(0.0) / solution.step_s;
+        let k = since as usize;
+        let along_m_s = |state: &PlanarState| {
+            let (sin, cos) = libm::sincos(state.theta_rad);
+            state.u_m_s * cos + state.w_m_s * sin + wind_m_s
+        };
+        match (solution.states.get(k), solution.states.get(k + 1)) {
+            (Some(before), Some(after)) => {
+                let share = since - k as f64;
+                (1.0 - share) * along_m_s(before) + share * along_m_s(after)
+            }
+            _ => 0.0,
+        }
     }
 
     /// Elevation, its rate and its acceleration at a time; upright at rest after the plan's end.

@@ -10,6 +10,10 @@ use crate::rigid::RigidState;
 /// Slower than this sideways, the wind chooses the plane, m/s.
 const CHOOSING_SPEED_M_S: f64 = 1.0;
 
+/// Velocity that being off the pad is worth when the plane is chosen, 1/s: what the least-effort way back from rest in
+/// four seconds asks for, `6 p / t^2` beside `4 v / t`.
+const HOMING_PER_S: f64 = 0.375;
+
 /// A vertical plane through the pad's axis, and what lies across it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
@@ -20,11 +24,12 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The plane that needs the most doing: that of the horizontal velocity, or of the wind if there is hardly any, or
-    /// the world's x-z plane in a calm.
-    pub fn choose(velocity_m_s: &Vector3<f64>, wind_m_s: &Vector3<f64>) -> Self {
+    /// The plane that needs the most doing: that of the horizontal velocity to be lost and the way back to the pad, or
+    /// of the wind if there is hardly any, or the world's x-z plane in a calm over the pad. Across it the vehicle is
+    /// then on its way back already.
+    pub fn choose(position_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, wind_m_s: &Vector3<f64>) -> Self {
         let level = |vector: &Vector3<f64>| Vector3::new(vector.x, vector.y, 0.0);
-        let directions = [level(velocity_m_s), level(wind_m_s)];
+        let directions = [level(&(velocity_m_s + position_m * HOMING_PER_S)), level(wind_m_s)];
         let along = directions
             .iter()
             .find(|direction| direction.norm() > CHOOSING_SPEED_M_S)
@@ -80,7 +85,7 @@ mod tests {
     fn the_worlds_own_plane_gives_the_planar_state_back() {
         let planar =
             PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.2, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: 0.3 };
-        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros());
+        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros(), &Vector3::zeros());
         let found = plane.project(&RigidState::from(planar), 0.0, 0.0);
         for (found, put) in found.to_array().iter().zip(planar.to_array()) {
             assert!((found - put).abs() < 1e-12, "{found} for {put}");
@@ -93,15 +98,17 @@ mod tests {
 
     #[test]
     fn it_follows_the_velocity_first_and_the_wind_then() {
-        let plane = Plane::choose(&Vector3::new(0.0, -3.0, -40.0), &Vector3::new(9.0, 0.0, 0.0));
+        let plane =
+            Plane::choose(&Vector3::zeros(), &Vector3::new(0.0, -3.0, -40.0), &Vector3::new(9.0, 0.0, 0.0));
         assert!((plane.along - -Vector3::y()).norm() < 1e-15);
-        let plane = Plane::choose(&Vector3::new(0.0, -0.3, -40.0), &Vector3::new(9.0, 0.0, 0.0));
+        let plane =
+            Plane::choose(&Vector3::zeros(), &Vector3::new(0.0, -0.3, -40.0), &Vector3::new(9.0, 0.0, 0.0));
         assert!((plane.along - Vector3::x()).norm() < 1e-15);
     }
 
     #[test]
     fn resting_on_the_ground_is_moving_through_the_wind() {
-        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros());
+        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros(), &Vector3::zeros());
         let standing = plane.project(&RigidState::upright(0.58), 0.58, 4.0);
         let rest = Plane::rest(4.0);
         for (standing, rest) in standing.to_array().iter().zip(rest.to_array()) {
