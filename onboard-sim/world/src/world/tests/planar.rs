@@ -24,6 +24,8 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
             thrust_arm_m: airframe.mass.loaded_cg_station_m,
             drag_per_m: 0.5 * Air::at_height_m(16.0).density_kg_m3 * airframe.drag_area_m2(0.0)
                 / airframe.mass.loaded_kg,
+            lateral_drag_per_m: 0.0,
+            crossflow_per_m: 0.0,
             gravity_m_s2: STANDARD_GRAVITY_M_S2,
         },
         kind: ModelKind::Consistent,
