@@ -100,8 +100,10 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
                 (touchdown.tilt_rad, legs.tilt_deg.to_radians(), Failure::Tilt),
                 (touchdown.rate_rad_s, legs.rate_deg_s.to_radians(), Failure::Rate),
             ];
-            let first =
-                too_much.iter().find(|(found, most, _)| !(found <= most)).map(|(_, _, failure)| *failure);
+            let first = too_much
+                .iter()
+                .find(|(found, most, _)| found.is_nan() || found > most)
+                .map(|(_, _, failure)| *failure);
             let failure = first.or((!upright).then_some(Failure::TippedOver));
             (upright && inside_table_2(mission, touchdown), failure)
         }

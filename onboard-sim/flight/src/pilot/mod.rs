@@ -28,6 +28,7 @@ pub const FRAMES_PER_PLAN: u64 = 10;
 
 /// What the flight computer knows of its motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "plain data, one a frame, so that a log of it is whole")]
 pub enum Sensed {
     /// Sensors, through the estimator.
     Measured(Measurements),
