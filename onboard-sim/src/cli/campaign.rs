@@ -180,7 +180,12 @@ fn program() -> anyhow::Result<String> {
     let path = std::env::current_exe().context("which program this is")?;
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let digest = sha2::Sha256::digest(&bytes);
-    let short: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let short = digest.iter().take(8).fold(String::new(), |mut short, byte| {
+        short.extend(
+            [byte >> 4, byte & 15].map(|digit| char::from_digit(u32::from(digit), 16).unwrap_or('?')),
+        );
+        short
+    });
     let build = build_info();
     let commit = build.get("git_commit").map_or("unknown", String::as_str);
     Ok(format!("{} {commit} {short}", env!("CARGO_PKG_VERSION")))
