@@ -76,6 +76,7 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         link_name: wire.endpoint().to_string(),
         link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
+        tlog_path: None,
         auto,
         interactive,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
@@ -187,6 +188,8 @@ impl Station {
                     }
                 }
                 Action::Redraw => self.output.clear(),
+                Action::Bell => self.output.bell(),
+                Action::Alarm(_) => {}
                 Action::Quit => quit = true,
             }
         }
@@ -242,6 +245,12 @@ impl Output {
     fn mark_changed(&mut self) {
         if let Self::Screen(screen) = self {
             screen.mark_changed();
+        }
+    }
+
+    fn bell(&self) {
+        if let Self::Screen(screen) = self {
+            screen.bell();
         }
     }
 

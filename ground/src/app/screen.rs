@@ -49,13 +49,12 @@ impl Screen {
     /// # Errors
     /// It is none, or refuses.
     pub fn open() -> anyhow::Result<Self> {
-        let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         restore_before_panic_message();
         let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
             terminal,
             events: EventStream::new(),
-            theme: Theme { colour: !no_colour },
+            theme: Theme::of_environment(|name| std::env::var(name).ok()),
             changed: true,
             drawn_at: None,
             input_ended: false,
@@ -92,6 +91,13 @@ impl Screen {
         // If the terminal cannot be cleared, drawing fails next and says why.
         let _ = self.terminal.clear();
         self.changed = true;
+    }
+
+    /// Rings the terminal's bell.
+    pub fn bell(&self) {
+        let mut out = io::stdout();
+        // A terminal that is gone shows by the next frame.
+        let _ = io::Write::write_all(&mut out, b"\x07").and_then(|()| io::Write::flush(&mut out));
     }
 
     /// The next thing done at the terminal.

@@ -1,12 +1,18 @@
 //! Everything the ground knows, as plain data.
 
+pub mod alarm;
 pub mod chord;
 pub mod command;
 pub mod dialog;
 pub mod events;
+pub mod history;
 pub mod link;
 pub mod outcome;
+pub mod page;
+pub mod parameters;
+pub mod reckoning;
 pub mod telemetry;
+pub mod too_late;
 pub mod vehicle;
 pub mod words;
 
@@ -16,12 +22,16 @@ use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
 use crate::update::Action;
+use alarm::Alarms;
 use chord::AbortChord;
 use command::Commands;
 use dialog::Dialog;
 use events::{Events, Speaker};
+use history::History;
 use link::Link;
 use outcome::Outcome;
+use page::{Page, Pages};
+use parameters::Parameters;
 use vehicle::Vehicle;
 
 /// What the run was asked to be; never changes during it.
@@ -33,6 +43,8 @@ pub struct Settings {
     pub link_capacity_bytes_s: Option<u32>,
     /// The log's path; `None` without a log.
     pub log_path: Option<String>,
+    /// The telemetry log's path (`.tlog`); `None` without one.
+    pub tlog_path: Option<String>,
     /// Arm and start without a hand.
     pub auto: bool,
     /// Someone watches a screen: the end of a flight does not end the program.
@@ -96,6 +108,15 @@ pub struct Model {
     pub outcome: Outcome,
     /// How the log does.
     pub log: LogHealth,
+    /// What must be seen, and whether it was.
+    pub alarms: Alarms,
+    /// Which screen is shown.
+    pub pages: Pages,
+    /// Timeline and greatest values.
+    pub history: History,
+    /// The vehicle's parameters.
+    pub parameters: Parameters,
+    pub(crate) rebooted_at: Option<Duration>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
@@ -115,11 +136,21 @@ impl Model {
             events: Events::default(),
             outcome: Outcome::default(),
             log: LogHealth::default(),
+            alarms: Alarms::default(),
+            pages: Pages::default(),
+            history: History::default(),
+            parameters: Parameters::default(),
+            rebooted_at: None,
             texts: Reassembler::new(),
             due: Due::default(),
             auto_step: AutoStep::default(),
             outbox: Vec::new(),
         }
+    }
+
+    /// The screen to show.
+    pub fn page(&self) -> Page {
+        self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
     }
 
     /// Notes an event for the list, the lines and the log.

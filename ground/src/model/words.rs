@@ -27,7 +27,7 @@ pub fn abort_effect(effect: TdAbortEffect) -> &'static str {
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "inhibit landing motor, chute at apogee",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "inhibit motor, fins open, chute NOW",
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
-        TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "NO CUT-OFF EXISTS: only holds upright at full thrust",
+        TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
     }
 }
 

@@ -5,7 +5,8 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdPhase};
+use protocol::identity::VEHICLE;
 use protocol::log::record::Record;
 use protocol::log::v1::OperatorAction;
 
@@ -14,8 +15,14 @@ use crate::key::Key;
 use crate::model::Model;
 use crate::model::command::CommandKind;
 use crate::model::dialog::{ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT};
+use crate::model::page::Page;
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
+
+/// Lines that a page key scrolls.
+const SCROLL_PAGE: i32 = 10;
+/// No list is longer.
+const SCROLL_MAX: i32 = 4_000;
 
 pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     record_operator(model, "key", &key.name(), now);
@@ -35,7 +42,6 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => on_free_key(model, key, now),
-        Dialog::Help => {}
         Dialog::Arm { typed, until } => on_arm_key(model, key, typed, until, now),
         Dialog::Start { until } => match key {
             Key::Enter => start(model, now),
@@ -59,7 +65,7 @@ pub(super) fn expire(model: &mut Model, now: Duration) {
             Dialog::Arm { .. } => "arming: time is up, nothing was sent",
             Dialog::Start { .. } => "start: time is up, nothing was sent",
             Dialog::Disarm { .. } => "disarm: time is up, nothing was sent",
-            Dialog::Quit { .. } | Dialog::Closed | Dialog::Help => return,
+            Dialog::Quit { .. } | Dialog::Closed => return,
         };
         model.info(now, words);
     }
@@ -86,9 +92,59 @@ fn on_free_key(model: &mut Model, key: Key, now: Duration) {
         Key::Char('D') => model.dialog = Dialog::Disarm { until: now + CONFIRM_TIME_LIMIT },
         Key::Char('a' | 's' | 'd') => model.info(now, "capital letters: A arms, S starts, D disarms"),
         Key::Char('q' | 'Q') => quit(model, now),
-        Key::Char('?') | Key::F1 => model.dialog = Dialog::Help,
+        _ => on_page_key(model, key, now),
+    }
+}
+
+/// Which screen, how far its list is scrolled, and that the alarms were seen.
+fn on_page_key(model: &mut Model, key: Key, now: Duration) {
+    let shown = model.page();
+    match key {
+        Key::Char('?') | Key::F1 if shown == Page::Help => model.pages.hold(None),
+        Key::Char('?') | Key::F1 => model.pages.hold(Some(Page::Help)),
+        Key::Escape | Key::Char('0') => model.pages.hold(None),
+        Key::Char('h' | 'H') if model.pages.held.is_some() => model.pages.hold(None),
+        Key::Char('h' | 'H') => model.pages.hold(Some(shown)),
+        Key::Char(' ') => {
+            let seen = model.alarms.acknowledge();
+            if seen > 0 {
+                model.info(now, format!("alarms acknowledged: {seen}"));
+            }
+        }
+        Key::Char('r') if shown == Page::Parameters => ask_parameters(model),
+        Key::Up => scroll(model, 1),
+        Key::Down => scroll(model, -1),
+        Key::PageUp => scroll(model, SCROLL_PAGE),
+        Key::PageDown => scroll(model, -SCROLL_PAGE),
+        Key::Home => scroll(model, SCROLL_MAX),
+        Key::End => scroll(model, -SCROLL_MAX),
+        Key::Char(digit) => {
+            if let Some(page) = Page::from_digit(digit) {
+                model.pages.hold(Some(page));
+                if page == Page::Parameters && !model.parameters.asked {
+                    ask_parameters(model);
+                }
+            }
+        }
         _ => {}
     }
+}
+
+/// Scrolls up by this many lines; down when negative. What happened is read from its newest line, a list of
+/// names from its first.
+fn scroll(model: &mut Model, up: i32) {
+    let away = if model.page() == Page::Parameters { -up } else { up };
+    let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
+    let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
+    model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
+}
+
+fn ask_parameters(model: &mut Model) {
+    model.parameters.asked = true;
+    model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+        target_system: VEHICLE.system_id,
+        target_component: VEHICLE.component_id,
+    })));
 }
 
 fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, now: Duration) {

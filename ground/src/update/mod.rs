@@ -2,6 +2,7 @@
 //!
 //! Nothing here reads a clock, a socket or a file; whatever arrives in whatever order is data.
 
+pub mod alarms;
 pub mod auto;
 pub mod commands;
 pub mod frames;
@@ -65,6 +66,10 @@ pub enum Action {
     SyncLog,
     /// Draw the whole screen again.
     Redraw,
+    /// Ring the terminal's bell.
+    Bell,
+    /// An alarm was raised: tell whoever is not at the screen.
+    Alarm(String),
     /// End the program.
     Quit,
 }
@@ -115,6 +120,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::Tick => tick::on_tick(model, now),
     }
+    alarms::watch(model, now);
     std::mem::take(&mut model.outbox)
 }
 

@@ -6,10 +6,9 @@ use ratatui::text::{Line, Span};
 
 use super::number::{age_mark, seconds};
 use super::theme::{Role, Theme};
-use crate::model::Model;
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
-use crate::model::words;
+use crate::model::{Model, too_late, words};
 
 /// The abort key, in words.
 pub const ABORT_KEY: &str = "Ctrl-X Ctrl-X";
@@ -84,8 +83,12 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 /// What an abort would do now, marked when that was said too long ago.
 fn abort_effect(model: &Model, now: Duration) -> String {
     let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
+    if let Some(why) = too_late::why(model, now) {
+        return why.to_owned();
+    }
     let mark = if status.is_stale(now) { "~" } else { "" };
-    format!("{mark}{}", words::abort_effect(status.value.abort_effect))
+    let reach = if let LinkState::Lost(_) = model.link.state(now) { "; MAY NOT ARRIVE" } else { "" };
+    format!("{mark}{}{reach}", words::abort_effect(status.value.abort_effect))
 }
 
 /// After an abort on the pad: nobody goes there yet.

@@ -22,8 +22,8 @@ fn ends_in_complete_ladder(history: &[(Key, Duration)]) -> bool {
             match key {
                 Key::Char(c) => word.push(*c),
                 Key::Backspace => drop(word.pop()),
-                Key::CtrlX | Key::CtrlL | Key::F1 => {}
                 Key::Enter | Key::Escape | Key::CtrlC => return false,
+                _ => {}
             }
         }
         word.eq_ignore_ascii_case("ARM")
@@ -49,6 +49,14 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
         Key::CtrlC,
         Key::CtrlL,
         Key::CtrlX,
+        Key::Char(' '),
+        Key::Char('h'),
+        Key::Char('0'),
+        Key::Char('1'),
+        Key::Char('7'),
+        Key::Up,
+        Key::PageDown,
+        Key::Home,
     ]);
     // Pieces of the ladder, so that near misses are common.
     prop_oneof![

@@ -1,5 +1,6 @@
 //! The ground station from outside: its keys, its radio, its screens, the program itself.
 
+mod alarms;
 mod auto;
 mod bench;
 mod disarm;
