@@ -5,10 +5,12 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::Parser;
+use protocol::dialect::TdPhase;
 use protocol::transport::Endpoint;
 
 use crate::demo::Speed;
 use crate::exit;
+use crate::model::words;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
@@ -39,6 +41,14 @@ pub struct Cli {
     /// Demonstration: speed of simulated time, a factor or `max`.
     #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect")]
     pub speed: Speed,
+
+    /// Show a recorded flight (MCAP, or .tlog by its name) on the same screens instead.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "seed", "speed"])]
+    pub replay: Option<PathBuf>,
+
+    /// Replay: where to begin, seconds since its first frame or a phase as in `POWERED`.
+    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
+    pub from: Option<ReplayFrom>,
 
     /// Arm and start without a hand. The demonstration without a screen always does.
     #[arg(long)]
@@ -72,6 +82,29 @@ impl FromStr for LogChoice {
             "" => Err("the log's name is empty; give a file or `none`".to_owned()),
             "none" => Ok(Self::None),
             path => Ok(Self::File(PathBuf::from(path))),
+        }
+    }
+}
+
+/// Where a replay begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReplayFrom {
+    /// Time since its first frame.
+    Time(Duration),
+    /// The begin of this phase.
+    Phase(TdPhase),
+}
+
+impl FromStr for ReplayFrom {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if let Some(phase) = words::phase_from_name(given) {
+            return Ok(Self::Phase(phase));
+        }
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(Self::Time(Duration::from_secs_f64(seconds))),
+            _ => Err(format!("`{given}` is neither seconds from 0 to 1000000 nor a phase as in POWERED")),
         }
     }
 }

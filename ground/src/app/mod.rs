@@ -3,6 +3,7 @@
 pub mod clock;
 pub mod lines;
 pub mod log;
+pub mod replaying;
 pub mod screen;
 pub mod signals;
 pub mod wire;
@@ -20,7 +21,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use crate::cli::{Cli, Seconds};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
-use crate::model::{LogHealth, Model, Settings};
+use crate::model::{LogHealth, Model, Role, Settings};
 use crate::update::{Action, Msg, update};
 use clock::{Clock, LogTime};
 use lines::Lines;
@@ -41,7 +42,10 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
-    runtime.block_on(session(cli, interactive))
+    match &cli.replay {
+        Some(path) => runtime.block_on(replaying::session(cli, path, interactive)),
+        None => runtime.block_on(session(cli, interactive)),
+    }
 }
 
 async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
@@ -77,6 +81,7 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: None,
+        role: Role::Station,
         auto,
         interactive,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),

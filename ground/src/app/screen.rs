@@ -77,10 +77,18 @@ impl Screen {
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration) -> io::Result<()> {
+        self.show_at(model, now, now)
+    }
+
+    /// Draws if a frame is due, as it was at another time: ages count from there.
+    ///
+    /// # Errors
+    /// The terminal cannot be written.
+    pub fn show_at(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
         if now < self.redraw_at() {
             return Ok(());
         }
-        self.terminal.draw(|frame| view(model, self.theme, now, frame))?;
+        self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
         self.changed = false;
         self.drawn_at = Some(now);
         Ok(())

@@ -45,12 +45,52 @@ pub struct Settings {
     pub log_path: Option<String>,
     /// The telemetry log's path (`.tlog`); `None` without one.
     pub tlog_path: Option<String>,
+    /// What this screen may do.
+    pub role: Role,
     /// Arm and start without a hand.
     pub auto: bool,
     /// Someone watches a screen: the end of a flight does not end the program.
     pub interactive: bool,
     /// Give up after this long without the end of a flight; without a screen only.
     pub time_limit: Option<Duration>,
+}
+
+/// What this screen may do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Role {
+    /// Holds the link: commands go out here.
+    #[default]
+    Station,
+    /// Shows a station that runs elsewhere, and hands it the crew's commands.
+    Attached,
+    /// Shows a station that runs elsewhere; commands nothing.
+    Watching,
+    /// Shows a recorded flight; there is nothing to command.
+    Replaying,
+}
+
+impl Role {
+    /// Why this screen commands nothing; `None` if it may.
+    pub fn why_not_command(self) -> Option<&'static str> {
+        match self {
+            Self::Station | Self::Attached => None,
+            Self::Watching => Some("this screen only watches (--watch)"),
+            Self::Replaying => Some("a replay commands nothing"),
+        }
+    }
+}
+
+/// Where a replay is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Playing {
+    /// Time since the first frame.
+    pub position: Duration,
+    /// Time of the last frame.
+    pub length: Duration,
+    /// Flight time per real time.
+    pub speed: f64,
+    /// Time stands still.
+    pub paused: bool,
 }
 
 /// How the log does.
@@ -116,6 +156,8 @@ pub struct Model {
     pub history: History,
     /// The vehicle's parameters.
     pub parameters: Parameters,
+    /// Where a replay is; `None` for a live flight.
+    pub playing: Option<Playing>,
     pub(crate) rebooted_at: Option<Duration>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
@@ -140,6 +182,7 @@ impl Model {
             pages: Pages::default(),
             history: History::default(),
             parameters: Parameters::default(),
+            playing: None,
             rebooted_at: None,
             texts: Reassembler::new(),
             due: Due::default(),

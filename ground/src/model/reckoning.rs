@@ -107,7 +107,7 @@ mod tests {
         let found = reckon(&falling(), SEEN + Duration::from_secs(2)).unwrap();
         assert!((found.altitude_m - 60.3867).abs() < 1e-9 && (found.x_m - 5.0).abs() < 1e-12);
         assert!(!found.by_plan);
-        assert_eq!(reckon(&falling(), SEEN + Duration::from_secs(60)).unwrap().altitude_m.to_bits(), 0);
+        assert_eq!(reckon(&falling(), SEEN + Duration::from_mins(1)).unwrap().altitude_m.to_bits(), 0);
     }
 
     #[test]
@@ -124,10 +124,10 @@ mod tests {
         };
         vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s: 4.0, touchdown }, SEEN));
         vehicle.path = Some(Sample::new(vec![(4.0, 40.0), (2.0, 10.0), (0.0, 0.0)], SEEN));
-        let at = |ms| reckon(&vehicle, SEEN + Duration::from_millis(ms)).unwrap();
-        assert!(at(3_000).by_plan);
-        assert!((at(3_000).altitude_m - 5.0).abs() < 1e-9 && (at(3_000).x_m - 1.0).abs() < 1e-9);
-        assert!(at(9_000).altitude_m.abs() < 1e-9);
-        assert!(at(2_000).error_m < at(3_000).error_m && at(3_000).error_m < at(9_000).error_m);
+        let at = |s| reckon(&vehicle, SEEN + Duration::from_secs(s)).unwrap();
+        assert!(at(3).by_plan);
+        assert!((at(3).altitude_m - 5.0).abs() < 1e-9 && (at(3).x_m - 1.0).abs() < 1e-9);
+        assert!(at(9).altitude_m.abs() < 1e-9);
+        assert!(at(2).error_m < at(3).error_m && at(3).error_m < at(9).error_m);
     }
 }

@@ -2,11 +2,19 @@
 
 use std::fmt::Debug;
 
+use super::telemetry::phase_from_number;
 use protocol::dialect::{TdAbortEffect, TdCheck, TdPhase};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
+}
+
+/// The phase of a name, in any case.
+pub fn phase_from_name(name: &str) -> Option<TdPhase> {
+    (0..=u32::from(u8::MAX))
+        .map_while(phase_from_number)
+        .find(|known| phase(*known).eq_ignore_ascii_case(name))
 }
 
 /// A dialect's enum value as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not run`.

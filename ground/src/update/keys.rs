@@ -27,6 +27,10 @@ const SCROLL_MAX: i32 = 4_000;
 pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     record_operator(model, "key", &key.name(), now);
     expire(model, now);
+    let why_not = model.settings.role.why_not_command();
+    if let (Some(why), Key::CtrlX | Key::Char('A' | 'S' | 'D')) = (why_not, key) {
+        return model.info(now, why);
+    }
     if key == Key::CtrlX {
         model.abort_chord.press(now);
         return;

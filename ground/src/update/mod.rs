@@ -17,6 +17,7 @@ use protocol::frame::{Frame, FramerCounters};
 use protocol::log::record::{Event, EventLevel, Record};
 
 use crate::key::Key;
+use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::{LogHealth, Model};
 
@@ -27,6 +28,8 @@ pub enum Msg {
     Key(Key),
     /// A frame arrived.
     Frame(Frame),
+    /// The crew has commanded this, with its whole ladder: in a replay, or on a screen elsewhere.
+    Commanded(CommandKind),
     /// Bytes arrived, whole frames or not.
     Received {
         /// How many.
@@ -89,6 +92,7 @@ impl Action {
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
         Msg::Key(key) => keys::on_key(model, key, now),
+        Msg::Commanded(kind) => commands::submit(model, kind, now),
         Msg::Frame(frame) => frames::on_frame(model, &frame, now),
         Msg::Received { bytes, framing } => {
             model.link.stats.on_rx_bytes(bytes, now);

@@ -5,12 +5,15 @@ use std::time::Duration;
 use protocol::log::record::EventLevel;
 use ratatui::text::Line;
 
-use super::number::seconds;
+use super::number::{seconds, shortest};
 use super::theme::{Role, Theme};
-use crate::model::Model;
+use crate::model::{Model, Playing};
 
 /// The foremost alarm; without one, what happened last.
 pub fn line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(playing) = model.playing {
+        return replay(playing, theme);
+    }
     if let Some(alarm) = alarm(model, theme, now) {
         return alarm;
     }
@@ -19,6 +22,19 @@ pub fn line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let head = format!(" {:.1} ", event.at.as_secs_f64());
         Line::styled(format!("{head}{}{}", event.mark().trim_start(), event.text), theme.style(role))
     })
+}
+
+/// Where a replay is, and its keys.
+pub fn replay(playing: Playing, theme: Theme) -> Line<'static> {
+    let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
+    let state = if playing.paused { "PAUSED" } else { "plays" };
+    Line::styled(
+        format!(
+            " REPLAY {state} {at:.1} of {of:.1} s x{}  Space  Left Right 5 s  [ ] phase  + -",
+            shortest(playing.speed)
+        ),
+        theme.style(Role::Title),
+    )
 }
 
 /// The foremost alarm, how many more there are, and the key that acknowledges them.

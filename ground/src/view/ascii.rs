@@ -18,20 +18,18 @@ pub fn flatten(buffer: &mut Buffer) {
 fn ascii(c: char) -> char {
     match c {
         '─' | '━' => '-',
-        '│' | '┃' => '|',
+        '│' | '┃' | '▐' | '▌' => '|',
         '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' => '+',
         '█' => '#',
         '▀' => '"',
         '▄' => '_',
-        '▐' | '▌' => '|',
-        // Limits: "at most this, either side".
-        '±' => '<',
         '°' => 'd',
         '·' => '.',
         '↑' => '^',
         '↓' => 'v',
         '→' => '>',
-        '←' => '<',
+        // Limits: at most this, either side.
+        '←' | '±' => '<',
         _ => match u32::from(c).checked_sub(BRAILLE) {
             Some(dots @ 0..=0xFF) => match dots.count_ones() {
                 0 => ' ',

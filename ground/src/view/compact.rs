@@ -32,7 +32,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         return;
     }
     lines.extend(top::pad_wait(model, theme));
-    lines.extend(alarms::alarm(model, theme, now));
+    lines.extend(model.playing.map(|playing| alarms::replay(playing, theme)));
+    if model.playing.is_none() {
+        lines.extend(alarms::alarm(model, theme, now));
+    }
     let page = model.page();
     let named = u16::from(area.height >= NAMED_ROWS);
     let taken = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(named);

@@ -8,10 +8,19 @@ use super::number::{age_mark, seconds};
 use super::theme::{Role, Theme};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
-use crate::model::{Model, too_late, words};
+use crate::model::{self, Model, too_late, words};
 
 /// The abort key, in words.
 pub const ABORT_KEY: &str = "Ctrl-X Ctrl-X";
+
+/// What aborts from this screen, or why nothing does.
+pub fn abort_key(model: &Model) -> String {
+    match model.settings.role {
+        model::Role::Station | model::Role::Attached => format!("ABORT {ABORT_KEY}"),
+        model::Role::Watching => "WATCHING only".to_owned(),
+        model::Role::Replaying => "REPLAY".to_owned(),
+    }
+}
 
 /// The phase, with its age.
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {

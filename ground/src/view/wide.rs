@@ -42,7 +42,7 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
     frame.render_widget(top::armed(model, theme, now), armed);
     frame.render_widget(top::countdown(model, theme, now), countdown);
     frame.render_widget(top::link(model, theme, now), link);
-    frame.render_widget(Line::styled(format!("ABORT {}", top::ABORT_KEY), theme.style(Role::Key)), abort);
+    frame.render_widget(Line::styled(top::abort_key(model), theme.style(Role::Key)), abort);
 }
 
 /// The screens' digits and names, the shown one in brackets, and whether it is held.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{Model, Settings};
+use ground::model::{Model, Role, Settings};
 use ground::update::{Action, Msg, update};
 use ground::view::theme::Theme;
 use ground::view::view;
@@ -351,6 +351,7 @@ pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
         link_capacity_bytes_s: None,
         log_path: Some("flight.mcap".to_owned()),
         tlog_path: None,
+        role: Role::Station,
         auto,
         interactive,
         time_limit: None,

@@ -8,4 +8,5 @@ mod hand;
 mod ladder;
 mod program;
 mod radio;
+mod replay;
 mod screens;

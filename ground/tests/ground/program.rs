@@ -106,4 +106,13 @@ fn the_demonstration_lands_with_code_0_and_names_its_log() {
     for topic in ["/telemetry", "/operator", "/events", "/controller/tick", "/verdict"] {
         assert!(reader.channels().any(|(_, channel)| channel.topic == topic), "{topic} is missing");
     }
+    let output = ground(directory.path(), &["--replay", log]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    let replayed = out(&output);
+    for words in ["ARM acknowledged: accepted", "phase PAD_ARMED -> ", "LANDED inside every limit"] {
+        assert!(replayed.contains(words), "{words} is missing in\n{replayed}");
+    }
+    let output = ground(directory.path(), &["--replay", log, "--from", "CHUTE"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(err(&output).contains("has no phase CHUTE; it has SAFE, PAD_IDLE, PAD_ARMED"), "{}", err(&output));
 }

@@ -16,6 +16,7 @@ pub fn lines() -> Vec<Line<'static>> {
         " 0 or Esc        follow the flight again",
         " Up Down PgUp PgDn Home End   scroll a list",
         " Ctrl-L          draw the screen again",
+        " In a replay: Space, Left, Right, [ and ] (phases), + and - (speed), g, G",
         " q, Ctrl-C       quit; asks when armed or in flight",
         "",
         " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
