@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::transport::Endpoint;
 
+use crate::attach::place;
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::words;
@@ -20,26 +21,36 @@ use crate::model::words;
 #[derive(Debug, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP)]
 pub struct Cli {
+    /// What to be instead of a station with its screen.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
     /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT or serial:DEVICE:BAUD.
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", global = true)]
     pub connect: Option<Endpoint>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
-    #[arg(long, value_name = "FILE|none")]
+    #[arg(long, value_name = "FILE|none", global = true)]
     pub log: Option<LogChoice>,
 
     /// Demonstration: built-in profile or TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "paper-calibrated", conflicts_with = "connect")]
+    #[arg(
+        long,
+        value_name = "NAME|FILE",
+        default_value = "paper-calibrated",
+        conflicts_with = "connect",
+        global = true
+    )]
     pub profile: String,
 
     /// Demonstration: seed of the profile's dispersions.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect")]
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect", global = true)]
     pub seed: u64,
 
     /// Demonstration: speed of simulated time, a factor or `max`.
-    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect")]
+    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect", global = true)]
     pub speed: Speed,
 
     /// Show a recorded flight (MCAP, or .tlog by its name) on the same screens instead.
@@ -50,8 +61,12 @@ pub struct Cli {
     #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
     pub from: Option<ReplayFrom>,
 
+    /// Socket between a station and its screens; by default this user's own.
+    #[arg(long, value_name = "PATH", global = true)]
+    pub socket: Option<PathBuf>,
+
     /// Arm and start without a hand. The demonstration without a screen always does.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub auto: bool,
 
     /// Lines instead of the full screen, also on a terminal.
@@ -63,6 +78,21 @@ pub struct Cli {
     /// Default: 120 s where the flight is started automatically, otherwise never.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub timeout_s: Option<Seconds>,
+}
+
+/// What `ground` can be besides a station with its screen.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// A station without a screen: holds the link, records, and serves screens until it is told to end (SIGTERM).
+    ///
+    /// It outlives every screen, and the session it was started from.
+    Daemon,
+    /// A screen for a station that runs elsewhere on this machine. Quitting leaves the station as it is.
+    Attach {
+        /// Show only; command nothing.
+        #[arg(long)]
+        watch: bool,
+    },
 }
 
 /// Where the log goes.
@@ -125,6 +155,11 @@ impl FromStr for Seconds {
 }
 
 impl Cli {
+    /// The socket of the station.
+    pub fn socket_path(&self) -> PathBuf {
+        self.socket.clone().unwrap_or_else(place::default_path)
+    }
+
     /// Whether the flight is started without a hand.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
         self.auto || (self.connect.is_none() && !interactive)

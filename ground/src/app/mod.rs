@@ -1,24 +1,30 @@
 //! The run loop: everything that touches the world, around a pure model.
 
+pub mod attached;
 pub mod clock;
 pub mod lines;
 pub mod log;
 pub mod replaying;
 pub mod screen;
+pub mod server;
 pub mod signals;
 pub mod wire;
 
 use std::io::IsTerminal as _;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
+use protocol::log::v1::OperatorAction;
 use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::cli::{Cli, Seconds};
+use crate::attach::codec::{Asked, Hello, VERSION};
+use crate::attach::place;
+use crate::cli::{Cli, Command, Seconds};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::{LogHealth, Model, Role, Settings};
@@ -27,6 +33,7 @@ use clock::{Clock, LogTime};
 use lines::Lines;
 use log::LogGuard;
 use screen::Screen;
+use server::Server;
 use signals::Signals;
 use wire::Wire;
 
@@ -42,10 +49,24 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
-    match &cli.replay {
-        Some(path) => runtime.block_on(replaying::session(cli, path, interactive)),
-        None => runtime.block_on(session(cli, interactive)),
-    }
+    runtime.block_on(async {
+        match (&cli.command, &cli.replay) {
+            (Some(Command::Attach { watch }), _) => {
+                attached::session(&cli.socket_path(), *watch, interactive).await
+            }
+            (Some(Command::Daemon), _) => session(cli, false).await,
+            (None, Some(path)) => replaying::session(cli, path, interactive).await,
+            (None, None) if interactive && cli.connect.is_none() && station_runs(cli).await => {
+                attached::session(&cli.socket_path(), false, interactive).await
+            }
+            (None, None) => session(cli, interactive).await,
+        }
+    })
+}
+
+/// A station of this user runs on this machine already.
+async fn station_runs(cli: &Cli) -> bool {
+    place::connect(&cli.socket_path()).await.is_ok()
 }
 
 async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
@@ -75,7 +96,8 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         }
         _ => None,
     };
-    let auto = cli.starts_by_itself(interactive);
+    let is_daemon = matches!(cli.command, Some(Command::Daemon));
+    let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let mut model = Model::new(Settings {
         link_name: wire.endpoint().to_string(),
         link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
@@ -83,11 +105,19 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         tlog_path: None,
         role: Role::Station,
         auto,
-        interactive,
+        // A daemon, too, goes on after a flight.
+        interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
     });
     let output = if interactive { Output::Screen(Screen::open()?) } else { Output::Lines(Lines::new()) };
-    let mut station = Station { clock, log_time, recorder, demo, output };
+    let socket = cli.socket_path();
+    let server = match is_daemon {
+        true => Some(Server::open(&socket, hello(&model)).await?),
+        // Other screens may watch a real vehicle's station; where one is served already, they watch that.
+        false if interactive && demo.is_none() => Server::open(&socket, hello(&model)).await.ok(),
+        false => None,
+    };
+    let mut station = Station { clock, log_time, recorder, demo, output, socket, server };
     let ran = station.run(&mut model, &mut wire).await;
     station.close(&model).await;
     let log_path = log_guard.finish();
@@ -121,6 +151,8 @@ struct Station {
     recorder: Option<Recorder>,
     demo: Option<Demo>,
     output: Output,
+    socket: PathBuf,
+    server: Option<Server>,
 }
 
 impl Station {
@@ -130,13 +162,14 @@ impl Station {
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         loop {
             let redraw_at = self.output.redraw_at();
-            let demo = &mut self.demo;
+            let (demo, server) = (&mut self.demo, &mut self.server);
             let chord_at = model.abort_chord.acts_at();
             let msgs = tokio::select! {
                 // In this order. Keys before the clock: one that waits may show that Ctrl-X is held. The
                 // link last: it alone can be busy all the time, and it is read until nothing waits.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
+                asked = server_asks(server) => self.asked(asked),
                 msg = self.output.input() => vec![msg],
                 () = self.clock.sleep_until(chord_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
@@ -146,6 +179,13 @@ impl Station {
             };
             let mut quit = false;
             for msg in msgs {
+                let msg = match msg {
+                    Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
+                        self.lose_screen(model).await;
+                        Msg::ScreenGone
+                    }
+                    msg => msg,
+                };
                 // A tick alone changes nothing that must be seen before the next second.
                 if msg != Msg::Tick {
                     self.output.mark_changed();
@@ -155,6 +195,42 @@ impl Station {
             self.output.show(model, self.clock.now())?;
             if quit {
                 return Ok(());
+            }
+        }
+    }
+
+    /// A real vehicle's link and log go on without a screen; a demonstration is only looked at.
+    fn outlives_its_screen(&self) -> bool {
+        self.demo.is_none() || (self.server.is_some() && matches!(self.output, Output::Lines(_)))
+    }
+
+    /// Goes on without the terminal, and serves screens from now on.
+    async fn lose_screen(&mut self, model: &Model) {
+        self.output = Output::Lines(Lines::closed());
+        if self.server.is_none() {
+            // Another station may serve there; then this one goes on alone.
+            self.server = Server::open(&self.socket, hello(model)).await.ok();
+        }
+    }
+
+    /// What a screen elsewhere asks for.
+    fn asked(&self, asked: Asked) -> Vec<Msg> {
+        match asked {
+            Asked::Command(kind) => vec![Msg::Requested(kind)],
+            Asked::Acknowledge => vec![Msg::Acknowledged],
+            Asked::Parameters => vec![Msg::ParametersWanted],
+            Asked::Hello { .. } => Vec::new(),
+            Asked::Key(name) => {
+                if let Some(recorder) = &self.recorder {
+                    let at_ns = self.log_time.now_ns();
+                    let action = OperatorAction {
+                        time_s: 0.0,
+                        kind: "key".to_owned(),
+                        detail: format!("{name} (attached screen)"),
+                    };
+                    recorder.try_record(timed(Record::OperatorAction(action), at_ns), at_ns);
+                }
+                Vec::new()
             }
         }
     }
@@ -171,10 +247,16 @@ impl Station {
     fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> bool {
         let now = self.clock.now();
         let mut quit = false;
+        if let Some(server) = &mut self.server {
+            server.publish(&msg, now);
+        }
         for action in update(model, msg, now) {
             match action {
                 Action::Send(message) => {
                     let sent = wire.send(&message);
+                    if let Some(server) = &mut self.server {
+                        server.publish(&sent, now);
+                    }
                     // Only counts: it wants nothing done.
                     update(model, sent, now);
                 }
@@ -194,7 +276,8 @@ impl Station {
                 }
                 Action::Redraw => self.output.clear(),
                 Action::Bell => self.output.bell(),
-                Action::Alarm(_) => {}
+                // A station asks nobody.
+                Action::Request(_) | Action::Alarm(_) => {}
                 Action::Quit => quit = true,
             }
         }
@@ -222,6 +305,25 @@ fn timed(mut record: Record, at_ns: u64) -> Record {
         _ => {}
     }
     record
+}
+
+fn hello(model: &Model) -> Hello {
+    let settings = &model.settings;
+    Hello {
+        version: VERSION,
+        auto: settings.auto,
+        link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
+        link_name: settings.link_name.clone(),
+        log_path: settings.log_path.clone().unwrap_or_default(),
+        tlog_path: settings.tlog_path.clone().unwrap_or_default(),
+    }
+}
+
+async fn server_asks(server: &mut Option<Server>) -> Asked {
+    match server {
+        Some(server) => server.next().await,
+        None => std::future::pending().await,
+    }
 }
 
 async fn demo_ended(demo: &mut Option<Demo>) -> Option<String> {

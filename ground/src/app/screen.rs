@@ -30,6 +30,9 @@ const FRAME: Duration = Duration::from_millis(100);
 /// Ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
 
+/// Why a screen ends without a signal.
+pub const GONE: &str = "the terminal is gone";
+
 /// What was pushed must be popped, by whichever way the screen ends.
 static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
@@ -124,7 +127,7 @@ impl Screen {
                 Some(Ok(_)) => {}
                 Some(Err(_)) | None => {
                     self.input_ended = true;
-                    return Msg::Terminate("the terminal is gone");
+                    return Msg::Terminate(GONE);
                 }
             }
         }

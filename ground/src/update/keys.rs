@@ -11,13 +11,14 @@ use protocol::log::record::Record;
 use protocol::log::v1::OperatorAction;
 
 use super::{Action, commands};
+use crate::attach::codec::Asked;
 use crate::key::Key;
-use crate::model::Model;
 use crate::model::command::CommandKind;
 use crate::model::dialog::{ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT};
 use crate::model::page::Page;
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
+use crate::model::{Model, Role};
 
 /// Lines that a page key scrolls.
 const SCROLL_PAGE: i32 = 10;
@@ -48,12 +49,12 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         Dialog::Closed => on_free_key(model, key, now),
         Dialog::Arm { typed, until } => on_arm_key(model, key, typed, until, now),
         Dialog::Start { until } => match key {
-            Key::Enter => start(model, now),
+            Key::Enter => ask(model, CommandKind::Start, now),
             Key::Escape => model.info(now, "start: cancelled"),
             _ => model.dialog = Dialog::Start { until },
         },
         Dialog::Disarm { until } => match key {
-            Key::Enter => commands::submit(model, CommandKind::Disarm, now),
+            Key::Enter => ask(model, CommandKind::Disarm, now),
             Key::Escape => model.info(now, "disarm: cancelled"),
             _ => model.dialog = Dialog::Disarm { until },
         },
@@ -109,12 +110,10 @@ fn on_page_key(model: &mut Model, key: Key, now: Duration) {
         Key::Escape | Key::Char('0') => model.pages.hold(None),
         Key::Char('h' | 'H') if model.pages.held.is_some() => model.pages.hold(None),
         Key::Char('h' | 'H') => model.pages.hold(Some(shown)),
-        Key::Char(' ') => {
-            let seen = model.alarms.acknowledge();
-            if seen > 0 {
-                model.info(now, format!("alarms acknowledged: {seen}"));
-            }
+        Key::Char(' ') if model.settings.role == Role::Attached => {
+            model.outbox.push(Action::Request(Asked::Acknowledge));
         }
+        Key::Char(' ') => acknowledge(model, now),
         Key::Char('r') if shown == Page::Parameters => ask_parameters(model),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
@@ -143,8 +142,11 @@ fn scroll(model: &mut Model, up: i32) {
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
 }
 
-fn ask_parameters(model: &mut Model) {
+pub(super) fn ask_parameters(model: &mut Model) {
     model.parameters.asked = true;
+    if model.settings.role == Role::Attached {
+        return model.outbox.push(Action::Request(Asked::Parameters));
+    }
     model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: VEHICLE.system_id,
         target_component: VEHICLE.component_id,
@@ -155,12 +157,7 @@ fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, n
     match key {
         Key::Escape => return model.info(now, "arming: cancelled"),
         Key::Enter if typed.eq_ignore_ascii_case(ARM_WORD) => {
-            // The vehicle may have changed while the word was typed.
-            match why_not_arm(model, now) {
-                None => commands::submit(model, CommandKind::Arm, now),
-                Some(why) => model.warn(now, format!("cannot arm: {why}")),
-            }
-            return;
+            return ask(model, CommandKind::Arm, now);
         }
         Key::Backspace => {
             typed.pop();
@@ -175,10 +172,32 @@ fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, n
     model.dialog = Dialog::Arm { typed, until };
 }
 
-fn start(model: &mut Model, now: Duration) {
-    match why_not_start(model, now) {
-        None => commands::submit(model, CommandKind::Start, now),
-        Some(why) => model.warn(now, format!("cannot start: {why}")),
+/// The ladder is complete: commands here, or asks the station that this screen shows.
+fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
+    match model.settings.role {
+        Role::Attached => model.outbox.push(Action::Request(Asked::Command(kind))),
+        Role::Station => command(model, kind, now),
+        Role::Watching | Role::Replaying => {}
+    }
+}
+
+/// Commands, unless the vehicle has changed since the ladder was begun.
+pub(super) fn command(model: &mut Model, kind: CommandKind, now: Duration) {
+    let why_not = match kind {
+        CommandKind::Arm => why_not_arm(model, now),
+        CommandKind::Start => why_not_start(model, now),
+        CommandKind::Disarm | CommandKind::Abort => None,
+    };
+    match why_not {
+        None => commands::submit(model, kind, now),
+        Some(why) => model.warn(now, format!("cannot {}: {why}", kind.name().to_lowercase())),
+    }
+}
+
+pub(super) fn acknowledge(model: &mut Model, now: Duration) {
+    let seen = model.alarms.acknowledge();
+    if seen > 0 {
+        model.info(now, format!("alarms acknowledged: {seen}"));
     }
 }
 
@@ -219,12 +238,14 @@ pub(super) fn pass_abort_chord(model: &mut Model, now: Duration) {
 
 fn abort(model: &mut Model, now: Duration) {
     model.dialog = Dialog::Closed;
-    commands::submit(model, CommandKind::Abort, now);
+    ask(model, CommandKind::Abort, now);
 }
 
 fn quit(model: &mut Model, now: Duration) {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
-    let risky = armed || model.vehicle.in_flight();
+    // A screen that ends leaves its station as it is.
+    let is_station = model.settings.role == Role::Station;
+    let risky = is_station && (armed || model.vehicle.in_flight());
     let confirmed = matches!(model.dialog, Dialog::Quit { .. });
     if confirmed || !risky {
         model.dialog = Dialog::Closed;

@@ -3,6 +3,7 @@
 mod alarms;
 mod auto;
 mod bench;
+mod daemon;
 mod disarm;
 mod hand;
 mod ladder;

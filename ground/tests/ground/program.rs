@@ -114,5 +114,9 @@ fn the_demonstration_lands_with_code_0_and_names_its_log() {
     }
     let output = ground(directory.path(), &["--replay", log, "--from", "CHUTE"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(err(&output).contains("has no phase CHUTE; it has SAFE, PAD_IDLE, PAD_ARMED"), "{}", err(&output));
+    assert!(
+        err(&output).contains("has no phase CHUTE; it has SAFE, PAD_IDLE, PAD_ARMED"),
+        "{}",
+        err(&output)
+    );
 }

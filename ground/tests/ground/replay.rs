@@ -42,7 +42,7 @@ fn player() -> Player {
 }
 
 fn phase(player: &Player) -> TdPhase {
-    player.model.vehicle.phase().unwrap().value
+    player.model.vehicle.phase().map(|phase| phase.value).expect("a phase is known")
 }
 
 #[test]
