@@ -18,7 +18,7 @@ use crate::model::words;
 /// Without --connect it flies a demonstration: a simulated vehicle in this process, on real MAVLink over a
 /// loopback UDP socket. On a terminal it shows the full screen (? lists the keys); without one, a line an
 /// event, the landing verdict at the end, and the exit code says how it went.
-#[derive(Debug, Parser)]
+#[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP)]
 pub struct Cli {
     /// What to be instead of a station with its screen.
@@ -53,6 +53,22 @@ pub struct Cli {
     #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect", global = true)]
     pub speed: Speed,
 
+    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
+    ///
+    /// Default: with --connect the log's name with this ending; the demonstration writes none.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub tlog: Option<LogChoice>,
+
+    /// Settings file (TOML); `ground config example` prints one.
+    ///
+    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub config: Option<PathBuf>,
+
+    /// Fly the demonstration although the settings name a link.
+    #[arg(long, conflicts_with = "connect", global = true)]
+    pub demo: bool,
+
     /// Show a recorded flight (MCAP, or .tlog by its name) on the same screens instead.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "seed", "speed"])]
     pub replay: Option<PathBuf>,
@@ -81,7 +97,7 @@ pub struct Cli {
 }
 
 /// What `ground` can be besides a station with its screen.
-#[derive(Debug, Subcommand)]
+#[derive(Debug, Clone, Subcommand)]
 pub enum Command {
     /// A station without a screen: holds the link, records, and serves screens until it is told to end (SIGTERM).
     ///
@@ -93,6 +109,28 @@ pub enum Command {
         #[arg(long)]
         watch: bool,
     },
+    /// The settings file.
+    Config {
+        /// What to do with it.
+        #[command(subcommand)]
+        command: ConfigCommand,
+    },
+    /// Print a shell's completions.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    Man,
+}
+
+/// What can be done with the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+pub enum ConfigCommand {
+    /// Say whether they are understood, and what they are.
+    Check,
+    /// Print a file with every key, its meaning and its default.
+    Example,
 }
 
 /// Where the log goes.

@@ -16,6 +16,7 @@
 pub mod app;
 pub mod attach;
 pub mod cli;
+pub mod config;
 pub mod demo;
 pub mod exit;
 pub mod key;

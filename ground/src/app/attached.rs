@@ -16,6 +16,7 @@ use super::server::read_one;
 use super::signals::Signals;
 use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_asked};
 use crate::attach::place;
+use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::{Model, Role, Settings};
 use crate::update::{Action, Msg, update};
@@ -31,7 +32,7 @@ const WAITING_MAX: usize = 4_096;
 ///
 /// # Errors
 /// No station runs there, or the terminal failed.
-pub async fn session(path: &Path, watch: bool, interactive: bool) -> anyhow::Result<Exit> {
+pub async fn session(path: &Path, watch: bool, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     anyhow::ensure!(interactive, "a screen needs a terminal; `ground daemon` runs without one");
     let mut link = Link::open(path, watch).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
@@ -48,7 +49,8 @@ pub async fn session(path: &Path, watch: bool, interactive: bool) -> anyhow::Res
             told => take(&mut model, told, at, watch)?,
         }
     }
-    let mut screen = Screen::open()?;
+    let mut screen = Screen::open(config)?;
+    model.repeats_told = screen.tells_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
@@ -89,6 +91,7 @@ pub async fn session(path: &Path, watch: bool, interactive: bool) -> anyhow::Res
                     let pages = model.pages;
                     model = Model::new(settings(&Hello::default(), watch));
                     model.pages = pages;
+                    model.repeats_told = screen.tells_repeats();
                     look_again_at = None;
                 }
                 Vec::new()

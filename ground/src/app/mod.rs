@@ -1,9 +1,11 @@
 //! The run loop: everything that touches the world, around a pure model.
 
+pub mod alarm_command;
 pub mod attached;
 pub mod clock;
 pub mod lines;
 pub mod log;
+pub mod print;
 pub mod replaying;
 pub mod screen;
 pub mod server;
@@ -15,7 +17,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::log::record::Record;
+use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use protocol::log::writer::LogHeader;
@@ -24,7 +26,8 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::attach::codec::{Asked, Hello, VERSION};
 use crate::attach::place;
-use crate::cli::{Cli, Command, Seconds};
+use crate::cli::{Cli, Command, LogChoice, Seconds};
+use crate::config::Config;
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::{LogHealth, Model, Role, Settings};
@@ -45,6 +48,16 @@ const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
 /// # Errors
 /// A socket, a file or the terminal failed, or the profile is wrong.
 pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
+    match &cli.command {
+        Some(Command::Config { command }) => return print::config(cli, command),
+        Some(Command::Completions { shell }) => return print::completions(*shell),
+        Some(Command::Man) => return print::manual(),
+        _ => {}
+    }
+    let config = Config::load(cli.config.as_deref())?;
+    let mut cli = cli.clone();
+    config.fill(&mut cli);
+    let (cli, config) = (&cli, &config);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let runtime =
@@ -52,14 +65,14 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     runtime.block_on(async {
         match (&cli.command, &cli.replay) {
             (Some(Command::Attach { watch }), _) => {
-                attached::session(&cli.socket_path(), *watch, interactive).await
+                attached::session(&cli.socket_path(), *watch, config, interactive).await
             }
-            (Some(Command::Daemon), _) => session(cli, false).await,
-            (None, Some(path)) => replaying::session(cli, path, interactive).await,
-            (None, None) if interactive && cli.connect.is_none() && station_runs(cli).await => {
-                attached::session(&cli.socket_path(), false, interactive).await
+            (Some(Command::Daemon), _) => session(cli, config, false).await,
+            (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
+            (_, None) if interactive && !cli.demo && station_runs(cli).await => {
+                attached::session(&cli.socket_path(), false, config, interactive).await
             }
-            (None, None) => session(cli, interactive).await,
+            (_, None) => session(cli, config, interactive).await,
         }
     })
 }
@@ -69,7 +82,7 @@ async fn station_runs(cli: &Cli) -> bool {
     place::connect(&cli.socket_path()).await.is_ok()
 }
 
-async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
+async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match cli.connect {
         None => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
@@ -85,7 +98,9 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
     };
     // The demonstration takes any free port, so that it runs beside a real ground station.
     let endpoint = cli.connect.clone().unwrap_or_else(|| Endpoint::UdpIn("127.0.0.1:0".to_owned()));
-    let recorder = log::open(cli.log.as_ref(), &header)?;
+    let tlog = cli.tlog.as_ref();
+    let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
+    let recorder = log::open(cli.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
@@ -102,14 +117,20 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         link_name: wire.endpoint().to_string(),
         link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
-        tlog_path: None,
+        tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         role: Role::Station,
         auto,
         // A daemon, too, goes on after a flight.
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
     });
-    let output = if interactive { Output::Screen(Screen::open()?) } else { Output::Lines(Lines::new()) };
+    let output = if interactive {
+        let screen = Screen::open(config)?;
+        model.repeats_told = screen.tells_repeats();
+        Output::Screen(screen)
+    } else {
+        Output::Lines(Lines::new())
+    };
     let socket = cli.socket_path();
     let server = match is_daemon {
         true => Some(Server::open(&socket, hello(&model)).await?),
@@ -117,7 +138,8 @@ async fn session(cli: &Cli, interactive: bool) -> anyhow::Result<Exit> {
         false if interactive && demo.is_none() => Server::open(&socket, hello(&model)).await.ok(),
         false => None,
     };
-    let mut station = Station { clock, log_time, recorder, demo, output, socket, server };
+    let alarm_command = config.alarm_command.clone();
+    let mut station = Station { clock, log_time, recorder, demo, output, socket, server, alarm_command };
     let ran = station.run(&mut model, &mut wire).await;
     station.close(&model).await;
     let log_path = log_guard.finish();
@@ -153,6 +175,7 @@ struct Station {
     output: Output,
     socket: PathBuf,
     server: Option<Server>,
+    alarm_command: Option<String>,
 }
 
 impl Station {
@@ -235,6 +258,19 @@ impl Station {
         }
     }
 
+    fn tell_alarm(&mut self, words: &str) {
+        let Some(command) = &self.alarm_command else { return };
+        if let Err(error) = alarm_command::run(command, words) {
+            // Said once: a command that cannot be started now cannot be later.
+            let text = format!("the alarm command cannot be started: {error}");
+            self.alarm_command = None;
+            if let Some(recorder) = &self.recorder {
+                let event = Event { level: EventLevel::Warning, name: "ground".to_owned(), message: text };
+                recorder.try_record(Record::Event(event), self.log_time.now_ns());
+            }
+        }
+    }
+
     fn tick_msgs(&self, model: &Model) -> Vec<Msg> {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
@@ -276,8 +312,9 @@ impl Station {
                 }
                 Action::Redraw => self.output.clear(),
                 Action::Bell => self.output.bell(),
+                Action::Alarm(words) => self.tell_alarm(&words),
                 // A station asks nobody.
-                Action::Request(_) | Action::Alarm(_) => {}
+                Action::Request(_) => {}
                 Action::Quit => quit = true,
             }
         }

@@ -12,6 +12,7 @@ use super::lines::{self, Lines};
 use super::screen::Screen;
 use super::signals::Signals;
 use crate::cli::{Cli, ReplayFrom};
+use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::{Role, Settings, words};
 use crate::replay::film::Film;
@@ -25,7 +26,7 @@ const STEP: Duration = Duration::from_millis(100);
 ///
 /// # Errors
 /// The log cannot be read, the terminal failed, or the film has no such phase.
-pub async fn session(cli: &Cli, path: &Path, interactive: bool) -> anyhow::Result<Exit> {
+pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let film = Film::load(path)?;
     let damage = film.damage.clone();
     let settings = Settings {
@@ -63,7 +64,7 @@ pub async fn session(cli: &Cli, path: &Path, interactive: bool) -> anyhow::Resul
         player.model.warn(player.position(), format!("the log {damage}"));
     }
     if interactive {
-        watch(&mut player).await?;
+        watch(&mut player, config).await?;
     } else {
         player.seek(player.film().length());
         Lines::new().show(&player.model);
@@ -72,9 +73,9 @@ pub async fn session(cli: &Cli, path: &Path, interactive: bool) -> anyhow::Resul
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
 }
 
-async fn watch(player: &mut Player) -> anyhow::Result<()> {
+async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
     let clock = Clock::start();
-    let mut screen = Screen::open()?;
+    let mut screen = Screen::open(config)?;
     let mut signals = Signals::listen()?;
     let mut steps = interval(STEP);
     steps.set_missed_tick_behavior(MissedTickBehavior::Skip);

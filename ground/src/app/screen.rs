@@ -19,6 +19,7 @@ use ratatui::DefaultTerminal;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 
+use crate::config::{Characters, Colour, Config};
 use crate::key::Key;
 use crate::model::Model;
 use crate::update::Msg;
@@ -41,6 +42,7 @@ pub struct Screen {
     terminal: DefaultTerminal,
     events: EventStream,
     theme: Theme,
+    bell: bool,
     changed: bool,
     drawn_at: Option<Duration>,
     input_ended: bool,
@@ -51,13 +53,14 @@ impl Screen {
     ///
     /// # Errors
     /// It is none, or refuses.
-    pub fn open() -> anyhow::Result<Self> {
+    pub fn open(config: &Config) -> anyhow::Result<Self> {
         restore_before_panic_message();
         let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
             terminal,
             events: EventStream::new(),
-            theme: Theme::of_environment(|name| std::env::var(name).ok()),
+            theme: theme(config),
+            bell: config.bell.unwrap_or(true),
             changed: true,
             drawn_at: None,
             input_ended: false,
@@ -104,8 +107,16 @@ impl Screen {
         self.changed = true;
     }
 
+    /// Whether the terminal tells a held key's repeats from presses.
+    pub fn tells_repeats(&self) -> bool {
+        KEYBOARD_ENHANCED.load(Ordering::Relaxed)
+    }
+
     /// Rings the terminal's bell.
     pub fn bell(&self) {
+        if !self.bell {
+            return;
+        }
         let mut out = io::stdout();
         // A terminal that is gone shows by the next frame.
         let _ = io::Write::write_all(&mut out, b"\x07").and_then(|()| io::Write::flush(&mut out));
@@ -138,6 +149,22 @@ impl Drop for Screen {
     fn drop(&mut self) {
         restore();
     }
+}
+
+/// What the settings say; else the environment.
+fn theme(config: &Config) -> Theme {
+    let found = Theme::of_environment(|name| std::env::var(name).ok());
+    let colour = match config.colour {
+        Colour::Auto => found.colour,
+        Colour::Always => true,
+        Colour::Never => false,
+    };
+    let ascii = match config.characters {
+        Characters::Auto => found.ascii,
+        Characters::Unicode => false,
+        Characters::Ascii => true,
+    };
+    Theme { colour, ascii }
 }
 
 fn take_terminal() -> io::Result<DefaultTerminal> {

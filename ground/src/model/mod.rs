@@ -142,6 +142,8 @@ pub struct Model {
     pub dialog: Dialog,
     /// How far the abort chord is.
     pub abort_chord: AbortChord,
+    /// The terminal tells a held key's repeats from presses, so that none of them arrives here.
+    pub repeats_told: bool,
     /// What happened.
     pub events: Events,
     /// What became of the flight.
@@ -175,6 +177,7 @@ impl Model {
             commands: Commands::default(),
             dialog: Dialog::Closed,
             abort_chord: AbortChord::default(),
+            repeats_told: false,
             events: Events::default(),
             outcome: Outcome::default(),
             log: LogHealth::default(),

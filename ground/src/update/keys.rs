@@ -34,6 +34,10 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     }
     if key == Key::CtrlX {
         model.abort_chord.press(now);
+        // A terminal that tells repeats apart has shown that this was a press: nothing is waited for.
+        if model.repeats_told && model.abort_chord.acts_at().is_some() && model.abort_chord.end() {
+            abort(model, now);
+        }
         return;
     }
     // The chord is twice the same key with nothing between; once complete, nothing takes it back.
