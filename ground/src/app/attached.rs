@@ -72,8 +72,9 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
-                if told.as_ref().is_none_or(|(told, _)| *told != Told::Msg(Msg::Tick)) {
-                    screen.mark_changed();
+                match &told {
+                    Some((Told::Msg(msg), _)) => screen.mark_message(msg, &model),
+                    _ => screen.mark_changed(),
                 }
                 if let Some((told, at)) = told {
                     times.heard(at, clock.now());

@@ -209,10 +209,7 @@ impl Station {
                     }
                     msg => msg,
                 };
-                // A tick alone changes nothing that must be seen before the next second.
-                if msg != Msg::Tick {
-                    self.output.mark_changed();
-                }
+                self.output.mark_message(&msg, model);
                 quit |= self.step(model, wire, msg);
             }
             self.output.show(model, self.clock.now())?;
@@ -383,6 +380,12 @@ impl Output {
         match self {
             Self::Screen(screen) => screen.input().await,
             Self::Lines(_) => std::future::pending().await,
+        }
+    }
+
+    fn mark_message(&mut self, msg: &Msg, model: &Model) {
+        if let Self::Screen(screen) = self {
+            screen.mark_message(msg, model);
         }
     }
 

@@ -26,8 +26,10 @@ use crate::update::Msg;
 use crate::view::theme::Theme;
 use crate::view::view;
 
-/// At most ten frames a second.
+/// At most ten frames a second, while it matters.
 const FRAME: Duration = Duration::from_millis(100);
+/// On the pad and after a flight, for what only the radio brings: a slow line has other things to carry.
+const CALM_FRAME: Duration = Duration::from_millis(500);
 /// Ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
 
@@ -43,7 +45,7 @@ pub struct Screen {
     events: EventStream,
     theme: Theme,
     bell: bool,
-    changed: bool,
+    wait: Duration,
     drawn_at: Option<Duration>,
     input_ended: bool,
 }
@@ -61,21 +63,39 @@ impl Screen {
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
-            changed: true,
+            wait: Duration::ZERO,
             drawn_at: None,
             input_ended: false,
         })
     }
 
-    /// Something to see has changed.
+    /// Something to see has changed, and a person waits for it.
     pub fn mark_changed(&mut self) {
-        self.changed = true;
+        self.wait = self.wait.min(FRAME);
+    }
+
+    /// Something to see has changed that can wait a moment.
+    pub fn mark_changed_calmly(&mut self) {
+        self.wait = self.wait.min(CALM_FRAME);
+    }
+
+    /// A message was taken into the model: how soon it must be seen.
+    pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
+        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
+        match msg {
+            // Time and what was sent change nothing that must be seen before the next second.
+            Msg::Tick | Msg::Sent { .. } => {}
+            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
+                self.mark_changed();
+            }
+            Msg::Frame(_) | Msg::Received { .. } => self.mark_changed_calmly(),
+            _ => self.mark_changed(),
+        }
     }
 
     /// When the next frame is due.
     pub fn redraw_at(&self) -> Duration {
-        let wait = if self.changed { FRAME } else { IDLE_FRAME };
-        self.drawn_at.map_or(Duration::ZERO, |at| at + wait)
+        self.drawn_at.map_or(Duration::ZERO, |at| at + self.wait)
     }
 
     /// Draws if a frame is due.
@@ -95,7 +115,7 @@ impl Screen {
             return Ok(());
         }
         self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
-        self.changed = false;
+        self.wait = IDLE_FRAME;
         self.drawn_at = Some(now);
         Ok(())
     }
@@ -104,7 +124,7 @@ impl Screen {
     pub fn clear(&mut self) {
         // If the terminal cannot be cleared, drawing fails next and says why.
         let _ = self.terminal.clear();
-        self.changed = true;
+        self.mark_changed();
     }
 
     /// Whether the terminal tells a held key's repeats from presses.
@@ -134,7 +154,7 @@ impl Screen {
                         return Msg::Key(key);
                     }
                 }
-                Some(Ok(Event::Resize(..))) => self.changed = true,
+                Some(Ok(Event::Resize(..))) => self.mark_changed(),
                 Some(Ok(_)) => {}
                 Some(Err(_)) | None => {
                     self.input_ended = true;

@@ -66,7 +66,8 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.link.state(now) {
         LinkState::NeverHeard => Span::styled("link: not heard", theme.style(Role::Caution)),
-        LinkState::Alive(age) => Span::styled(format!("link ok {}", seconds(age)), theme.style(Role::Good)),
+        // An age that only counts from heartbeat to heartbeat says nothing, ten times a second.
+        LinkState::Alive(_) => Span::styled("link ok", theme.style(Role::Good)),
         LinkState::Doubtful(age) => {
             Span::styled(format!("LINK? {}", seconds(age)), theme.style(Role::Caution))
         }

@@ -257,16 +257,23 @@ fn regress_help() {
 /// Colour only repeats: without it the same words stand in the same cells, and no cell has a colour.
 #[test]
 fn colour_carries_nothing_alone() {
-    let bench = powered();
-    let mono = bench.draw(80, 24, MONO);
-    let coloured = bench.draw(80, 24, Theme { colour: true, ascii: false });
-    let cells = |terminal: &ratatui::Terminal<ratatui::backend::TestBackend>| {
-        terminal.backend().buffer().content.iter().map(|cell| cell.symbol().to_owned()).collect::<Vec<_>>()
-    };
-    assert_eq!(cells(&mono), cells(&coloured));
-    assert!(
-        mono.backend().buffer().content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset)
-    );
+    let mut lost = powered();
+    lost.speaks = false;
+    lost.run(6.0);
+    for mut bench in [on_the_pad(), counting(), descending(), powered(), lost] {
+        for digit in '0'..='9' {
+            bench.key(Key::Char(digit));
+            let mono = bench.draw(80, 24, MONO);
+            let coloured = bench.draw(80, 24, Theme { colour: true, ascii: false });
+            let cells = |terminal: &ratatui::Terminal<ratatui::backend::TestBackend>| {
+                let cells = &terminal.backend().buffer().content;
+                cells.iter().map(|cell| cell.symbol().to_owned()).collect::<Vec<_>>()
+            };
+            assert_eq!(cells(&mono), cells(&coloured), "screen {digit}");
+            let grey = |cell: &ratatui::buffer::Cell| cell.fg == Color::Reset && cell.bg == Color::Reset;
+            assert!(mono.backend().buffer().content.iter().all(grey), "screen {digit}");
+        }
+    }
 }
 
 /// Phase, armed, countdown, link and the abort key stay where they are under every dialog.
