@@ -11,8 +11,9 @@ use tokio::net::UnixStream;
 use tokio::net::unix::OwnedReadHalf;
 use tokio::sync::{broadcast, mpsc};
 
-use crate::attach::codec::{Asked, Hello, Told, decode_asked, encode_told, length};
+use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_asked, encode_told, length};
 use crate::attach::place;
+use crate::model::Model;
 use crate::update::Msg;
 
 /// History kept: some hours of a radio.
@@ -97,6 +98,19 @@ impl Drop for Server {
         self.accepting.abort();
         // A socket that stays behind is replaced by the next station.
         let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+/// What a station tells a screen first.
+pub(super) fn hello(model: &Model) -> Hello {
+    let settings = &model.settings;
+    Hello {
+        version: VERSION,
+        auto: settings.auto,
+        link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
+        link_name: settings.link_name.clone(),
+        log_path: settings.log_path.clone().unwrap_or_default(),
+        tlog_path: settings.tlog_path.clone().unwrap_or_default(),
     }
 }
 
