@@ -1,6 +1,7 @@
 //! The full screen: the terminal's state, its keys, and when it is drawn.
 
 use std::io;
+use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -41,7 +42,9 @@ static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
 pub struct Screen {
-    terminal: DefaultTerminal,
+    /// Never dropped: its own clean-up prints when the terminal is gone, and printing to a terminal that is
+    /// gone panics. [`restore`] does what it would do.
+    terminal: ManuallyDrop<DefaultTerminal>,
     events: EventStream,
     theme: Theme,
     bell: bool,
@@ -59,7 +62,7 @@ impl Screen {
         restore_before_panic_message();
         let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
-            terminal,
+            terminal: ManuallyDrop::new(terminal),
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),

@@ -11,3 +11,4 @@ mod program;
 mod radio;
 mod replay;
 mod screens;
+mod terminal;
