@@ -12,7 +12,9 @@ use sha2::Digest as _;
 fn main() -> Result<()> {
     let out_dir = PathBuf::from(env::var("OUT_DIR").context("OUT_DIR")?);
     generate_dialect(&out_dir)?;
-    generate_log_records(&out_dir)?;
+    for package in ["log", "flight"] {
+        generate_log_records(&out_dir, package)?;
+    }
     note_the_build()
 }
 
@@ -27,12 +29,12 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     Ok(())
 }
 
-fn generate_log_records(out_dir: &Path) -> Result<()> {
-    let file = "proto/touchdown/log/v1.proto";
+fn generate_log_records(out_dir: &Path, package: &str) -> Result<()> {
+    let file = format!("proto/touchdown/{package}/v1.proto");
     println!("cargo:rerun-if-changed={file}");
-    let descriptors = protox::compile([file], ["proto"]).context(file)?;
-    fs::write(out_dir.join("log_v1.fds"), descriptors.encode_to_vec())?;
-    prost_build::Config::new().compile_fds(descriptors).context(file)?;
+    let descriptors = protox::compile([&file], ["proto"]).with_context(|| file.clone())?;
+    fs::write(out_dir.join(format!("{package}_v1.fds")), descriptors.encode_to_vec())?;
+    prost_build::Config::new().compile_fds(descriptors).with_context(|| file.clone())?;
     Ok(())
 }
 

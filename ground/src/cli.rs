@@ -25,9 +25,14 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT or serial:DEVICE:BAUD.
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
     #[arg(long, value_name = "LINK", global = true)]
-    pub connect: Option<Endpoint>,
+    pub connect: Vec<Endpoint>,
+
+    /// Sign every frame with this key, and believe nothing that is not signed with it. `onboard-sim keygen` makes one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub key: Option<PathBuf>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
@@ -200,7 +205,7 @@ impl Cli {
 
     /// Whether the flight is started without a hand.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
-        self.auto || (self.connect.is_none() && !interactive)
+        self.auto || (self.connect.is_empty() && !interactive)
     }
 }
 
@@ -217,9 +222,17 @@ mod tests {
     #[test]
     fn help_names_every_option_and_exit_code() {
         let help = Cli::command().render_long_help().to_string();
-        for word in
-            ["--connect", "--log", "--profile", "--seed", "--speed", "--auto", "--headless", "--timeout-s"]
-        {
+        for word in [
+            "--connect",
+            "--key",
+            "--log",
+            "--profile",
+            "--seed",
+            "--speed",
+            "--auto",
+            "--headless",
+            "--timeout-s",
+        ] {
             assert!(help.contains(word), "{word}");
         }
         assert!(help.contains(exit::HELP));

@@ -11,8 +11,11 @@ use crate::cli::{Cli, LogChoice};
 pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
 # Looked for in $XDG_CONFIG_HOME/touchdown/ground.toml, else ~/.config/touchdown/ground.toml.
 
-# Link to the vehicle, as for --connect. Without one, `ground` flies its demonstration.
-#connect = "udpin:0.0.0.0:14550"
+# Links to the vehicle, as for --connect. Without one, `ground` flies its demonstration.
+#connect = ["udpin:0.0.0.0:14550"]
+
+# Signing key, as for --key. Default: nothing is signed.
+#key = "touchdown.key"
 
 # Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
 #log = "flight.mcap"
@@ -40,8 +43,11 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
-    /// As `--connect`.
-    pub connect: Option<String>,
+    /// As `--connect`, each.
+    #[serde(default)]
+    pub connect: Vec<String>,
+    /// As `--key`.
+    pub key: Option<PathBuf>,
     /// As `--log`.
     pub log: Option<String>,
     /// As `--tlog`.
@@ -129,7 +135,7 @@ impl Config {
     /// Where it is wrong, in words.
     pub fn parse(text: &str) -> Result<Self, String> {
         let config: Self = toml::from_str(text).map_err(|error| error.to_string())?;
-        if let Some(link) = &config.connect {
+        for link in &config.connect {
             link.parse::<Endpoint>().map_err(|error| format!("connect: {error}"))?;
         }
         for (key, value) in [("log", &config.log), ("tlog", &config.tlog)] {
@@ -149,8 +155,11 @@ impl Config {
             value.and_then(|value| value.parse().ok())
         }
         // A replay, an attached screen and a demonstration that was asked for need no link.
-        if cli.connect.is_none() && cli.replay.is_none() && !cli.demo {
-            cli.connect = parsed(self.connect.as_ref());
+        if cli.connect.is_empty() && cli.replay.is_none() && !cli.demo {
+            cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        }
+        if cli.key.is_none() && !cli.connect.is_empty() {
+            cli.key.clone_from(&self.key);
         }
         if cli.log.is_none() {
             cli.log = parsed(self.log.as_ref());
@@ -187,9 +196,14 @@ mod tests {
             EXAMPLE.lines().filter_map(|line| line.strip_prefix('#')).filter(|line| !line.starts_with(' '));
         let uncommented = keys.collect::<Vec<_>>().join("\n");
         let config = Config::parse(&uncommented).unwrap();
-        assert!(config.connect.is_some() && config.log.is_some() && config.tlog.is_some());
+        assert!(
+            !config.connect.is_empty()
+                && config.key.is_some()
+                && config.log.is_some()
+                && config.tlog.is_some()
+        );
         assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-        assert_eq!(uncommented.lines().count(), 8, "one line a key: {uncommented}");
+        assert_eq!(uncommented.lines().count(), 9, "one line a key: {uncommented}");
         assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
     }
 
@@ -197,7 +211,7 @@ mod tests {
     fn what_is_wrong_is_named() {
         let wrong = |text: &str| Config::parse(text).unwrap_err();
         assert!(wrong("belll = true").contains("belll"));
-        assert!(wrong("connect = \"tcp\"").contains("udpin:ADDRESS:PORT"));
+        assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
         assert!(wrong("colour = \"blue\"").contains("always"));
         assert!(wrong("log = \"\"").contains("log: "));
         assert!(wrong("alarm_command = \" \"").contains("empty"));
@@ -205,13 +219,13 @@ mod tests {
 
     #[test]
     fn a_flag_overrides_its_key() {
-        let config = Config::parse("connect = \"udpin:0.0.0.0:14550\"\nlog = \"a.mcap\"").unwrap();
+        let config = Config::parse("connect = [\"udpin:0.0.0.0:14550\"]\nlog = \"a.mcap\"").unwrap();
         let mut cli = Cli::try_parse_from(["ground", "--log", "b.mcap"]).unwrap();
         config.fill(&mut cli);
         assert_eq!(cli.log, Some(LogChoice::File("b.mcap".into())));
-        assert_eq!(cli.connect, Some(Endpoint::UdpIn("0.0.0.0:14550".to_owned())));
+        assert_eq!(cli.connect, [Endpoint::UdpIn("0.0.0.0:14550".to_owned())]);
         let mut cli = Cli::try_parse_from(["ground", "--demo"]).unwrap();
         config.fill(&mut cli);
-        assert_eq!(cli.connect, None);
+        assert_eq!(cli.connect, []);
     }
 }

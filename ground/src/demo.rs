@@ -66,6 +66,7 @@ impl Demo {
         let fly_options = FlyOptions {
             profile: options.profile.clone(),
             links: vec![link],
+            key_file: None,
             recorder,
             seed: options.seed,
             speed: options.speed,

@@ -3,8 +3,9 @@
 //! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly: an arm that is
 //! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock.
 
+use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
-use protocol::dialect::{MavCmd, MavResult};
+use protocol::dialect::{AUTOPILOT_VERSION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult};
 
 use crate::vehicle::{Answer, Request, Result};
 
@@ -70,10 +71,23 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
     } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
         // Parameter 2 means something to two messages only; for the others it may be NaN.
         Ok(Command::SendMessage { message_id: message_id(param1)?, of: message_id(param2).unwrap_or(0) })
+    } else if let Some((_, message_id)) =
+        LEGACY_REQUESTS.iter().find(|(command, _)| *command == request.command)
+    {
+        // Parameter 1 says whether it is wanted; old clients leave it at 0 or 1 and want it either way.
+        Ok(Command::SendMessage { message_id: *message_id, of: 0 })
+    } else if request.command == GET_MESSAGE_INTERVAL {
+        Ok(Command::SendMessage { message_id: MESSAGE_INTERVAL_DATA::ID, of: message_id(param1)? })
     } else {
         Err(Unfit { result: MavResult::MAV_RESULT_UNSUPPORTED, reason: None })
     }
 }
+
+/// MAV_CMD_GET_MESSAGE_INTERVAL, the predecessor of a request for MESSAGE_INTERVAL.
+const GET_MESSAGE_INTERVAL: u16 = 510;
+/// Requests for one message each, from before MAV_CMD_REQUEST_MESSAGE; clients in use still send them:
+/// MAV_CMD_REQUEST_PROTOCOL_VERSION and MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES.
+const LEGACY_REQUESTS: [(u16, u32); 2] = [(519, 300), (520, AUTOPILOT_VERSION_DATA::ID)];
 
 /// The MAV_RESULT of a vehicle's answer.
 pub fn mav_result(answer: &Answer) -> MavResult {
@@ -148,6 +162,17 @@ mod tests {
             parse(&command(512, 148.0, f32::NAN)),
             Ok(Command::SendMessage { message_id: 148, of: 0 })
         );
+    }
+
+    #[test]
+    fn older_ways_to_ask_for_a_message_are_understood() {
+        for (number, param1, message_id, of) in [(519, 1.0, 300, 0), (520, 1.0, 148, 0), (510, 30.0, 244, 30)]
+        {
+            assert_eq!(
+                parse(&command(number, param1, f32::NAN)),
+                Ok(Command::SendMessage { message_id, of })
+            );
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Telemetry is scheduled within a radio's budget; answers and texts go first and count against it.
 
-mod streams;
+mod questions;
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -15,12 +15,13 @@ use protocol::dialect::{
     AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
     TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
-use protocol::frame::{Encoder, Frame};
+use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::signing::Rejection;
 use protocol::text;
 
-use self::streams::Streams;
 use crate::commands::{self, Command};
+use crate::streams::Streams;
 use crate::telemetry;
 use crate::vehicle::{Severity, Snapshot, Vehicle, VehicleEvent};
 
@@ -29,20 +30,27 @@ const BURST_BYTES: f64 = 400.0;
 
 /// Requested messages that may wait; more are refused for the time being.
 const MAX_REQUESTED: usize = 32;
+/// Commands that were not believed are spoken of this often at most.
+const REJECTED_SAID_EVERY_S: f64 = 5.0;
 /// Sources that are greeted; a forged flood of ids cannot grow memory.
 const MAX_KNOWN: usize = 16;
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
     encoder: Encoder,
+    /// What a signature adds to every frame, bytes; 0 without a key.
+    signature_len: usize,
     streams: Streams,
     /// Answers and texts that wait to be sent.
     urgent: Vec<Frame>,
     /// Messages that were asked for; they wait for room in the budget.
     requested: VecDeque<MavMessage>,
+    /// The next parameter of a list that was asked for; none when the list has been sent.
+    next_parameter: Option<u16>,
     text_id: u16,
     credit_bytes: f64,
     last_poll_s: f64,
     warned_of_twin: bool,
+    say_rejected_after_s: f64,
     /// Whoever has sent anything yet; a newcomer is told the limits at once.
     known: BTreeSet<Address>,
 }
@@ -58,15 +66,23 @@ impl VehicleEndpoint {
     pub fn new() -> Self {
         Self {
             encoder: Encoder::new(VEHICLE),
+            signature_len: 0,
             streams: Streams::standard(),
             urgent: Vec::new(),
             requested: VecDeque::new(),
+            next_parameter: None,
             text_id: 0,
             credit_bytes: BURST_BYTES,
             last_poll_s: 0.0,
             warned_of_twin: false,
+            say_rejected_after_s: 0.0,
             known: BTreeSet::new(),
         }
+    }
+
+    /// The same where every frame will be signed, and is longer for it.
+    pub fn signed() -> Self {
+        Self { signature_len: SIGNATURE_LEN, streams: Streams::signed(), ..Self::new() }
     }
 
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
@@ -85,6 +101,9 @@ impl VehicleEndpoint {
             if VEHICLE.accepts(request.target) {
                 self.on_command(&request, vehicle);
             }
+            return;
+        }
+        if self.on_question(frame, vehicle) {
             return;
         }
         match frame.decode() {
@@ -109,6 +128,22 @@ impl VehicleEndpoint {
         }
     }
 
+    /// Says that a command was not believed; now and then, because a flood of them must not fill the radio. It is not
+    /// acknowledged: a forger could have the true ground's own command answered by it.
+    pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
+        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| VEHICLE.accepts(asked.target))
+        else {
+            return;
+        };
+        if self.last_poll_s < self.say_rejected_after_s {
+            return;
+        }
+        self.say_rejected_after_s = self.last_poll_s + REJECTED_SAID_EVERY_S;
+        let Address { system_id, component_id } = request.source;
+        let words = format!("command {} from {system_id}/{component_id} refused: {why}", request.command);
+        self.say(Severity::Warning, &words);
+    }
+
     /// Takes note of what the vehicle reports.
     pub fn on_event(&mut self, event: &VehicleEvent) {
         match event {
@@ -124,14 +159,14 @@ impl VehicleEndpoint {
     }
 
     /// What is to be sent now.
-    pub fn poll(&mut self, snapshot: &Snapshot) -> Vec<Frame> {
+    pub fn poll(&mut self, vehicle: &Vehicle, snapshot: &Snapshot) -> Vec<Frame> {
         let now_s = snapshot.time_s;
         let earned = f64::from(RADIO_BUDGET_BYTES_S) * (now_s - self.last_poll_s).max(0.0);
         self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
         self.last_poll_s = now_s;
         let mut frames = std::mem::take(&mut self.urgent);
         for message_id in self.streams.due(now_s) {
-            let pending: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
+            let pending = self.bytes_of(&frames);
             // The heartbeat is what the ground believes us alive by: it is never held back.
             if self.credit_bytes < pending as f64 && message_id != HEARTBEAT_DATA::ID {
                 continue;
@@ -141,18 +176,22 @@ impl VehicleEndpoint {
             }
             self.streams.on_sent(message_id, now_s);
         }
-        let mut sent: usize = frames.iter().map(|frame| frame.as_bytes().len()).sum();
+        let mut sent = self.bytes_of(&frames);
         // What was asked for comes after what the crew lives by.
         while self.credit_bytes >= sent as f64
-            && let Some(message) = self.requested.pop_front()
+            && let Some(message) = self.next_requested(vehicle)
         {
             let frame = self.encoder.encode(&message);
-            sent += frame.as_bytes().len();
+            sent += frame.as_bytes().len() + self.signature_len;
             frames.push(frame);
         }
         // A flood of commands, each answered, must not silence telemetry for longer than a burst.
         self.credit_bytes = (self.credit_bytes - sent as f64).max(-BURST_BYTES);
         frames
+    }
+
+    fn bytes_of(&self, frames: &[Frame]) -> usize {
+        frames.iter().map(|frame| frame.as_bytes().len() + self.signature_len).sum()
     }
 
     fn on_command(&mut self, request: &CommandRequest, vehicle: &mut Vehicle) {

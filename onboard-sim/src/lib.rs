@@ -4,7 +4,9 @@
 //! * [`scatter`]: seeded differences between the plant and what the controller believes.
 //! * [`vehicle`]: the flight computer: phases, checks, controller ticks, around one plant. Pure.
 //! * [`commands`]: what the radio may ask for and how it is answered. Pure.
-//! * [`telemetry`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's budget. Pure.
+//! * [`telemetry`], [`streams`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's
+//!   budget. Pure.
+//! * [`parameters`]: what a ground may read by name, and the little that it may set. Pure.
 //! * [`landability`]: maps of where a landing exists.
 //! * [`paper`]: the landing paper's experiments, its numbers beside ours.
 //! * [`fly`]: the run loop: clock, links, log.
@@ -15,8 +17,10 @@ pub mod endpoint;
 pub mod fly;
 pub mod landability;
 pub mod paper;
+pub mod parameters;
 pub mod plant;
 pub mod scatter;
 pub mod solve_times;
+pub mod streams;
 pub mod telemetry;
 pub mod vehicle;

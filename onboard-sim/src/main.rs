@@ -1,5 +1,7 @@
 //! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
 
+mod cli;
+
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -12,6 +14,7 @@ use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, 
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
@@ -35,11 +38,19 @@ enum Command {
     Fly(FlyArguments),
     /// Map where a landing inside the touchdown limits exists, over two quantities.
     Landability(LandabilityArguments),
+    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and day.
+    Campaign(cli::campaign::CampaignArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {
         /// As JSON.
         #[arg(long)]
         json: bool,
+    },
+    /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
+    Keygen {
+        /// The file; an existing one is not overwritten.
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
     },
     /// List the built-in profiles, or print one as a file to start from.
     Profiles {
@@ -77,9 +88,13 @@ struct FlyArguments {
     /// Built-in profile or TOML file.
     #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
     profile: String,
-    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT or serial:DEVICE:BAUD; may be given more than once.
+    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once.
     #[arg(long, value_name = "LINK")]
     mavlink: Vec<Endpoint>,
+    /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
     /// Log to write (MCAP). An existing file is not overwritten.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -114,7 +129,12 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
         Command::Landability(arguments) => map_landability(&arguments),
+        Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Paper { json } => repeat_paper(json),
+        Command::Keygen { file } => {
+            KeyFile::create(&file)?;
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -200,6 +220,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         profile,
         auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
         links: arguments.mavlink,
+        key_file: arguments.key,
         recorder: recorder.clone(),
         seed: arguments.seed,
         speed: arguments.speed,
@@ -271,6 +292,9 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
             1e3 * worst_s,
             summary.solve_times.missed()
         )?;
+    }
+    if let Some([median, p99, worst]) = summary.lateness.quantiles() {
+        writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
     match &summary.outcome {
         Outcome::Landed => writeln!(out, "LANDED inside every limit")?,

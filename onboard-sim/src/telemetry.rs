@@ -8,20 +8,24 @@ use flight::dynamics::PlanarState;
 use flight::phase::{Interlocks, Phase};
 use mavlink::MessageData as _;
 use mavlink::types::CharArray;
+#[expect(deprecated, reason = "only [`protocol_version`] uses it")]
+use protocol::dialect::PROTOCOL_VERSION_DATA;
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA, CURRENT_MODE_DATA,
-    EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavLandedState,
-    MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState,
-    MavSysStatusSensor, MavType, MavVtolState, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel,
-    TdInterlock, TdLimit, TdPhase, TdSolverStatus, VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA,
+    CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
+    MavLandedState, MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode,
+    MavState, MavSysStatusSensor, MavSysStatusSensorExtended, MavType, MavVtolState, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck,
+    TdControlLevel, TdInterlock, TdLimit, TdPhase, TdSolverStatus, VFR_HUD_DATA,
 };
 
 use crate::vehicle::{AbortEffect, Snapshot};
 
 /// Points of the predicted path in one message.
 const PATH_POINTS: usize = 12;
+/// Deprecated late in 2025, but still what some clients begin with.
+const PROTOCOL_VERSION_ID: u32 = 300;
 
 /// The message of this id as things stand, or `None` if the vehicle has none or nothing to say in it.
 pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
@@ -34,6 +38,8 @@ pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
         VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
         CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
         AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version()),
+        PROTOCOL_VERSION_ID => Some(protocol_version()),
+        ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
         TD_FLIGHT_STATUS_DATA::ID => Some(flight_status(snapshot)),
         TD_FINS_DATA::ID => Some(fins(snapshot)),
         TD_GIMBAL_DATA::ID => Some(gimbal(snapshot)),
@@ -96,6 +102,10 @@ fn sys_status(snapshot: &Snapshot) -> MavMessage {
         voltage_battery: u16::MAX,
         current_battery: -1,
         battery_remaining: -1,
+        // Empty by name: the generated default of a set of flags is its first flag.
+        onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
+        onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),
+        onboard_control_sensors_health_extended: MavSysStatusSensorExtended::empty(),
         ..SYS_STATUS_DATA::default()
     })
 }
@@ -166,10 +176,36 @@ fn autopilot_version() -> MavMessage {
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION,
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST,
         // Major, minor, patch, then 0 for a development version.
         flight_sw_version: version.take(3).fold(0, |packed, part| (packed << 8) | (part & 0xff)) << 8,
         ..AUTOPILOT_VERSION_DATA::default()
+    })
+}
+
+/// MAVLink 2 and nothing older: 100 times the version.
+#[expect(deprecated, reason = "the standard has dropped it; clients in use still ask")]
+fn protocol_version() -> MavMessage {
+    MavMessage::PROTOCOL_VERSION(PROTOCOL_VERSION_DATA {
+        version: 200,
+        min_version: 200,
+        max_version: 200,
+        ..PROTOCOL_VERSION_DATA::default()
+    })
+}
+
+/// Outputs 1 to 4 the fins (0 closed, 1 fully deployed), 5 and 6 the gimbal (-1 to 1, stop to stop).
+fn actuators(snapshot: &Snapshot) -> MavMessage {
+    let mut actuator = [0.0; 32];
+    for (output, angle_rad) in actuator.iter_mut().zip(snapshot.fins_rad.1) {
+        *output = (angle_rad / core::f64::consts::FRAC_PI_2) as f32;
+    }
+    actuator[4] = (snapshot.gimbal_rad.1 / snapshot.gimbal_limit_rad) as f32;
+    MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA {
+        time_usec: (1e6 * snapshot.time_s) as u64,
+        active: 0b11_1111,
+        actuator,
     })
 }
 

@@ -6,16 +6,25 @@
 //! garbage here, because their one-byte marker and unchecked ids would make a framer wait on noise for bytes that
 //! never come. Wire format: <https://mavlink.io/en/guide/serialization.html>.
 
+mod encoder;
+mod framer;
+
 use mavlink::{MavlinkVersion, Message as _};
 
 use crate::dialect::MavMessage;
 use crate::identity::Address;
 
+pub use encoder::Encoder;
+pub use framer::{Framer, FramerCounters};
+
 const MAGIC: u8 = 0xFD;
 const HEADER_LEN: usize = 10;
 const CRC_LEN: usize = 2;
-const SIGNATURE_LEN: usize = 13;
+/// What a signature adds to a frame: link id, six bytes of timestamp, six of hash.
+pub const SIGNATURE_LEN: usize = 13;
 const INCOMPAT_SIGNED: u8 = 0x01;
+/// Hands a key over in the clear.
+const SETUP_SIGNING_ID: u32 = 256;
 
 /// One whole frame whose CRC is right.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,6 +66,53 @@ impl Frame {
         padded
     }
 
+    /// The checksum.
+    pub fn crc(&self) -> u16 {
+        let at = HEADER_LEN + usize::from(self.bytes[1]);
+        u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]])
+    }
+
+    /// Whether it carries a signature; whether that is right is another matter.
+    pub fn is_signed(&self) -> bool {
+        self.bytes[2] & INCOMPAT_SIGNED != 0
+    }
+
+    /// Link id, timestamp and the hash's first six bytes, as they stand on the wire; `None` if it is unsigned.
+    pub(crate) fn signature(&self) -> Option<&[u8]> {
+        self.is_signed().then(|| &self.bytes[self.bytes.len() - SIGNATURE_LEN..])
+    }
+
+    /// The same frame marked as signed, up to its checksum: the signature is to follow.
+    pub(crate) fn marked_signed(&self) -> Self {
+        self.with_flags(INCOMPAT_SIGNED)
+    }
+
+    /// Appends a signature to a frame that is marked as signed.
+    pub(crate) fn push_signature(&mut self, signature: &[u8; SIGNATURE_LEN]) {
+        self.bytes.extend_from_slice(signature);
+    }
+
+    /// The same message unsigned.
+    #[must_use]
+    pub fn without_signature(&self) -> Self {
+        if self.is_signed() { self.with_flags(0) } else { self.clone() }
+    }
+
+    /// The frame as a log may have it: without its signature, and `None` for a message that carries a key.
+    pub fn for_log(&self) -> Option<Vec<u8>> {
+        (self.message_id() != SETUP_SIGNING_ID).then(|| self.without_signature().bytes)
+    }
+
+    fn with_flags(&self, flags: u8) -> Self {
+        let crc_at = HEADER_LEN + usize::from(self.bytes[1]);
+        let mut bytes = self.bytes[..crc_at].to_vec();
+        bytes[2] = flags;
+        // A frame's id is in the dialect, or it would not be one.
+        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
+        bytes.extend_from_slice(&crc.to_le_bytes());
+        Self { bytes }
+    }
+
     /// The typed message.
     ///
     /// # Errors
@@ -77,134 +133,6 @@ pub struct DecodeError {
     pub reason: String,
 }
 
-/// What a [`Framer`] has seen, kept and thrown away.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct FramerCounters {
-    /// Frames with a right CRC.
-    pub frames: u64,
-    /// Candidates whose CRC was wrong.
-    pub crc_errors: u64,
-    /// Candidates with a message id outside the dialect (their CRC cannot be checked).
-    pub unknown_ids: u64,
-    /// Candidates that ended before their length.
-    pub cut_short: u64,
-    /// Candidates with incompatibility flags that this implementation does not know.
-    pub unknown_flags: u64,
-    /// Bytes that belonged to no frame.
-    pub garbage_bytes: u64,
-}
-
-/// Finds frames in a stream of bytes.
-///
-/// A rejected candidate is retried from its second byte, so that a start marker inside garbage never hides the
-/// frame behind it. A candidate that waits for bytes is rejected too as soon as it is known that none will come:
-/// at the end of a datagram, and when a serial line falls silent. Holds at most one partial frame between calls.
-#[derive(Debug, Default)]
-pub struct Framer {
-    buffer: Vec<u8>,
-    start: usize,
-    /// No byte will follow what is in the buffer.
-    ended: bool,
-    counters: FramerCounters,
-}
-
-impl Framer {
-    /// An empty framer.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Appends bytes of a stream; call [`Framer::next_frame`] until it returns `None` afterwards.
-    pub fn push(&mut self, bytes: &[u8]) {
-        self.buffer.drain(..self.start);
-        self.start = 0;
-        self.buffer.extend_from_slice(bytes);
-        self.ended = false;
-    }
-
-    /// Appends a whole datagram, whose end is the end of its frames; call [`Framer::next_frame`] until it returns
-    /// `None` afterwards.
-    pub fn push_datagram(&mut self, bytes: &[u8]) {
-        self.push(bytes);
-        self.ended = true;
-    }
-
-    /// The stream has fallen silent for longer than a frame may pause: what is incomplete will stay so. Call
-    /// [`Framer::next_frame`] until it returns `None` afterwards: a whole frame may stand behind it.
-    pub fn on_silence(&mut self) {
-        self.ended = true;
-    }
-
-    /// Counters since the start.
-    pub fn counters(&self) -> FramerCounters {
-        self.counters
-    }
-
-    /// The next whole frame, or `None` until more bytes arrive.
-    pub fn next_frame(&mut self) -> Option<Frame> {
-        loop {
-            let candidate = &self.buffer[self.start..];
-            let Some(skipped) = candidate.iter().position(|byte| *byte == MAGIC) else {
-                self.counters.garbage_bytes += candidate.len() as u64;
-                self.start = self.buffer.len();
-                return None;
-            };
-            self.counters.garbage_bytes += skipped as u64;
-            self.start += skipped;
-            match examine(&self.buffer[self.start..]) {
-                Candidate::Incomplete if !self.ended => return None,
-                Candidate::Incomplete => self.counters.cut_short += 1,
-                Candidate::Whole(len) => {
-                    let bytes = self.buffer[self.start..self.start + len].to_vec();
-                    self.start += len;
-                    self.counters.frames += 1;
-                    return Some(Frame { bytes });
-                }
-                Candidate::BadCrc => self.counters.crc_errors += 1,
-                Candidate::UnknownId => self.counters.unknown_ids += 1,
-                Candidate::UnknownFlags => self.counters.unknown_flags += 1,
-            }
-            self.counters.garbage_bytes += 1;
-            self.start += 1;
-        }
-    }
-}
-
-enum Candidate {
-    Incomplete,
-    Whole(usize),
-    BadCrc,
-    UnknownId,
-    UnknownFlags,
-}
-
-/// Looks at bytes that begin with a start marker.
-fn examine(candidate: &[u8]) -> Candidate {
-    let signature_len = match candidate {
-        [_, _, flags, ..] if flags & !INCOMPAT_SIGNED != 0 => return Candidate::UnknownFlags,
-        [_, _, flags, ..] if flags & INCOMPAT_SIGNED != 0 => SIGNATURE_LEN,
-        _ => 0,
-    };
-    if candidate.len() < HEADER_LEN {
-        return Candidate::Incomplete;
-    }
-    let message_id = u32::from_le_bytes([candidate[7], candidate[8], candidate[9], 0]);
-    let Some(crc_extra) = crc_extra(message_id) else {
-        return Candidate::UnknownId;
-    };
-    let crc_at = HEADER_LEN + usize::from(candidate[1]);
-    let len = crc_at + CRC_LEN + signature_len;
-    if candidate.len() < len {
-        return Candidate::Incomplete;
-    }
-    let found = u16::from_le_bytes([candidate[crc_at], candidate[crc_at + 1]]);
-    if mavlink::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
-        Candidate::Whole(len)
-    } else {
-        Candidate::BadCrc
-    }
-}
-
 /// The dialect's CRC seed of a message; `None` for an id outside the dialect.
 ///
 /// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so the seed
@@ -213,61 +141,5 @@ fn crc_extra(message_id: u32) -> Option<u8> {
     match MavMessage::extra_crc(message_id) {
         0 if MavMessage::default_message_from_id(message_id).is_none() => None,
         extra => Some(extra),
-    }
-}
-
-/// Turns one component's messages into MAVLink 2 frames, numbering them.
-#[derive(Debug, Clone)]
-pub struct Encoder {
-    source: Address,
-    sequence: u8,
-}
-
-impl Encoder {
-    /// An encoder for one component; every component numbers its own frames.
-    pub fn new(source: Address) -> Self {
-        Self { source, sequence: 0 }
-    }
-
-    /// The frame of a typed message.
-    pub fn encode(&mut self, message: &MavMessage) -> Frame {
-        let mut payload = [0; 255];
-        let len = message.ser(MavlinkVersion::V2, &mut payload);
-        self.frame(message.message_id(), MavMessage::extra_crc(message.message_id()), &payload[..len])
-    }
-
-    /// The frame of a payload built by hand, for values that the typed messages cannot hold.
-    ///
-    /// Returns `None` for a message id outside the dialect or more than 255 bytes.
-    pub fn encode_payload(&mut self, message_id: u32, payload: &[u8]) -> Option<Frame> {
-        let extra = crc_extra(message_id)?;
-        if payload.len() > 255 {
-            return None;
-        }
-        // MAVLink 2 cuts trailing zeros, but never the first byte.
-        let len = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1).min(payload.len());
-        Some(self.frame(message_id, extra, &payload[..len]))
-    }
-
-    fn frame(&mut self, message_id: u32, crc_extra: u8, payload: &[u8]) -> Frame {
-        let id = message_id.to_le_bytes();
-        let mut bytes = Vec::with_capacity(HEADER_LEN + payload.len() + CRC_LEN);
-        bytes.extend_from_slice(&[
-            MAGIC,
-            payload.len() as u8,
-            0,
-            0,
-            self.sequence,
-            self.source.system_id,
-            self.source.component_id,
-            id[0],
-            id[1],
-            id[2],
-        ]);
-        bytes.extend_from_slice(payload);
-        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra);
-        bytes.extend_from_slice(&crc.to_le_bytes());
-        self.sequence = self.sequence.wrapping_add(1);
-        Frame { bytes }
     }
 }

@@ -1,4 +1,4 @@
-//! Statistics of one link: rates, loss and age, over the last ten seconds.
+//! Statistics of one link: rates, loss and age, over the last ten seconds, in all and for each component.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -12,6 +12,8 @@ pub const WINDOW: Duration = Duration::from_secs(10);
 const REORDER: u8 = 32;
 /// Sources remembered at most; a forged flood of ids cannot grow memory.
 const MAX_SOURCES: usize = 64;
+/// Messages whose age is remembered at most.
+const MAX_MESSAGES: usize = 256;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Bucket {
@@ -22,17 +24,70 @@ struct Bucket {
     lost: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+/// The last [`WINDOW`], second by second.
+#[derive(Debug, Clone, Default)]
+struct Buckets(VecDeque<Bucket>);
+
+impl Buckets {
+    fn at(&mut self, now: Duration) -> &mut Bucket {
+        let second = now.as_secs();
+        if self.0.back().is_none_or(|bucket| bucket.second < second) {
+            self.0.push_back(Bucket { second, ..Bucket::default() });
+        }
+        while self.0.len() > WINDOW.as_secs() as usize {
+            self.0.pop_front();
+        }
+        let last = self.0.len() - 1;
+        &mut self.0[last]
+    }
+
+    fn sum(&self, now: Duration) -> Bucket {
+        let oldest = oldest_second(now);
+        let mut sum = Bucket::default();
+        for bucket in self.0.iter().filter(|bucket| bucket.second >= oldest) {
+            sum.rx_bytes += bucket.rx_bytes;
+            sum.tx_bytes += bucket.tx_bytes;
+            sum.received += bucket.received;
+            sum.lost += bucket.lost;
+        }
+        sum
+    }
+
+    fn on_frame(&mut self, lost: u64, late: bool, now: Duration) {
+        let bucket = self.at(now);
+        bucket.received += 1;
+        bucket.lost += lost;
+        if late {
+            bucket.lost = bucket.lost.saturating_sub(1);
+        }
+    }
+}
+
+fn oldest_second(now: Duration) -> u64 {
+    now.as_secs().saturating_sub(WINDOW.as_secs() - 1)
+}
+
+impl Bucket {
+    fn loss(&self) -> f64 {
+        let expected = self.received + self.lost;
+        if expected == 0 { 0.0 } else { self.lost as f64 / expected as f64 }
+    }
+}
+
+#[derive(Debug, Clone)]
 struct Source {
     last_sequence: u8,
+    first_seen: Duration,
     last_seen: Duration,
+    buckets: Buckets,
 }
 
 /// What a link carries, seen from one end.
 #[derive(Debug, Default)]
 pub struct LinkStats {
     sources: BTreeMap<Address, Source>,
-    buckets: VecDeque<Bucket>,
+    messages: BTreeMap<(Address, u32), Duration>,
+    buckets: Buckets,
     first_activity: Option<Duration>,
 }
 
@@ -46,6 +101,19 @@ pub struct LinkFigures {
     /// Frames per second received.
     pub rx_frames_s: f64,
     /// Share of frames lost, 0 to 1, by gaps in the sequence numbers.
+    pub loss: f64,
+}
+
+/// One component's figures at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SourceFigures {
+    /// The component.
+    pub source: Address,
+    /// Since its last frame.
+    pub age: Duration,
+    /// Its frames per second.
+    pub rx_frames_s: f64,
+    /// Share of its frames that were lost, 0 to 1.
     pub loss: f64,
 }
 
@@ -68,24 +136,31 @@ impl LinkStats {
     /// A frame that arrived. One that comes late is taken off the loss that its absence was; a jump backwards by
     /// more than a few dozen is a restarted sender.
     pub fn on_frame(&mut self, frame: &Frame, now: Duration) {
-        let (source, sequence) = (frame.source(), frame.sequence());
-        let known = self.sources.get(&source).copied();
-        let ahead = known.map_or(1, |known| sequence.wrapping_sub(known.last_sequence));
+        let (address, sequence) = (frame.source(), frame.sequence());
+        let known = self.sources.get(&address).map(|known| known.last_sequence);
+        let ahead = known.map_or(1, |last| sequence.wrapping_sub(last));
         let late = ahead == 0 || ahead > u8::MAX - REORDER;
         let (lost, last_sequence) = match known {
-            Some(known) if late => (0, known.last_sequence),
+            Some(last) if late => (0, last),
             _ if ahead < 128 => (u64::from(ahead) - 1, sequence),
             _ => (0, sequence),
         };
         if known.is_some() || self.sources.len() < MAX_SOURCES {
-            self.sources.insert(source, Source { last_sequence, last_seen: now });
+            let source = self.sources.entry(address).or_insert_with(|| Source {
+                last_sequence,
+                first_seen: now,
+                last_seen: now,
+                buckets: Buckets::default(),
+            });
+            (source.last_sequence, source.last_seen) = (last_sequence, now);
+            source.buckets.on_frame(lost, late, now);
         }
-        let bucket = self.bucket(now);
-        bucket.received += 1;
-        bucket.lost += lost;
-        if late {
-            bucket.lost = bucket.lost.saturating_sub(1);
+        let message = (address, frame.message_id());
+        if self.messages.len() < MAX_MESSAGES || self.messages.contains_key(&message) {
+            self.messages.insert(message, now);
         }
+        self.first_activity.get_or_insert(now);
+        self.buckets.on_frame(lost, late, now);
     }
 
     /// Time since the last frame of this component; `None` if it was never heard.
@@ -93,37 +168,45 @@ impl LinkStats {
         self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
     }
 
+    /// Time since the last frame of this message from this component; `None` if it was never heard.
+    pub fn message_age(&self, source: Address, message_id: u32, now: Duration) -> Option<Duration> {
+        self.messages.get(&(source, message_id)).map(|at| now.saturating_sub(*at))
+    }
+
+    /// Every component that was heard, with its own rate and loss.
+    pub fn sources(&self, now: Duration) -> Vec<SourceFigures> {
+        let figures = |(address, source): (&Address, &Source)| {
+            let sum = source.buckets.sum(now);
+            SourceFigures {
+                source: *address,
+                age: now.saturating_sub(source.last_seen),
+                rx_frames_s: sum.received as f64 / span_s(source.first_seen, now),
+                loss: sum.loss(),
+            }
+        };
+        self.sources.iter().map(figures).collect()
+    }
+
     /// The figures over the last [`WINDOW`], or over the link's life while it is younger.
     pub fn figures(&self, now: Duration) -> LinkFigures {
-        let oldest = now.as_secs().saturating_sub(WINDOW.as_secs() - 1);
-        let mut sum = Bucket::default();
-        for bucket in self.buckets.iter().filter(|bucket| bucket.second >= oldest) {
-            sum.rx_bytes += bucket.rx_bytes;
-            sum.tx_bytes += bucket.tx_bytes;
-            sum.received += bucket.received;
-            sum.lost += bucket.lost;
-        }
-        let window_start = Duration::from_secs(oldest).max(self.first_activity.unwrap_or(now));
-        let span_s = now.saturating_sub(window_start).as_secs_f64().max(1.0);
-        let expected = sum.received + sum.lost;
+        let sum = self.buckets.sum(now);
+        let span_s = span_s(self.first_activity.unwrap_or(now), now);
         LinkFigures {
             rx_bytes_s: sum.rx_bytes as f64 / span_s,
             tx_bytes_s: sum.tx_bytes as f64 / span_s,
             rx_frames_s: sum.received as f64 / span_s,
-            loss: if expected == 0 { 0.0 } else { sum.lost as f64 / expected as f64 },
+            loss: sum.loss(),
         }
     }
 
     fn bucket(&mut self, now: Duration) -> &mut Bucket {
         self.first_activity.get_or_insert(now);
-        let second = now.as_secs();
-        if self.buckets.back().is_none_or(|bucket| bucket.second < second) {
-            self.buckets.push_back(Bucket { second, ..Bucket::default() });
-        }
-        while self.buckets.len() > WINDOW.as_secs() as usize {
-            self.buckets.pop_front();
-        }
-        let last = self.buckets.len() - 1;
-        &mut self.buckets[last]
+        self.buckets.at(now)
     }
+}
+
+/// The part of the window in which there was something to count, s.
+fn span_s(since: Duration, now: Duration) -> f64 {
+    let window_start = Duration::from_secs(oldest_second(now)).max(since);
+    now.saturating_sub(window_start).as_secs_f64().max(1.0)
 }

@@ -164,6 +164,26 @@ fn loss_and_rate_are_those_of_the_last_ten_seconds() {
 }
 
 #[test]
+fn each_component_has_its_own_loss_and_each_message_its_age() {
+    let mut stats = LinkStats::new();
+    let (vehicle, ground) =
+        (heartbeats(&mut Encoder::new(VEHICLE), 100), heartbeats(&mut Encoder::new(GROUND), 100));
+    for (k, (of_vehicle, of_ground)) in vehicle.iter().zip(&ground).enumerate() {
+        let now = ms(100 * k as u64);
+        if k % 4 != 0 {
+            stats.on_frame(of_vehicle, now);
+        }
+        stats.on_frame(of_ground, now);
+    }
+    let sources = stats.sources(ms(9_900));
+    assert_eq!(sources.iter().map(|figures| figures.source).collect::<Vec<_>>(), [VEHICLE, GROUND]);
+    assert!((sources[0].loss - 0.25).abs() < 0.02 && sources[1].loss.abs() < f64::EPSILON, "{sources:?}");
+    assert!((sources[1].rx_frames_s - 10.0).abs() < 0.5, "{sources:?}");
+    assert_eq!(stats.message_age(VEHICLE, 0, ms(10_900)), Some(ms(1_000)));
+    assert_eq!(stats.message_age(VEHICLE, 1, ms(10_900)), None);
+}
+
+#[test]
 fn a_frame_that_was_overtaken_is_not_lost() {
     let frames = heartbeats(&mut Encoder::new(VEHICLE), 20);
     let mut stats = LinkStats::new();

@@ -3,13 +3,15 @@
 //! Waiting is always for something that happens, with a limit; nothing here sleeps and hopes.
 
 mod bare_ground;
+mod clients;
 mod log_file;
 mod process;
 mod programs;
 mod serial_line;
 
 pub use bare_ground::BareGround;
-pub use log_file::{rewrite_log, ticks_of};
+pub use clients::Clients;
+pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
 pub use process::{Ended, Running};
 pub use programs::{Program, program};

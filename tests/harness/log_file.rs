@@ -18,6 +18,24 @@ pub fn ticks_of(path: &Path) -> Vec<v1::ControllerTick> {
     read(path).1
 }
 
+/// The raw frames of a log's direction (`rx` or `tx`), in file order.
+///
+/// # Panics
+/// The log cannot be read.
+pub fn raw_frames_of(path: &Path, direction: &str) -> Vec<Vec<u8>> {
+    let topic = format!("/mavlink/{direction}/raw");
+    let mut reader = LogReader::new(BufReader::new(File::open(path).expect("the log")));
+    let mut frames = Vec::new();
+    while let Some(item) = reader.next_item().expect("readable") {
+        if let LogItem::Message { channel_id, data, .. } = item
+            && reader.channel(channel_id).is_some_and(|channel| channel.topic == topic)
+        {
+            frames.push(data);
+        }
+    }
+    frames
+}
+
 /// Writes the ticks and the profile of a log into a new one, after `change`.
 ///
 /// # Panics

@@ -1,7 +1,7 @@
 //! A running program whose output is read as it comes and which dies with its test.
 
 use std::io::{BufRead as _, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -32,8 +32,20 @@ impl Running {
     /// # Panics
     /// It cannot be started.
     pub fn start(command: &mut Command) -> Self {
+        Self::spawn(command.stdin(Stdio::null()))
+    }
+
+    /// Starts a program that is typed to. Its output is no terminal.
+    ///
+    /// # Panics
+    /// It cannot be started.
+    pub fn start_with_input(command: &mut Command) -> (ChildStdin, Self) {
+        let mut running = Self::spawn(command.stdin(Stdio::piped()));
+        (running.child.stdin.take().expect("piped"), running)
+    }
+
+    fn spawn(command: &mut Command) -> Self {
         let mut child = command
-            .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -94,6 +106,29 @@ impl Running {
         }
         let status = self.child.wait().expect("it ended");
         Ended { code: status.code(), output: self.seen.join("\n") }
+    }
+
+    /// Processor time that it has used so far.
+    ///
+    /// # Panics
+    /// The system does not say.
+    pub fn processor_time(&self) -> Duration {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).expect("it runs");
+        // The fields behind the name, which may hold spaces: user and system time are the 14th and 15th.
+        let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+        let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
+        // 100 a second on every Linux.
+        Duration::from_millis(10 * clock_ticks)
+    }
+
+    /// Resident memory, bytes.
+    ///
+    /// # Panics
+    /// The system does not say.
+    pub fn memory_bytes(&self) -> u64 {
+        let statm = std::fs::read_to_string(format!("/proc/{}/statm", self.child.id())).expect("it runs");
+        let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
+        pages * 4096
     }
 
     /// Sends a signal.

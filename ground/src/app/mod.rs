@@ -18,6 +18,7 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
@@ -80,9 +81,9 @@ async fn station_runs(cli: &Cli) -> bool {
 
 async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let clock = Clock::start();
-    let demo_options = match cli.connect {
-        None => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
-        Some(_) => None,
+    let demo_options = match &cli.connect[..] {
+        [] => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
+        _ => None,
     };
     let header = match &demo_options {
         Some(options) => options.log_header(clock.start_unix_ns()),
@@ -93,25 +94,35 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         },
     };
     // The demonstration takes any free port, so that it runs beside a real ground station.
-    let endpoint = cli.connect.clone().unwrap_or_else(|| Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+    let mut endpoints = cli.connect.clone();
+    if endpoints.is_empty() {
+        endpoints.push(Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+    }
+    let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
     let tlog = cli.tlog.as_ref();
     let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
     let recorder = log::open(cli.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let mut wire = Wire::open(endpoint, recorder.clone(), log_time.clone()).await?;
+    let mut wire = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await?;
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
-            Some(start_demo(options, wire.endpoint(), recorder.clone(), vehicle_clock)?)
+            Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
         }
         _ => None,
     };
     let is_daemon = matches!(cli.command, Some(Command::Daemon));
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
+    let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
     let mut model = Model::new(Settings {
-        link_name: wire.endpoint().to_string(),
-        link_capacity_bytes_s: wire.endpoint().capacity_bytes_s(),
+        link_name: links.join(" and "),
+        // Of several links, each has its own.
+        link_capacity_bytes_s: wire
+            .endpoints()
+            .next()
+            .filter(|_| links.len() == 1)
+            .and_then(Endpoint::capacity_bytes_s),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         role: Role::Station,
@@ -137,6 +148,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
     let alarm_command = config.alarm_command.clone();
     let mut station = Station { clock, log_time, recorder, demo, output, socket, server, alarm_command };
     let ran = station.run(&mut model, &mut wire).await;
+    wire.remember();
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
@@ -147,12 +159,12 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
 
 fn start_demo(
     options: &DemoOptions,
-    listening: &Endpoint,
+    listening: Option<&Endpoint>,
     recorder: Option<Recorder>,
     log_clock: LogClock,
 ) -> anyhow::Result<Demo> {
-    let Endpoint::UdpIn(address) = listening else {
-        anyhow::bail!("the demonstration listens on UDP, not on {listening}");
+    let Some(Endpoint::UdpIn(address)) = listening else {
+        anyhow::bail!("the demonstration listens on UDP, not on {listening:?}");
     };
     Demo::start(options, Endpoint::UdpOut(address.clone()), recorder, log_clock)
         .context("starting the simulator")

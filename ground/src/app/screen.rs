@@ -87,7 +87,7 @@ impl Screen {
         let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
         match msg {
             // Time and what was sent change nothing that must be seen before the next second.
-            Msg::Tick | Msg::Sent { .. } => {}
+            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
             Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
                 self.mark_changed();
             }

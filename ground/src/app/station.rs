@@ -61,7 +61,9 @@ impl Station {
                 received = wire.receive() => wire.take(received),
             };
             let mut quit = false;
-            for msg in msgs {
+            // The links' state is told with the clock, so that it is never older than a tick.
+            let report = msgs.contains(&Msg::Tick).then(|| wire.report());
+            for msg in report.into_iter().chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
                         self.lose_screen(model).await;

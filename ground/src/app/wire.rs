@@ -1,119 +1,216 @@
-//! The link: bytes to messages and back, every frame into the log.
+//! The links: bytes to messages and back, every frame into the log.
+
+use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::dialect::MavMessage;
-use protocol::frame::{Encoder, Framer};
+use protocol::frame::{Encoder, Frame, FramerCounters};
+use protocol::hub::{Hub, HubLink, News, Received};
 use protocol::identity::GROUND;
+use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::transport::{Endpoint, Received, Transport, TransportSender};
+use protocol::signing::{Signing, stamp_of};
+use protocol::transport::{Endpoint, Transport, TransportSender};
 
-use super::clock::LogTime;
+use super::clock::{Clock, LogTime};
+use crate::model::link::LinkReport;
 use crate::update::Msg;
 
-/// An open link with its framing.
+/// Timestamps are remembered this often, in stamps (10 us).
+const REMEMBER_EVERY: u64 = 100_000;
+
+/// The open links to one vehicle.
 pub struct Wire {
-    transport: Transport,
-    sender: TransportSender,
-    framer: Framer,
+    open: Vec<OpenLink>,
+    hub: Hub,
+    key_file: Option<KeyFile>,
+    remembered_at: u64,
     encoder: Encoder,
+    clock: Clock,
     recorder: Option<Recorder>,
     log_time: LogTime,
+}
+
+struct OpenLink {
+    transport: Transport,
+    sender: TransportSender,
     name: String,
     ended: bool,
 }
 
 impl Wire {
-    /// Opens a link.
+    /// Opens the links.
     ///
     /// # Errors
-    /// A UDP address cannot be bound or resolved.
+    /// An address cannot be bound or resolved.
     pub async fn open(
-        endpoint: Endpoint,
+        endpoints: Vec<Endpoint>,
+        key: Option<(KeyFile, Signing)>,
+        clock: Clock,
         recorder: Option<Recorder>,
         log_time: LogTime,
     ) -> anyhow::Result<Self> {
-        let transport = Transport::open(endpoint.clone())
-            .await
-            .with_context(|| format!("opening the link {endpoint}"))?;
+        let mut open = Vec::new();
+        for endpoint in endpoints {
+            let transport = Transport::open(endpoint.clone())
+                .await
+                .with_context(|| format!("opening the link {endpoint}"))?;
+            let name = transport.endpoint().to_string();
+            open.push(OpenLink { sender: transport.sender(), transport, name, ended: false });
+        }
+        let (key_file, signing) = key.unzip();
         Ok(Self {
-            sender: transport.sender(),
-            name: transport.endpoint().to_string(),
-            transport,
-            framer: Framer::new(),
+            hub: Hub::new(open.len(), signing),
+            open,
+            key_file,
+            remembered_at: 0,
             encoder: Encoder::new(GROUND),
+            clock,
             recorder,
             log_time,
-            ended: false,
         })
     }
 
-    /// Where it leads.
-    pub fn endpoint(&self) -> &Endpoint {
-        self.transport.endpoint()
+    /// Where they lead.
+    pub fn endpoints(&self) -> impl Iterator<Item = &Endpoint> {
+        self.open.iter().map(|link| link.transport.endpoint())
     }
 
-    /// The next thing the link brings.
-    pub async fn receive(&mut self) -> Received {
-        if !self.ended {
-            if let Some(received) = self.transport.receive().await {
-                return received;
+    /// The next thing that a link brings, with the link's number.
+    pub async fn receive(&mut self) -> (usize, Received) {
+        std::future::poll_fn(|context| {
+            for (number, link) in self.open.iter_mut().enumerate().filter(|(_, link)| !link.ended) {
+                match link.transport.poll_receive(context) {
+                    std::task::Poll::Pending => {}
+                    std::task::Poll::Ready(Some(received)) => {
+                        return std::task::Poll::Ready((number, received));
+                    }
+                    std::task::Poll::Ready(None) => {
+                        link.ended = true;
+                        let why = format!("{}: the link has ended", link.name);
+                        return std::task::Poll::Ready((number, Received::Down(why)));
+                    }
+                }
             }
-            self.ended = true;
-            return Received::Down(format!("{}: the link has ended", self.name));
-        }
-        std::future::pending().await
+            std::task::Poll::Pending
+        })
+        .await
     }
 
-    /// What was received, and whatever waits behind it, as messages.
-    pub fn take(&mut self, first: Received) -> Vec<Msg> {
+    /// What was received, and whatever waits behind it on any link, as messages.
+    pub fn take(&mut self, (number, first): (usize, Received)) -> Vec<Msg> {
         let mut msgs = Vec::new();
-        let mut next = Some(first);
-        while let Some(received) = next {
-            match received {
-                Received::Datagram(bytes) => {
-                    self.framer.push_datagram(&bytes);
-                    self.take_frames(bytes.len(), &mut msgs);
-                }
-                Received::Stream(bytes) => {
-                    self.framer.push(&bytes);
-                    self.take_frames(bytes.len(), &mut msgs);
-                }
-                Received::Silence => {
-                    self.framer.on_silence();
-                    self.take_frames(0, &mut msgs);
-                }
-                Received::Up(peer) => msgs.push(Msg::LinkUp(peer)),
-                Received::Down(why) => msgs.push(Msg::LinkDown(why)),
+        self.take_one(number, first, &mut msgs);
+        for number in 0..self.open.len() {
+            while let Some(received) = self.open[number].transport.try_receive() {
+                self.take_one(number, received, &mut msgs);
             }
-            next = self.transport.try_receive();
         }
         msgs
     }
 
-    fn take_frames(&mut self, bytes: usize, msgs: &mut Vec<Msg>) {
-        while let Some(frame) = self.framer.next_frame() {
-            self.record(Direction::Rx, frame.as_bytes());
-            msgs.push(Msg::Frame(frame));
+    fn take_one(&mut self, number: usize, received: Received, msgs: &mut Vec<Msg>) {
+        let bytes = match &received {
+            Received::Datagram(bytes) | Received::Stream(_, bytes) => bytes.len(),
+            _ => 0,
+        };
+        let name = self.open[number].name.clone();
+        for news in self.hub.take(number, received, self.clock.now(), self.unix_stamp()) {
+            match news {
+                News::Frame(frame) => {
+                    self.record(Direction::Rx, &name, &frame);
+                    if self.open.len() > 1 {
+                        msgs.push(Msg::HeardOver(number));
+                    }
+                    msgs.push(Msg::Frame(frame));
+                }
+                News::Copy(frame) => self.record(Direction::Rx, &name, &frame),
+                // Counted, and shown in the link's report.
+                News::Rejected(..) => {}
+                News::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
+                News::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
+                    msgs.push(Msg::LinkDown(why));
+                }
+                News::Down(why) => msgs.push(Msg::OneLinkDown(why)),
+            }
         }
-        msgs.push(Msg::Received { bytes, framing: self.framer.counters() });
+        msgs.push(Msg::Received { bytes, framing: self.framing() });
     }
 
-    /// Sends a message; returns what is to be counted.
+    /// The peer, with the link's name where there is more than one.
+    fn named(&self, name: &str, peer: String) -> String {
+        if self.open.len() > 1 { format!("{name} with {peer}") } else { peer }
+    }
+
+    fn framing(&self) -> FramerCounters {
+        self.hub.links().iter().fold(FramerCounters::default(), |mut sum, link| {
+            sum += link.framing();
+            sum
+        })
+    }
+
+    /// Sends a message over every link; returns what is to be counted.
     pub fn send(&mut self, message: &MavMessage) -> Msg {
         let frame = self.encoder.encode(message);
-        self.record(Direction::Tx, frame.as_bytes());
-        let bytes = frame.as_bytes().to_vec();
-        let count = bytes.len();
-        self.sender.send(bytes);
-        Msg::Sent { bytes: count, drops: self.sender.dropped() }
+        let (now, stamp) = (self.clock.now(), self.unix_stamp());
+        let mut sent = 0;
+        for number in 0..self.open.len() {
+            let bytes = self.hub.bytes_for(number, &frame, stamp);
+            let count = bytes.len();
+            self.record(Direction::Tx, &self.open[number].name, &frame);
+            if self.open[number].sender.send(bytes) {
+                self.hub.on_sent(number, count, now);
+            }
+            sent += count;
+        }
+        Msg::Sent { bytes: sent, drops: self.open.iter().map(|link| link.sender.dropped()).sum() }
     }
 
-    fn record(&self, direction: Direction, bytes: &[u8]) {
-        if let Some(recorder) = &self.recorder {
-            let frame =
-                RawFrame { direction, endpoint: "ground", link: self.name.clone(), bytes: bytes.to_vec() };
+    /// How each link does. Also remembers timestamps, now and then.
+    pub fn report(&mut self) -> Msg {
+        let now = self.clock.now();
+        let stamp = self.unix_stamp();
+        if stamp.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
+            self.remembered_at = stamp;
+            self.remember();
+        }
+        let links = self.hub.links().iter().zip(&self.open);
+        Msg::Links {
+            links: links.map(|(link, open)| report_of(link, open, now)).collect(),
+            signing: self.hub.signing(),
+        }
+    }
+
+    /// Remembers timestamps for the next run.
+    pub fn remember(&mut self) {
+        if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory()) {
+            // A full disk shows by the log; the next run then begins by the clock.
+            let _ = file.remember(memory);
+        }
+    }
+
+    fn unix_stamp(&self) -> u64 {
+        stamp_of(Duration::from_nanos(self.clock.start_unix_ns()) + self.clock.now())
+    }
+
+    fn record(&self, direction: Direction, link: &str, frame: &Frame) {
+        if let Some(recorder) = &self.recorder
+            && let Some(bytes) = frame.for_log()
+        {
+            let frame = RawFrame { direction, endpoint: "ground", link: link.to_owned(), bytes };
             recorder.try_record(Record::RawFrame(frame), self.log_time.now_ns());
         }
+    }
+}
+
+fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
+    LinkReport {
+        name: open.name.clone(),
+        figures: link.stats().figures(now),
+        sources: link.stats().sources(now),
+        capacity_bytes_s: open.transport.endpoint().capacity_bytes_s(),
+        copies: link.copies(),
+        trouble: link.trouble().map(str::to_owned),
     }
 }

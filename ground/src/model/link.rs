@@ -2,14 +2,19 @@
 
 use std::time::Duration;
 
+use protocol::dialect::RADIO_STATUS_DATA;
 use protocol::frame::FramerCounters;
 use protocol::identity::Address;
-use protocol::link::LinkStats;
+use protocol::link::{LinkFigures, LinkStats, SourceFigures};
+use protocol::signing::SigningCounters;
 
 /// Without a heartbeat for this long the link is doubtful.
 pub const AMBER_AFTER: Duration = Duration::from_millis(1_500);
 /// Without a heartbeat for this long the link is lost.
 pub const RED_AFTER: Duration = Duration::from_millis(3_500);
+
+/// What a radio said of itself is shown for this long.
+pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
 /// Whether the vehicle is heard. Only its heartbeat counts: a radio that reports about itself is not
 /// the vehicle.
@@ -32,11 +37,36 @@ impl LinkState {
     }
 }
 
-/// The link.
+/// How one of several links does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkReport {
+    /// Its name, as in `udpin:0.0.0.0:14550`.
+    pub name: String,
+    /// What it carries.
+    pub figures: LinkFigures,
+    /// What it carries of each component.
+    pub sources: Vec<SourceFigures>,
+    /// What it can carry, bytes per second; `None` where nothing is known to bound it.
+    pub capacity_bytes_s: Option<u32>,
+    /// Frames that had come over another link already.
+    pub copies: u64,
+    /// Why it does not work, if it does not.
+    pub trouble: Option<String>,
+}
+
+/// The link: one or several that lead to the same vehicle.
 #[derive(Debug, Default)]
 pub struct Link {
-    /// Rates, loss and age.
+    /// Rates, loss and age over all links: loss is what came over none.
     pub stats: LinkStats,
+    /// Each link by itself, where there are several or frames are signed.
+    pub reports: Vec<LinkReport>,
+    /// What signatures let in and kept out; `None` without a key.
+    pub signing: Option<SigningCounters>,
+    /// What a radio last said about itself, and when. It says nothing about the vehicle.
+    pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
+    /// The link that the last frame came over, where there are several.
+    pub(crate) heard_over: Option<usize>,
     /// What framing threw away.
     pub framing: FramerCounters,
     /// Frames with a right checksum whose fields could not be understood.
@@ -57,6 +87,12 @@ pub struct Link {
 }
 
 impl Link {
+    /// The name of the link that the last frame came over, where there are several.
+    pub fn heard_over(&self) -> Option<&str> {
+        let report = self.heard_over.and_then(|number| self.reports.get(number));
+        report.map(|report| report.name.as_str())
+    }
+
     /// Whether the vehicle is heard.
     pub fn state(&self, now: Duration) -> LinkState {
         let Some(at) = self.heartbeat_at else { return LinkState::NeverHeard };

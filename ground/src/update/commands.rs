@@ -91,6 +91,8 @@ fn track_of(model: &mut Model, command: u16) -> Option<&mut Track> {
 }
 
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
+    // Where there are several links, the operator is told which one carried the answer.
+    let over = model.link.heard_over().map_or_else(String::new, |link| format!(", over {link}"));
     let track = match event {
         CommandEvent::Sent { command, .. }
         | CommandEvent::InProgress { command, .. }
@@ -119,9 +121,9 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
             if track.accepted() {
-                ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}"))
+                ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}{over}"))
             } else {
-                ("refused", EventLevel::Error, format!("{name} REFUSED{late}: {words}"))
+                ("refused", EventLevel::Error, format!("{name} REFUSED{late}: {words}{over}"))
             }
         }
         CommandEvent::TimedOut { attempts, .. } => {

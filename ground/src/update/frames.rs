@@ -14,6 +14,7 @@ use crate::model::events::Speaker;
 use crate::model::{Model, telemetry};
 
 const HEARTBEAT_ID: u32 = 0;
+const RADIO_STATUS_ID: u32 = 109;
 /// A second ground with our own ids is named at most this often.
 const TWIN_SAID_EVERY: Duration = Duration::from_secs(10);
 /// Strangers remembered, so that each is named once.
@@ -21,7 +22,11 @@ const STRANGERS_MAX: usize = 8;
 
 pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.stats.on_frame(frame, now);
-    if frame.source() == GROUND {
+    if frame.message_id() == RADIO_STATUS_ID {
+        if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
+            model.link.radio = Some((radio, now));
+        }
+    } else if frame.source() == GROUND {
         note_twin(model, now);
     } else if frame.source() == VEHICLE {
         on_vehicle_frame(model, frame, now);

@@ -15,11 +15,13 @@ use std::time::Duration;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Frame, FramerCounters};
 use protocol::log::record::{Event, EventLevel, Record};
+use protocol::signing::SigningCounters;
 
 use crate::attach::codec::Asked;
 use crate::key::Key;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
+use crate::model::link::LinkReport;
 use crate::model::{LogHealth, Model};
 
 /// Something that reached the ground.
@@ -41,6 +43,15 @@ pub enum Msg {
     ScreenTick,
     /// The terminal is gone; the station goes on without it.
     ScreenGone,
+    /// The frame that follows came over this link; told where there are several.
+    HeardOver(usize),
+    /// How each link does, several times a second.
+    Links {
+        /// In the order of their numbers.
+        links: Vec<LinkReport>,
+        /// What signatures let in and kept out; `None` without a key.
+        signing: Option<SigningCounters>,
+    },
     /// Bytes arrived, whole frames or not.
     Received {
         /// How many.
@@ -59,6 +70,8 @@ pub enum Msg {
     LinkUp(String),
     /// The transport does not work; why.
     LinkDown(String),
+    /// One of several links does not work; why.
+    OneLinkDown(String),
     /// How the log does.
     Log(LogHealth),
     /// The embedded simulator ended by itself; why, if it failed.
@@ -134,6 +147,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.warn(now, format!("link down: {why}"));
             model.link.trouble = Some(why);
         }
+        Msg::OneLinkDown(why) => {
+            model.warn(now, format!("one link down: {}", protocol::text::printable(why.as_bytes())));
+        }
+        Msg::HeardOver(number) => model.link.heard_over = Some(number),
+        Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
         Msg::SimulatorEnded(failure) => {
             if let Some(why) = failure {
@@ -149,6 +167,21 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     }
     alarms::watch(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<SigningCounters>, now: Duration) {
+    let rejected = |counters: Option<SigningCounters>| counters.map_or(0, |counters| counters.rejected());
+    if rejected(signing) > 0 && rejected(model.link.signing) == 0 {
+        let what = signing.unwrap_or_default();
+        model.warn(
+            now,
+            format!(
+                "frames refused: {} unsigned, {} wrongly signed, {} replayed, {} too old",
+                what.unsigned, what.wrong, what.replayed, what.too_old
+            ),
+        );
+    }
+    (model.link.reports, model.link.signing) = (links, signing);
 }
 
 fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {

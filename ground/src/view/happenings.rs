@@ -7,6 +7,7 @@ use ratatui::text::{Line, Span};
 
 use super::theme::{Role, Theme};
 use crate::model::Model;
+use crate::model::link::RADIO_FRESH;
 
 /// Columns before an event's text: time, speaker, mark.
 const BEFORE_TEXT: usize = 18;
@@ -79,13 +80,18 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
     if let Some(why) = &model.link.trouble {
         return Line::styled(format!(" LINK DOWN {why}"), theme.style(Role::Alarm));
     }
+    if model.link.reports.len() > 1 {
+        return several_links(model, theme, now, columns);
+    }
     let figures = model.link.stats.figures(now);
     let round_trip = match model.link.round_trip {
         Some(round_trip) => format!("{:.0} ms", round_trip.as_secs_f64() * 1_000.0),
         None => "--".to_owned(),
     };
     let loss_role = if figures.loss > 0.05 { Role::Caution } else { Role::Plain };
-    let rejected = model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable;
+    let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
+    let rejected =
+        model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
     let span = |text: String, role: Role| Span::styled(text, theme.style(role));
     let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
     let mut spans = vec![
@@ -102,12 +108,67 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), Role::Caution));
     let round_trip = span(format!("  rtt {round_trip}"), Role::Plain);
     let sent = span(format!("  tx {:.0} B/s", figures.tx_bytes_s), Role::Plain);
-    for more in refused.into_iter().chain([round_trip, sent]) {
+    let radio = radio(model, now).map(|words| span(words, Role::Plain));
+    for more in refused.into_iter().chain([round_trip]).chain(radio).chain([sent]) {
         used += more.width();
         if used > columns {
             break;
         }
         spans.push(more);
+    }
+    Line::from(spans)
+}
+
+/// What a radio says of itself: signal and noise, here and at the other end, in its own units.
+fn radio(model: &Model, now: Duration) -> Option<String> {
+    let (radio, at) = model.link.radio.as_ref()?;
+    let fresh = now.saturating_sub(*at) < RADIO_FRESH;
+    fresh.then(|| {
+        let [rssi, remote, noise, remote_noise] =
+            [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(known);
+        format!("  rssi {rssi}/{remote} noise {noise}/{remote_noise}")
+    })
+}
+
+/// 255 says that it is not known.
+fn known(value: u8) -> String {
+    if value == u8::MAX { "--".to_owned() } else { value.to_string() }
+}
+
+/// Several links to one vehicle: what is left of the loss, and each link by itself as far as there is room.
+fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+    let all = model.link.stats.figures(now);
+    let role = |loss: f64| if loss > 0.05 { Role::Caution } else { Role::Plain };
+    let mut spans = vec![
+        Span::styled(
+            format!(" {} links, loss {:.1} %  ", model.link.reports.len(), all.loss * 100.0),
+            theme.style(role(all.loss)),
+        ),
+        log(model, theme),
+    ];
+    if let Some(refused) = model.link.signing.map(|signing| signing.rejected()).filter(|refused| *refused > 0)
+    {
+        spans.push(Span::styled(format!("  refused {refused}"), theme.style(Role::Caution)));
+    }
+    let mut used: usize = spans.iter().map(Span::width).sum();
+    for report in &model.link.reports {
+        let kind = report.name.split(':').next().unwrap_or_default();
+        let span = if report.trouble.is_some() {
+            Span::styled(format!("  {kind} DOWN"), theme.style(Role::Alarm))
+        } else {
+            let (rate, loss) = (report.figures.rx_bytes_s, report.figures.loss);
+            let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+            let words = format!("  {kind} {rate:.0}{capacity} B/s {:.1} %", loss * 100.0);
+            Span::styled(words, theme.style(role(loss)))
+        };
+        used += span.width();
+        if used > columns {
+            break;
+        }
+        spans.push(span);
+    }
+    if let Some(words) = radio(model, now).filter(|words| used + words.len() <= columns) {
+        spans.push(Span::styled(words, theme.style(Role::Plain)));
     }
     Line::from(spans)
 }

@@ -130,7 +130,7 @@ fn settings_are_checked_and_what_is_wrong_is_named() {
         std::fs::write(directory.path().join("ground.toml"), text).unwrap();
         ground(directory.path(), &["config", "check", "--config", "ground.toml"])
     };
-    let right = check("connect = \"udpin:0.0.0.0:14550\"\nbell = false\n");
+    let right = check("connect = [\"udpin:0.0.0.0:14550\"]\nbell = false\n");
     assert_eq!(right.status.code(), Some(0));
     assert!(out(&right).contains("understood") && out(&right).contains("14550"));
     let wrong = check("bel = false\n");

@@ -22,7 +22,7 @@ fn on_a_terminal(directory: &Path, command_line: &str) -> Option<Child> {
         .ok()
 }
 
-/// Waits until a file holds this, as long as a slow machine needs.
+/// Waits until a file holds this word, as long as a slow machine needs. A screen does not write its spaces.
 fn wait_for(path: &Path, what: &str) -> bool {
     (0..600).any(|_| {
         std::thread::park_timeout(Duration::from_millis(50));
@@ -52,7 +52,7 @@ fn a_terminal_that_vanishes_takes_nothing_with_it() {
     let mut attached =
         on_a_terminal(directory.path(), &format!("sh -c 'stty rows 24 cols 80; exec {program} attach'"))
             .unwrap();
-    assert!(wait_for(&directory.path().join("terminal.txt"), "the terminal is gone"));
+    assert!(wait_for(&directory.path().join("terminal.txt"), "gone:"));
     attached.stdin.take().unwrap().write_all(b"q").unwrap();
     assert!(attached.wait().unwrap().success());
     assert!(signal("TERM", &process), "it still runs");

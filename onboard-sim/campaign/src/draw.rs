@@ -8,6 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 use world::Truth;
+use world::wind::Wind;
 
 use crate::dispersion::Dispersion;
 
@@ -60,12 +61,14 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let roll_rad = TAU * chance.unit();
     let flight_seed = chance.random.next_u64();
 
+    let wind = Wind::new(wind_m_s, wind_towards_rad, 0.0, 0);
+    let carried = wind.mean_m_s(height_m) * start.carried_share;
     // Still leaning the way it flies; rolled as it happens to be.
     let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();
     let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad);
     let apogee = RigidState {
         position_m: away * start.distance_m + place + Vector3::z() * height_m,
-        velocity_m_s: away * start.speed_m_s + velocity,
+        velocity_m_s: away * start.speed_m_s + velocity + carried,
         world_from_body: UnitQuaternion::from_scaled_axis(leaning + tilt) * roll * upright(),
         rate_rad_s: rate,
     };

@@ -4,11 +4,13 @@ use flight::estimator::{Estimate, Health, HeightSources, Measurements, Sigmas, S
 use flight::mission::{Mission, MissionError};
 use flight::phase::Phase;
 use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
+use flight::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
 use world::world::WorldError;
 use world::{Actuators, World};
 
+use crate::baseline::Baseline;
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;
 use crate::outcome::{Ending, Outcome, judge};
@@ -37,7 +39,14 @@ pub struct Flight {
     sensors: Option<Sensors>,
     sensor_faults: SensorFaults,
     pilot: Pilot,
+    baseline: Option<Baseline>,
+    /// Frames that the flight computer is still dead for.
+    frames_down: u64,
     command: Actuators,
+    input: Option<PilotInput>,
+    /// What the pilot itself wanted at the last frame.
+    piloted: Option<PilotOutput>,
+    believed: RigidState,
     output: Option<PilotOutput>,
     frame: u64,
     abort: bool,
@@ -81,6 +90,11 @@ impl Flight {
             sensors,
             sensor_faults: SensorFaults::default(),
             pilot,
+            baseline: None,
+            frames_down: 0,
+            input: None,
+            piloted: None,
+            believed,
             command: Actuators {
                 gimbal_rad: [0.0; 2],
                 fins_rad: [closed_rad; 4],
@@ -120,6 +134,39 @@ impl Flight {
         self.abort = true;
     }
 
+    /// Has the landing burn flown by another controller than the pilot's own.
+    #[must_use]
+    pub fn with_baseline(mut self, baseline: Option<Baseline>) -> Self {
+        self.baseline = baseline;
+        self
+    }
+
+    /// The flight computer dies, and starts again after a time, s. Servos keep their last command meanwhile.
+    pub fn reboot(&mut self, down_s: f64) {
+        let frame_s = f64::from(FRAME_MS) * world::STEP_S;
+        self.frames_down = libm::ceil(down_s / frame_s).max(1.0) as u64;
+    }
+
+    /// What the flight computer was given at the last frame; `None` before the first and while it is dead.
+    pub fn input(&self) -> Option<&PilotInput> {
+        self.input.as_ref()
+    }
+
+    /// What the pilot itself wanted at the last frame, whoever flew it.
+    pub fn piloted(&self) -> Option<&PilotOutput> {
+        self.piloted.as_ref()
+    }
+
+    /// What the flight computer believed about its state at apogee.
+    pub fn believed_at_apogee(&self) -> &RigidState {
+        &self.believed
+    }
+
+    /// The mission as flown.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
     /// Number of frames flown.
     pub fn frame(&self) -> u64 {
         self.frame
@@ -146,6 +193,14 @@ impl Flight {
             }
         }
         self.frame += 1;
+        if self.frames_down > 0 {
+            self.input = None;
+            self.frames_down -= 1;
+            if self.frames_down == 0 {
+                self.pilot = self.pilot.restarted(self.world.time_s());
+            }
+            return self.goes_on();
+        }
         let input = PilotInput {
             frame: self.frame,
             time_s: self.world.time_s(),
@@ -155,7 +210,12 @@ impl Flight {
             igniter_continuity: true,
             abort: core::mem::take(&mut self.abort),
         };
-        let output = self.pilot.step(&input);
+        let mut output = self.pilot.step(&input);
+        self.piloted = Some(output);
+        if let Some(baseline) = &mut self.baseline {
+            baseline.fly(input.time_s, &self.pilot, &mut output);
+        }
+        self.input = Some(input);
         self.command = Actuators {
             gimbal_rad: output.gimbal_rad,
             fins_rad: output.fins_rad,
@@ -173,6 +233,10 @@ impl Flight {
             largest.height_m = largest.height_m.max(errors.height_m);
             largest.nose_rad = largest.nose_rad.max(errors.nose_rad);
         }
+        self.goes_on()
+    }
+
+    fn goes_on(&self) -> bool {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
     }
 
@@ -230,6 +294,7 @@ impl Flight {
             phase: self.pilot.mode().phase,
             ignited: self.pilot.ignited_at_s().is_some(),
             lit: self.world.thrust_begins_s().is_some(),
+            parachute: self.world.parachute_ejected(),
             finite: self.finite,
         };
         judge(&self.mission, &ending)

@@ -77,6 +77,8 @@ pub struct Ending {
     pub ignited: bool,
     /// It did.
     pub lit: bool,
+    /// The parachute was thrown out.
+    pub parachute: bool,
     /// Every state was a number.
     pub finite: bool,
 }
@@ -87,7 +89,7 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
     let (strict, failure) = match &ending.touchdown {
         _ if !ending.finite => (false, Some(Failure::NotANumber)),
         None => (false, Some(Failure::TimeOut)),
-        Some(_) if ending.phase == Phase::Chute => (false, Some(Failure::Parachute)),
+        Some(_) if ending.parachute => (false, Some(Failure::Parachute)),
         Some(_) if !ending.ignited => (false, Some(Failure::NoIgnition)),
         Some(_) if !ending.lit => (false, Some(Failure::NoLight)),
         Some(touchdown) => {

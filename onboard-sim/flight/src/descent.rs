@@ -14,7 +14,9 @@ use crate::aim::turn_to_aim_rad;
 use crate::rigid::RigidState;
 
 /// Slower than this through the air, fins do nothing worth steering, m/s.
-const LEAST_AIRSPEED_M_S: f64 = 4.0;
+const LEAST_AIRSPEED_M_S: f64 = 12.0;
+/// Slower than this they do not even keep it from rolling, m/s.
+const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 
 /// How the fall is steered.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -75,9 +77,13 @@ impl DescentGains {
         let through_air_m_s = state.velocity_m_s - situation.wind_m_s;
         let airspeed_m_s = through_air_m_s.norm();
         let dynamic_pressure_pa = 0.5 * situation.air_density_kg_m3 * airspeed_m_s * airspeed_m_s;
+        let [roll_inertia, inertia] = situation.inertia_kg_m2;
+        let rate = state.rate_rad_s;
+        let roll_n_m = -roll_inertia * self.roll_decay_per_s * rate.x;
         if airspeed_m_s < LEAST_AIRSPEED_M_S {
+            let rolling = airspeed_m_s > LEAST_ROLLING_AIRSPEED_M_S;
             return DescentDemand {
-                moment_n_m: Vector3::zeros(),
+                moment_n_m: Vector3::x() * if rolling { roll_n_m } else { 0.0 },
                 dynamic_pressure_pa,
                 nose_in_world: Vector3::z(),
             };
@@ -91,17 +97,11 @@ impl DescentGains {
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
-        let [roll_inertia, inertia] = situation.inertia_kg_m2;
-        let rate = state.rate_rad_s;
         let frequency = self.natural_frequency_rad_s;
         let turn = |error: f64, rate: f64| {
             inertia * (frequency * frequency * error - 2.0 * self.damping * frequency * rate)
         };
-        let moment_n_m = Vector3::new(
-            -roll_inertia * self.roll_decay_per_s * rate.x,
-            turn(error.y, rate.y),
-            turn(error.z, rate.z),
-        );
+        let moment_n_m = Vector3::new(roll_n_m, turn(error.y, rate.y), turn(error.z, rate.z));
         DescentDemand { moment_n_m, dynamic_pressure_pa, nose_in_world }
     }
 

@@ -25,6 +25,9 @@ pub struct IgnitionSettings {
     pub delay_s: f64,
     /// How long before the expected ignition the landing controller takes over, s.
     pub arm_before_s: f64,
+    /// Thrust begins at this height whatever the outlook says, m: for flights that are timed beforehand.
+    #[serde(default)]
+    pub fixed_height_m: Option<f64>,
 }
 
 /// What a tick says about the ignition.
@@ -67,7 +70,9 @@ impl IgnitionSettings {
             extremes.iter().try_fold(certified, |common, (impulse, time)| common.and(&band(*impulse, *time)?))
         });
         // Where no height suits all of them, what suits the certified motor has to do.
-        let chosen_m = common.or(certified).map(|band| band.low_m + self.place * (band.high_m - band.low_m));
+        let chosen_m = self.fixed_height_m.or_else(|| {
+            common.or(certified).map(|band| band.low_m + self.place * (band.high_m - band.low_m))
+        });
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
         IgnitionOutlook {

@@ -25,6 +25,8 @@ pub struct ApogeeStart {
     pub distance_m: f64,
     /// Horizontal speed, away from the pad, m/s.
     pub speed_m_s: f64,
+    /// Share of the mean wind there that the vehicle has taken on by then.
+    pub carried_share: f64,
     /// Tilt of the nose from the vertical, along the motion, degrees.
     pub tilt_deg: f64,
 }
@@ -60,10 +62,16 @@ pub struct Mission {
     pub pad_altitude_m: f64,
     /// The fins steer; otherwise they stay open and equal (passive descent).
     pub steered: bool,
-    /// Lag with which the thrust scale follows what is felt, s.
-    pub motor_lag_s: f64,
+    /// Place of the lidar along the axis, ahead of the feet, m.
+    pub lidar_ahead_of_feet_m: f64,
+    /// Standard deviations of the thrust ahead that the motor is taken to be weaker than estimated.
+    pub caution_sigmas: f64,
+    /// How much of the fins' present opening a plan expects to last; the rest is expected to be half open.
+    pub fins_kept: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
     pub soft_tilt_deg: f64,
+    /// How long before touchdown the vehicle is upright already in that band, s.
+    pub settle_s: f64,
     /// Where it begins.
     pub start: ApogeeStart,
     /// The estimator.

@@ -40,6 +40,11 @@ pub struct ThrustSample {
 }
 
 impl ThrustEstimate {
+    /// An estimate that has come to this scale: to go on from a log.
+    pub fn resumed(scale: f64) -> Self {
+        Self { scale }
+    }
+
     /// The estimated thrust over nominal thrust; 1 before anything was learnt.
     pub fn scale(&self) -> f64 {
         self.scale

@@ -4,8 +4,9 @@
 //! Both are bounded, so at every instant the deceleration lies between a soft and a hard one. A landing must arrive
 //! with both height and sinking speed near zero, not before the thrust falls through the weight, or it would lift off
 //! again. For a bounded double integrator the extremes are bang-bang: the highest start decelerates softly first and
-//! hard later, the lowest start hard first and softly later. Between the two lies the band of feasible heights
-//! ([`Column::band`]), and where in it the vehicle is says how hard to brake ([`Band::place`]).
+//! hard later, the lowest start hard first and softly later, but never so that the vehicle rises. Braking evenly lies
+//! in between. The heights that these begin at span the band of feasible heights ([`Column::band`]), and where in it
+//! the vehicle is says how hard to brake ([`Band::place`]). The last moments are flown upright, to arrive settled.
 //!
 //! Tilting at speed costs nothing in deceleration: the body lies across the air and its own drag makes up for the
 //! lost thrust. The model has that drag, `1/2 rho V^2 S_n sin^3`, so it knows that fins are the early throttle and
@@ -19,6 +20,8 @@ const INTERVALS: usize = 40;
 const END_TIMES: usize = 4;
 /// Halvings of a switching time: to a millionth of the burn.
 const HALVINGS: usize = 20;
+/// Faster upwards than this, a vehicle rises, m/s.
+const RISING_M_S: f64 = 0.05;
 
 /// How hard the vehicle brakes: its tilt and its fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +53,8 @@ pub struct Column {
     pub touchdown_m_s: f64,
     /// How long after thrust has fallen through the weight the touchdown may come at the latest, s.
     pub latest_after_s: f64,
+    /// How long before touchdown the vehicle is upright already, s.
+    pub settle_s: f64,
 }
 
 /// Heights from which a landing exists, m.
@@ -99,10 +104,39 @@ impl Outlook {
     }
 }
 
-/// Thrust and drag of a way of braking.
+/// Thrust and drag of braking.
 struct Share {
     thrust: f64,
     drag_per_v2: f64,
+}
+
+/// A family of ways to brake, with one parameter between 0 and 1.
+enum Way<'a> {
+    /// One first, then the other; the parameter is the share of the time.
+    Switch(&'a Share, &'a Share),
+    /// A mixture of both throughout; the parameter is the second's share.
+    Even(&'a Share, &'a Share),
+}
+
+impl Way<'_> {
+    /// Braking in interval `k`.
+    fn at(&self, k: f64, parameter: f64) -> Share {
+        let (first, then, share) = match self {
+            Self::Switch(first, then) => (first, then, (parameter * INTERVALS as f64 - k).clamp(0.0, 1.0)),
+            Self::Even(first, then) => (first, then, 1.0 - parameter),
+        };
+        Share {
+            thrust: share * first.thrust + (1.0 - share) * then.thrust,
+            drag_per_v2: share * first.drag_per_v2 + (1.0 - share) * then.drag_per_v2,
+        }
+    }
+}
+
+/// How a fall ends.
+struct Fall {
+    fallen_m: f64,
+    vertical_m_s: f64,
+    highest_m_s: f64,
 }
 
 impl Column {
@@ -123,10 +157,9 @@ impl Column {
         for i in 0..END_TIMES {
             let end_s = soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64;
             let outlook = Outlook::new(burn, self.mass_at_ignition_kg, burning_s, end_s);
-            let orders = [(&self.soft, &self.hard), (&self.hard, &self.soft)];
-            for height_m in orders.iter().filter_map(|(first, then)| {
-                self.height_between(&outlook, vertical_m_s, &self.share(first), &self.share(then))
-            }) {
+            let (soft, hard) = (self.share(&self.soft), self.share(&self.hard));
+            let ways = [Way::Switch(&soft, &hard), Way::Switch(&hard, &soft), Way::Even(&soft, &hard)];
+            for height_m in ways.iter().filter_map(|way| self.height_of(&outlook, vertical_m_s, way)) {
                 band = Some(band.map_or(Band { low_m: height_m, high_m: height_m }, |band| Band {
                     low_m: band.low_m.min(height_m),
                     high_m: band.high_m.max(height_m),
@@ -136,53 +169,46 @@ impl Column {
         band
     }
 
-    /// The height a landing begins at that brakes one way first and another way then; `None` if it cannot arrive at
-    /// the touchdown speed however the time is divided.
-    fn height_between(
-        &self,
-        outlook: &Outlook,
-        vertical_m_s: f64,
-        first: &Share,
-        then: &Share,
-    ) -> Option<f64> {
-        let end = |switch: f64| self.fall(outlook, vertical_m_s, first, then, switch);
-        let (mut low, mut high) = (0.0, INTERVALS as f64);
-        let rises = end(high).1 > end(low).1;
-        let reached = |speed_m_s: f64| (speed_m_s > self.touchdown_m_s) == rises;
-        if reached(end(low).1) || !reached(end(high).1) {
+    /// The height that a way of braking begins at; `None` if it cannot arrive at the touchdown speed however it is
+    /// divided, or rises on the way.
+    fn height_of(&self, outlook: &Outlook, vertical_m_s: f64, way: &Way<'_>) -> Option<f64> {
+        let end = |parameter: f64| self.fall(outlook, vertical_m_s, way, parameter);
+        let (mut low, mut high) = (0.0, 1.0);
+        let rises = end(high).vertical_m_s > end(low).vertical_m_s;
+        let reached = |parameter: f64| (end(parameter).vertical_m_s > self.touchdown_m_s) == rises;
+        if reached(low) || !reached(high) {
             return None;
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if reached(end(middle).1) { high = middle } else { low = middle }
+            if reached(middle) { high = middle } else { low = middle }
         }
-        Some(end(high).0)
+        let end = end(high);
+        (end.highest_m_s <= RISING_M_S).then_some(end.fallen_m)
     }
 
-    /// How far the vehicle falls, m, and how fast it then moves, m/s up positive.
-    fn fall(
-        &self,
-        outlook: &Outlook,
-        vertical_m_s: f64,
-        first: &Share,
-        then: &Share,
-        switch: f64,
-    ) -> (f64, f64) {
+    /// Falls along the outlook.
+    fn fall(&self, outlook: &Outlook, vertical_m_s: f64, way: &Way<'_>, parameter: f64) -> Fall {
         let step_s = outlook.step_s;
-        let (mut speed_m_s, mut fallen_m) = (vertical_m_s, 0.0);
+        let settled = self.settle_s / step_s;
+        let upright = self.share(&Braking { tilt_rad: 0.0, ..self.soft });
+        let mut fall = Fall { fallen_m: 0.0, vertical_m_s, highest_m_s: f64::NEG_INFINITY };
         for (k, (thrust_n, mass_kg)) in outlook.thrust_n.iter().zip(&outlook.mass_kg).enumerate() {
-            let share = (switch - k as f64).clamp(0.0, 1.0);
-            let cosine = share * first.thrust + (1.0 - share) * then.thrust;
-            let drag_per_v2 = share * first.drag_per_v2 + (1.0 - share) * then.drag_per_v2;
+            let braking = way.at(k as f64, parameter);
+            // Upright from the settling on.
+            let leaning = (INTERVALS as f64 - settled - k as f64).clamp(0.0, 1.0);
+            let cosine = leaning * braking.thrust + (1.0 - leaning) * upright.thrust;
+            let drag_per_v2 = leaning * braking.drag_per_v2 + (1.0 - leaning) * upright.drag_per_v2;
             let acceleration = |speed_m_s: f64| {
                 (thrust_n * cosine - drag_per_v2 * speed_m_s * speed_m_s.abs()) / mass_kg - self.gravity_m_s2
             };
             // Midpoint rule.
-            let midway_m_s = speed_m_s + 0.5 * step_s * acceleration(speed_m_s);
-            fallen_m -= step_s * midway_m_s;
-            speed_m_s += step_s * acceleration(midway_m_s);
+            let midway_m_s = fall.vertical_m_s + 0.5 * step_s * acceleration(fall.vertical_m_s);
+            fall.fallen_m -= step_s * midway_m_s;
+            fall.vertical_m_s += step_s * acceleration(midway_m_s);
+            fall.highest_m_s = fall.highest_m_s.max(fall.vertical_m_s);
         }
-        (fallen_m, speed_m_s)
+        fall
     }
 
     /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
@@ -203,14 +229,21 @@ impl Column {
         (height_m, vertical_m_s)
     }
 
-    /// How much of the fins to open, 0 to 1, to stay in the middle of the band: from the height the vehicle has.
+    /// How much of the fins to open, 0 to 1, to stay at a place in the band, from the height the vehicle has.
     ///
     /// Without a band the vehicle is too fast or too slow for any landing, and the answer is an end of the range.
-    pub fn fin_share(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64, height_m: f64) -> f64 {
+    pub fn fin_share(
+        &self,
+        burn: &Burn<'_>,
+        burning_s: f64,
+        vertical_m_s: f64,
+        height_m: f64,
+        place: f64,
+    ) -> f64 {
         /// Share of the fins per share of the band.
         const GAIN: f64 = 1.5;
         match self.band(burn, burning_s, vertical_m_s) {
-            Some(band) => (0.5 + GAIN * (0.5 - band.place(height_m))).clamp(0.0, 1.0),
+            Some(band) => (0.5 + GAIN * (place - band.place(height_m))).clamp(0.0, 1.0),
             // Falling slower than a landing would: let it fall.
             None if vertical_m_s > -1.0 => 0.0,
             None => 1.0,
@@ -240,6 +273,7 @@ mod tests {
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: 0.0267 },
             touchdown_m_s: -0.15,
             latest_after_s: 0.5,
+            settle_s: 0.3,
         }
     }
 
@@ -259,19 +293,22 @@ mod tests {
     }
 
     #[test]
-    fn every_height_of_the_band_is_reached_by_some_switching_time() {
+    fn every_way_of_braking_begins_inside_the_band_and_arrives_at_the_touchdown_speed() {
         let curve = motors::builtin("H45W").expect("built in");
         let column = column();
         let burn = Burn::nominal(&curve);
         let band = column.band(&burn, 1.0, -25.0).expect("lands");
         let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("carried");
         let outlook = Outlook::new(&burn, 3.13, 1.0, end_s);
-        for (first, then) in [(&column.soft, &column.hard), (&column.hard, &column.soft)] {
-            let height_m = column
-                .height_between(&outlook, -25.0, &column.share(first), &column.share(then))
-                .expect("lands");
-            assert!(band.contains(height_m), "{height_m} in {band:?}");
+        let (soft, hard) = (column.share(&column.soft), column.share(&column.hard));
+        let mut found = 0;
+        for way in [Way::Switch(&soft, &hard), Way::Switch(&hard, &soft), Way::Even(&soft, &hard)] {
+            if let Some(height_m) = column.height_of(&outlook, -25.0, &way) {
+                assert!(band.contains(height_m), "{height_m} in {band:?}");
+                found += 1;
+            }
         }
+        assert!(found >= 2, "{found}");
         assert!((band.place(band.low_m), band.place(band.high_m)) == (0.0, 1.0));
     }
 }

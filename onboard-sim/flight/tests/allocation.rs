@@ -82,19 +82,23 @@ fn warm_searches_for_the_final_time_do_not_allocate() {
         target_drift_m_s: 0.0,
         max_solves: 8,
     };
+    problem.landing.final_box = None;
     let mut workspace = FreeTimeWorkspace::default();
     let (mut best, mut next) = (FreeTimeSolution::default(), FreeTimeSolution::default());
     for found in [&mut best, &mut next] {
         solve_free_time_into(&problem, &Fading, None, &mut workspace, found);
     }
-    assert!(best.lands(), "{best:?}");
+    assert!(best.lands(), "{}", best.solution.condition_miss);
     problem.max_solves = 3;
+    let mut iterations = 0;
     for kick in [0.0, 0.02, -0.05] {
         problem.landing.initial.w_m_s += kick;
         let allocated = allocation_counter::measure(|| {
             solve_free_time_into(&problem, &Fading, Some((&best, 0.0)), &mut workspace, &mut next);
         });
         assert_eq!(allocated.count_total, 0, "{kick}");
-        assert!(next.solution.iterations > 0 && next.solves <= 3, "{next:?}");
+        assert!(next.solves <= 3, "{}", next.solves);
+        iterations += next.solution.iterations;
     }
+    assert!(iterations > 0);
 }

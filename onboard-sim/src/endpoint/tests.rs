@@ -9,9 +9,9 @@ use protocol::dialect::{ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, MavCmd, TD_
 use protocol::identity::GROUND;
 use protocol::text::Reassembler;
 
-use super::streams::STANDARD;
 use super::*;
 use crate::scatter::draw;
+use crate::streams::STANDARD;
 use crate::vehicle::{DeadlinePolicy, LogState};
 
 struct Bench {
@@ -39,7 +39,7 @@ impl Bench {
             for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            sent.extend(self.endpoint.poll(&self.vehicle.snapshot()));
+            sent.extend(self.endpoint.poll(&self.vehicle, &self.vehicle.snapshot()));
         }
         sent
     }
@@ -107,6 +107,23 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
     }
     assert_eq!(bench.vehicle.phase(), Phase::Safed);
     assert!(worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{worst} B in one second");
+}
+
+#[test]
+fn signatures_fit_the_radio_too() {
+    let total = Streams::signed().bytes_s();
+    assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
+    let mut bench = Bench { endpoint: VehicleEndpoint::signed(), ..Bench::new() };
+    bench.run(1.0);
+    let sent = bench.run(10.0);
+    let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + SIGNATURE_LEN).sum();
+    assert!(bytes as f64 <= 10.0 * f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{bytes} B in 10 s");
+    for (message_id, expected) in
+        [(HEARTBEAT_DATA::ID, 10), (TD_FLIGHT_STATUS_DATA::ID, 50), (ATTITUDE_QUATERNION_DATA::ID, 60)]
+    {
+        let found = count(&sent, message_id);
+        assert!(found.abs_diff(expected) <= 1, "message {message_id}: {found} of {expected}");
+    }
 }
 
 #[test]
@@ -313,3 +330,5 @@ proptest! {
         prop_assert!(bench.vehicle.phase() == Phase::PadIdle);
     }
 }
+
+mod questions;

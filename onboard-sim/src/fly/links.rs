@@ -1,69 +1,191 @@
-//! The open links, their framing and their raw frames in the log.
+//! The open links: their frames heard once, signed if a key is set, and in the log.
 
-use protocol::frame::{Frame, Framer};
+use std::time::Duration;
+
+use protocol::command::CommandRequest;
+use protocol::frame::Frame;
+use protocol::hub::{Hub, News};
+use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
-use protocol::transport::{Endpoint, Received, Transport};
+use protocol::signing::{Rejection, stamp_of};
+use protocol::transport::{Endpoint, Transport, TransportSender};
 
 use super::FlyError;
 use super::recording::{note, record_raw};
 
+/// Timestamps are remembered this often, in stamps (10 us).
+const REMEMBER_EVERY: u64 = 100_000;
+/// Things taken from one link before the vehicle's own work goes on: a flood must not hold up a frame of the loop.
+const MAX_AT_ONCE: usize = 1024;
+
+/// Frames from outside that are recorded in a second, at most: a flood must neither fill the log nor stop it.
+const MAX_RECORDED_S: u32 = 500;
+
 /// Every link of the vehicle.
 pub(super) struct Links {
-    open: Vec<(Transport, Framer, String)>,
+    open: Vec<OpenLink>,
+    intake: Intake,
+    hub: Hub,
+    key_file: Option<KeyFile>,
+    remembered_at: u64,
     recorder: Option<Recorder>,
     pub(super) tx_bytes: u64,
 }
 
+struct OpenLink {
+    transport: Transport,
+    sender: TransportSender,
+    name: String,
+}
+
+/// What comes from outside on its way into the log.
+struct Intake {
+    recorder: Option<Recorder>,
+    second: u64,
+    recorded: u32,
+    left_out: u64,
+}
+
+impl Intake {
+    fn record(&mut self, link: &str, frame: &Frame, time_s: f64) {
+        let second = time_s as u64;
+        if second != self.second {
+            if self.left_out > 0 {
+                let words = format!("a flood: {} frames are not recorded", self.left_out);
+                note(self.recorder.as_ref(), time_s, &words);
+            }
+            (self.second, self.recorded, self.left_out) = (second, 0, 0);
+        }
+        if self.recorded >= MAX_RECORDED_S {
+            self.left_out += 1;
+            return;
+        }
+        self.recorded += 1;
+        let recorder = self.recorder.as_ref();
+        record_raw(recorder, Direction::Rx, link, frame, time_s);
+        if let Some(CommandRequest { source, command, .. }) = CommandRequest::from_frame(frame) {
+            let (system, component) = (source.system_id, source.component_id);
+            note(recorder, time_s, &format!("command {command} from {system}/{component} over {link}"));
+        }
+    }
+}
+
+/// A frame from a link.
+pub(super) enum Heard {
+    /// To be acted on.
+    Frame(Frame),
+    /// Not to be acted on: its signature is missing or wrong.
+    Rejected(Frame, Rejection),
+}
+
 impl Links {
-    pub(super) async fn open(endpoints: &[Endpoint], recorder: Option<Recorder>) -> Result<Self, FlyError> {
+    pub(super) async fn open(
+        endpoints: &[Endpoint],
+        key_file: Option<&std::path::Path>,
+        recorder: Option<Recorder>,
+    ) -> Result<Self, FlyError> {
+        let (key_file, signing) = key_file.map(|path| KeyFile::open(path, "vehicle")).transpose()?.unzip();
         let mut open = Vec::new();
         for endpoint in endpoints {
-            let name = endpoint.to_string();
             let transport = Transport::open(endpoint.clone())
                 .await
-                .map_err(|source| FlyError::Link { link: name.clone(), source })?;
-            open.push((transport, Framer::new(), name));
+                .map_err(|source| FlyError::Link { link: endpoint.to_string(), source })?;
+            let name = transport.endpoint().to_string();
+            open.push(OpenLink { sender: transport.sender(), transport, name });
         }
-        Ok(Self { open, recorder, tx_bytes: 0 })
+        let hub = Hub::new(open.len(), signing);
+        let intake = Intake { recorder: recorder.clone(), second: 0, recorded: 0, left_out: 0 };
+        Ok(Self { open, intake, hub, key_file, remembered_at: 0, recorder, tx_bytes: 0 })
     }
 
-    pub(super) fn receive(&mut self, time_s: f64) -> Vec<Frame> {
-        let mut frames = Vec::new();
-        for (transport, framer, name) in &mut self.open {
-            while let Some(received) = transport.try_receive() {
-                match received {
-                    Received::Datagram(bytes) => framer.push_datagram(&bytes),
-                    Received::Stream(bytes) => framer.push(&bytes),
-                    Received::Silence => framer.on_silence(),
-                    Received::Up(peer) => {
-                        note(self.recorder.as_ref(), time_s, &format!("link {name} up: {peer}"));
+    pub(super) fn receive(&mut self, time_s: f64) -> Vec<Heard> {
+        let (now, clock) = (Duration::from_secs_f64(time_s), clock());
+        let recorder = self.recorder.as_ref();
+        let mut heard = Vec::new();
+        for (number, OpenLink { transport, name, .. }) in self.open.iter_mut().enumerate() {
+            for _ in 0..MAX_AT_ONCE {
+                let Some(received) = transport.try_receive() else { break };
+                for news in self.hub.take(number, received, now, clock) {
+                    match news {
+                        News::Frame(frame) => {
+                            self.intake.record(name, &frame, time_s);
+                            heard.push(Heard::Frame(frame));
+                        }
+                        News::Copy(frame) => self.intake.record(name, &frame, time_s),
+                        // Not recorded: a flood of forgeries must not fill the log. It is counted.
+                        News::Rejected(frame, why) => heard.push(Heard::Rejected(frame, why)),
+                        News::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
+                        News::Down(why) => note(recorder, time_s, &format!("link {name} down: {why}")),
                     }
-                    Received::Down(why) => {
-                        note(self.recorder.as_ref(), time_s, &format!("link {name} down: {why}"));
-                    }
-                }
-                while let Some(frame) = framer.next_frame() {
-                    record_raw(self.recorder.as_ref(), Direction::Rx, name, frame.as_bytes(), time_s);
-                    frames.push(frame);
                 }
             }
         }
-        frames
+        if clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
+            self.remembered_at = clock;
+            self.remember(time_s);
+        }
+        heard
     }
 
-    pub(super) fn send(&mut self, bytes: &[u8], time_s: f64) {
-        for (transport, _, name) in &self.open {
+    pub(super) fn send(&mut self, frame: &Frame, time_s: f64) {
+        let (now, clock) = (Duration::from_secs_f64(time_s), clock());
+        for (number, OpenLink { sender, name, .. }) in self.open.iter().enumerate() {
+            let bytes = self.hub.bytes_for(number, frame, clock);
+            let count = bytes.len();
             // What found no room was not sent, and the log must not say so.
-            if transport.sender().send(bytes.to_vec()) {
-                self.tx_bytes += bytes.len() as u64;
-                record_raw(self.recorder.as_ref(), Direction::Tx, name, bytes, time_s);
+            if sender.send(bytes) {
+                self.tx_bytes += count as u64;
+                self.hub.on_sent(number, count, now);
+                record_raw(self.recorder.as_ref(), Direction::Tx, name, frame, time_s);
             }
         }
     }
 
     /// Frames that found no room on their link.
     pub(super) fn dropped(&self) -> u64 {
-        self.open.iter().map(|(transport, ..)| transport.sender().dropped()).sum()
+        self.open.iter().map(|link| link.sender.dropped()).sum()
     }
+
+    /// The last words to the log: what each link carried, and what signatures kept out.
+    pub(super) fn close(&mut self, time_s: f64) {
+        let now = Duration::from_secs_f64(time_s);
+        for (link, OpenLink { name, .. }) in self.hub.links().iter().zip(&self.open) {
+            let (figures, framing) = (link.stats().figures(now), link.framing());
+            let words = format!(
+                "link {name}: {} frames heard, {} copies, loss {:.1} %, {} bad checksums, {} unknown ids",
+                framing.frames,
+                link.copies(),
+                100.0 * figures.loss,
+                framing.crc_errors,
+                framing.unknown_ids
+            );
+            note(self.recorder.as_ref(), time_s, &words);
+        }
+        if let Some(counters) = self.hub.signing() {
+            let words = format!(
+                "signatures: {} accepted, {} unsigned, {} wrong, {} replayed, {} too old",
+                counters.accepted, counters.unsigned, counters.wrong, counters.replayed, counters.too_old
+            );
+            note(self.recorder.as_ref(), time_s, &words);
+        }
+        self.remember(time_s);
+    }
+
+    fn remember(&mut self, time_s: f64) {
+        if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory())
+            && let Err(error) = file.remember(memory)
+        {
+            note(self.recorder.as_ref(), time_s, &format!("timestamps are not remembered: {error}"));
+        }
+    }
+}
+
+/// Now, as signatures count time.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "signatures need the time of day; nothing in flight depends on it"
+)]
+fn clock() -> u64 {
+    stamp_of(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default())
 }

@@ -6,20 +6,22 @@ mod pace;
 mod recording;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use flight::phase::Phase;
 use flight::profile::{BUILTIN, Profile, ProfileError};
 use flight::verdict::LandingVerdict;
+use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
 
 use self::autopilot::AutoPilot;
-use self::links::Links;
+use self::links::{Heard, Links};
+pub use self::pace::Lateness;
 use self::pace::Pace;
 use self::recording::{log_state, nanoseconds, note, record};
 use crate::endpoint::VehicleEndpoint;
@@ -57,6 +59,8 @@ pub struct FlyOptions {
     pub profile: LoadedProfile,
     /// Links to serve; none is allowed.
     pub links: Vec<Endpoint>,
+    /// The key that every frame is to be signed with; none is allowed.
+    pub key_file: Option<PathBuf>,
     /// Log to write into.
     pub recorder: Option<Recorder>,
     /// Seed of the dispersions.
@@ -116,6 +120,9 @@ pub enum FlyError {
     /// The profile cannot be simulated.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
+    /// The key is not used.
+    #[error(transparent)]
+    Key(#[from] KeyFileError),
     /// A link cannot be opened.
     #[error("cannot open the link {link}")]
     Link {
@@ -158,6 +165,8 @@ pub struct FlightSummary {
     pub time_s: f64,
     /// Controller ticks and how long they took.
     pub solve_times: SolveTimes,
+    /// How late frames began.
+    pub lateness: Lateness,
     /// Bytes sent on every link.
     pub tx_bytes: u64,
 }
@@ -220,8 +229,10 @@ pub async fn fly_observed(
     let profile = &options.profile.profile;
     let mut vehicle = Vehicle::new(profile, draw(profile, options.seed), options.deadline_policy)?;
     vehicle.pull_pin();
-    let mut links = Links::open(&options.links, options.recorder.clone()).await?;
-    let mut endpoint = VehicleEndpoint::new();
+    let mut links =
+        Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
+    let mut endpoint =
+        if options.key_file.is_some() { VehicleEndpoint::signed() } else { VehicleEndpoint::new() };
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
@@ -233,8 +244,11 @@ pub async fn fly_observed(
             vehicle.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
         }
-        for frame in links.receive(vehicle.time_s()) {
-            endpoint.on_frame(&frame, &mut vehicle);
+        for heard in links.receive(vehicle.time_s()) {
+            match heard {
+                Heard::Frame(frame) => endpoint.on_frame(&frame, &mut vehicle),
+                Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
+            }
         }
         pilot.act(&mut vehicle);
         let stopwatch = pace.clock();
@@ -254,8 +268,8 @@ pub async fn fly_observed(
         if let Some(recorder) = &options.recorder {
             record(recorder, &snapshot, &events);
         }
-        for frame in endpoint.poll(&snapshot) {
-            links.send(frame.as_bytes(), time_s);
+        for frame in endpoint.poll(&vehicle, &snapshot) {
+            links.send(&frame, time_s);
         }
         if links.dropped() > dropped {
             dropped = links.dropped();
@@ -275,6 +289,7 @@ pub async fn fly_observed(
             }
         }
     };
+    links.close(vehicle.time_s());
     let verdict = vehicle.verdict().copied();
     let outcome = match (&verdict, pilot.refused) {
         // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
@@ -293,6 +308,7 @@ pub async fn fly_observed(
         phase: vehicle.phase(),
         time_s: vehicle.time_s(),
         solve_times,
+        lateness: pace.into_lateness(),
         tx_bytes: links.tx_bytes,
     })
 }

@@ -11,6 +11,45 @@ pub(super) struct Pace {
     began: Instant,
     due: Instant,
     over_since: Option<Instant>,
+    lateness: Lateness,
+}
+
+/// How late frames began, while simulated time was paced: the jitter of the control loop.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lateness {
+    /// Frames by lateness, in steps of [`Lateness::STEP`]; the last holds all the later ones.
+    frames: Vec<u64>,
+    worst: Duration,
+}
+
+impl Lateness {
+    const STEP: Duration = Duration::from_micros(100);
+    const STEPS: usize = 500;
+
+    fn new() -> Self {
+        Self { frames: vec![0; Self::STEPS], worst: Duration::ZERO }
+    }
+
+    fn add(&mut self, late: Duration) {
+        let step = (late.as_nanos() / Self::STEP.as_nanos()) as usize;
+        self.frames[step.min(Self::STEPS - 1)] += 1;
+        self.worst = self.worst.max(late);
+    }
+
+    /// The median, the 99th percentile (both rounded up to a tenth of a millisecond) and the worst; `None` if no
+    /// frame was paced.
+    pub fn quantiles(&self) -> Option<[Duration; 3]> {
+        let total: u64 = self.frames.iter().sum();
+        let quantile = |percent: u64| {
+            let mut seen = 0;
+            let step = self.frames.iter().position(|count| {
+                seen += count;
+                100 * seen >= percent * total
+            });
+            Self::STEP * (step.unwrap_or(Self::STEPS) as u32 + 1)
+        };
+        (total > 0).then(|| [quantile(50), quantile(99), self.worst])
+    }
 }
 
 impl Pace {
@@ -22,7 +61,14 @@ impl Pace {
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]
     pub(super) fn new(speed: Speed, frame_s: f64) -> Self {
         let now = Instant::now();
-        Self { speed, frame: Duration::from_secs_f64(frame_s), began: now, due: now, over_since: None }
+        Self {
+            speed,
+            frame: Duration::from_secs_f64(frame_s),
+            began: now,
+            due: now,
+            over_since: None,
+            lateness: Lateness::new(),
+        }
     }
 
     pub(super) fn clock(&self) -> Instant {
@@ -53,5 +99,10 @@ impl Pace {
             self.due = now;
         }
         tokio::time::sleep_until(self.due.into()).await;
+        self.lateness.add(Instant::now().saturating_duration_since(self.due));
+    }
+
+    pub(super) fn into_lateness(self) -> Lateness {
+        self.lateness
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use flight::phase::Phase;
+use protocol::frame::Frame;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1;
@@ -17,11 +18,13 @@ pub(super) fn record_raw(
     recorder: Option<&Recorder>,
     direction: Direction,
     link: &str,
-    bytes: &[u8],
+    frame: &Frame,
     time_s: f64,
 ) {
-    if let Some(recorder) = recorder {
-        let frame = RawFrame { direction, endpoint: "vehicle", link: link.to_owned(), bytes: bytes.to_vec() };
+    if let Some(recorder) = recorder
+        && let Some(bytes) = frame.for_log()
+    {
+        let frame = RawFrame { direction, endpoint: "vehicle", link: link.to_owned(), bytes };
         recorder.record(Record::RawFrame(frame), nanoseconds(time_s));
     }
 }

@@ -2,7 +2,11 @@
 //!
 //! The flight code knows nothing of logs and the log nothing of the flight code; whoever writes or replays
 //! a log goes through here.
+//!
+//! [`pilot`] does the same for the flight computer from apogee to touchdown.
 #![warn(missing_docs)]
+
+pub mod pilot;
 
 use flight::controller::{ControllerInput, ControllerOutput, Plan};
 use flight::dynamics::PlanarState;

@@ -7,6 +7,7 @@
 //! * [`fault`]: what can break in flight.
 //! * [`world`]: everything together, one millisecond at a time.
 //! * `body`, `aero`, `motor`, `servo`, `parachute`, `ground`: the parts, each on its own.
+//! * [`sensors`]: what the flight computer is given of it all.
 //! * [`wind`]: the mean wind over height and the gusts in it.
 #![warn(missing_docs)]
 

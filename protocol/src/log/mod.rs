@@ -1,6 +1,6 @@
 //! The flight log: an MCAP file of raw frames, controller ticks, truth, telemetry, operator and events.
 //!
-//! The schemas are `proto/touchdown/log/v1.proto` and, where one fits, Foxglove's own. The format is
+//! The schemas are `proto/touchdown/log/v1.proto`, `proto/touchdown/flight/v1.proto` and, where one fits, Foxglove's own. The format is
 //! MCAP (<https://mcap.dev/spec>); every record is written so that a killed process loses a fraction
 //! of a second at most ([`recorder`]).
 
@@ -22,6 +22,21 @@ pub mod v1 {
     )]
     include!(concat!(env!("OUT_DIR"), "/touchdown.log.v1.rs"));
 }
+
+/// The records of `proto/touchdown/flight/v1.proto`, generated.
+pub mod flight_v1 {
+    #![allow(
+        missing_docs,
+        unreachable_pub,
+        clippy::pedantic,
+        clippy::allow_attributes_without_reason,
+        reason = "generated code; its documentation is in the .proto"
+    )]
+    include!(concat!(env!("OUT_DIR"), "/touchdown.flight.v1.rs"));
+}
+
+/// Serialised `google.protobuf.FileDescriptorSet` of [`flight_v1`].
+pub const DESCRIPTORS_FLIGHT_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/flight_v1.fds"));
 
 /// Serialised `google.protobuf.FileDescriptorSet` of [`v1`]: the schema data of its MCAP channels.
 pub const DESCRIPTORS_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/log_v1.fds"));

@@ -158,7 +158,7 @@ impl<R: Read> LogReader<R> {
                     self.finish(Some(Damage::Corrupt { near_byte: self.bytes_read, reason }));
                     break;
                 }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => parse(opcode, data),
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => parse_record(opcode, data),
             };
             match parsed {
                 Ok(record) => {
@@ -247,7 +247,11 @@ fn with_causes(error: &mcap::McapError) -> String {
     words
 }
 
-fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
+/// One record of an MCAP file, from its type and its body; never panics, whatever the body is.
+///
+/// # Errors
+/// The body is not of this type.
+pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
     // The parser trusts an attachment to be long enough for its own fields.
     if opcode == mcap::records::op::ATTACHMENT && !attachment_fits(data) {
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });

@@ -2,7 +2,7 @@
 
 use foxglove::messages::{FrameTransform, Log};
 
-use super::v1;
+use super::{flight_v1, v1};
 
 /// Which way a raw frame went, seen from the program that wrote the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,6 +67,14 @@ pub enum Record {
     RawFrame(RawFrame),
     /// `/events`.
     Event(Event),
+    /// `/pilot/start`.
+    PilotStart(Box<flight_v1::PilotStart>),
+    /// `/pilot/tick`.
+    PilotTick(Box<flight_v1::PilotTick>),
+    /// `/pilot/estimate`.
+    Estimate(Box<flight_v1::Estimate>),
+    /// `/vehicle/truth3d`.
+    TruthSample(Box<flight_v1::TruthSample>),
 }
 
 /// Topic of the controller's ticks.
@@ -85,6 +93,14 @@ pub const TOPIC_RAW_RX: &str = "/mavlink/rx/raw";
 pub const TOPIC_RAW_TX: &str = "/mavlink/tx/raw";
 /// Topic of events.
 pub const TOPIC_EVENTS: &str = "/events";
+/// Topic of what the flight computer believed at the start.
+pub const TOPIC_PILOT_START: &str = "/pilot/start";
+/// Topic of the flight computer's frames.
+pub const TOPIC_PILOT_TICK: &str = "/pilot/tick";
+/// Topic of its estimates.
+pub const TOPIC_ESTIMATE: &str = "/pilot/estimate";
+/// Topic of the simulated vehicle in space.
+pub const TOPIC_TRUTH_SAMPLE: &str = "/vehicle/truth3d";
 /// Topic of transforms.
 pub const TOPIC_TRANSFORM: &str = "/tf";
 /// Message encoding of the raw frames.

@@ -10,10 +10,11 @@ use mcap::records::MessageHeader;
 use super::build::build_info;
 use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, Direction, ENCODING_MAVLINK, METADATA_BUILD, METADATA_RUN,
-    RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
-    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_VERDICT, log_message, transform,
+    RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
+    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM,
+    TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
 };
-use super::{DESCRIPTORS_V1, v1};
+use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
 
 /// Small chunks lose little when the process is killed.
@@ -124,6 +125,18 @@ impl<W: Write + Seek> LogWriter<W> {
             Record::OperatorAction(action) => {
                 self.write_v1(TOPIC_OPERATOR, "OperatorAction", action, log_time)
             }
+            Record::PilotStart(start) => {
+                self.write_flight(TOPIC_PILOT_START, "PilotStart", start.as_ref(), log_time)
+            }
+            Record::PilotTick(tick) => {
+                self.write_flight(TOPIC_PILOT_TICK, "PilotTick", tick.as_ref(), log_time)
+            }
+            Record::Estimate(estimate) => {
+                self.write_flight(TOPIC_ESTIMATE, "Estimate", estimate.as_ref(), log_time)
+            }
+            Record::TruthSample(truth) => {
+                self.write_flight(TOPIC_TRUTH_SAMPLE, "TruthSample", truth.as_ref(), log_time)
+            }
             Record::RawFrame(frame) => self.write_raw(frame, log_time),
             Record::Event(event) => self.write_foxglove(
                 TOPIC_EVENTS,
@@ -158,12 +171,33 @@ impl<W: Write + Seek> LogWriter<W> {
         message: &M,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
+        let schema = format!("touchdown.log.v1.{message_name}");
+        self.write_message(topic, (&schema, DESCRIPTORS_V1), message, log_time)
+    }
+
+    fn write_flight<M: prost::Message>(
+        &mut self,
+        topic: &'static str,
+        message_name: &str,
+        message: &M,
+        log_time: u64,
+    ) -> Result<(), LogWriteError> {
+        let schema = format!("touchdown.flight.v1.{message_name}");
+        self.write_message(topic, (&schema, DESCRIPTORS_FLIGHT_V1), message, log_time)
+    }
+
+    fn write_message<M: prost::Message>(
+        &mut self,
+        topic: &'static str,
+        schema: (&str, &[u8]),
+        message: &M,
+        log_time: u64,
+    ) -> Result<(), LogWriteError> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
         buffer.reserve(message.encoded_len());
         message.encode_raw(&mut buffer);
-        let schema = format!("{}.{message_name}", v1_package());
-        let channel = self.channel(topic, "protobuf", Some((&schema, DESCRIPTORS_V1)), &BTreeMap::new())?;
+        let channel = self.channel(topic, "protobuf", Some(schema), &BTreeMap::new())?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
         written
@@ -242,10 +276,6 @@ impl<W: Write + Seek> LogWriter<W> {
 
 const RAW_FRAME_SCHEMA: &[u8] =
     b"One whole MAVLink frame, start marker to signature. Definitions: the attached dialect and its includes.";
-
-fn v1_package() -> &'static str {
-    "touchdown.log.v1"
-}
 
 impl From<v1::ControllerTick> for Record {
     fn from(tick: v1::ControllerTick) -> Self {

@@ -10,6 +10,10 @@ pub enum Endpoint {
     UdpIn(String),
     /// `udpout:HOST:PORT`: speak to it first.
     UdpOut(String),
+    /// `tcpin:ADDRESS:PORT`: serve whoever connects.
+    TcpIn(String),
+    /// `tcpout:HOST:PORT`: connect to it.
+    TcpOut(String),
     /// `serial:DEVICE:BAUD`.
     Serial {
         /// Device, as in `/dev/ttyUSB0`.
@@ -25,14 +29,16 @@ impl Endpoint {
         match self {
             // Ten bits a byte: start, eight, stop.
             Self::Serial { baud, .. } => Some(baud / 10),
-            Self::UdpIn(_) | Self::UdpOut(_) => None,
+            Self::UdpIn(_) | Self::UdpOut(_) | Self::TcpIn(_) | Self::TcpOut(_) => None,
         }
     }
 }
 
 /// Why a link's name was not understood.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}`: {problem}; write udpin:ADDRESS:PORT, udpout:HOST:PORT or serial:DEVICE:BAUD")]
+#[error(
+    "`{given}`: {problem}; write udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or serial:DEVICE:BAUD"
+)]
 pub struct EndpointError {
     given: String,
     problem: &'static str,
@@ -50,11 +56,16 @@ impl FromStr for Endpoint {
             return Err(refuse("the address is empty"));
         }
         match kind {
-            "udpin" | "udpout" => {
+            "udpin" | "udpout" | "tcpin" | "tcpout" => {
                 tail.parse::<u16>()
                     .map_err(|_not_a_port| refuse("the port is not a number from 0 to 65535"))?;
                 let address = rest.to_owned();
-                Ok(if kind == "udpin" { Self::UdpIn(address) } else { Self::UdpOut(address) })
+                Ok(match kind {
+                    "udpin" => Self::UdpIn(address),
+                    "udpout" => Self::UdpOut(address),
+                    "tcpin" => Self::TcpIn(address),
+                    _ => Self::TcpOut(address),
+                })
             }
             "serial" => {
                 let baud = tail.parse().map_err(|_not_a_rate| refuse("the baud rate is not a number"))?;
@@ -73,6 +84,8 @@ impl fmt::Display for Endpoint {
         match self {
             Self::UdpIn(address) => write!(f, "udpin:{address}"),
             Self::UdpOut(address) => write!(f, "udpout:{address}"),
+            Self::TcpIn(address) => write!(f, "tcpin:{address}"),
+            Self::TcpOut(address) => write!(f, "tcpout:{address}"),
             Self::Serial { path, baud } => write!(f, "serial:{path}:{baud}"),
         }
     }
@@ -84,7 +97,14 @@ mod tests {
 
     #[test]
     fn names_are_read_and_written_alike() {
-        for name in ["udpin:0.0.0.0:14550", "udpout:[::1]:14550", "serial:/dev/ttyUSB0:57600"] {
+        for name in [
+            "udpin:0.0.0.0:14550",
+            "udpin:[::]:14550",
+            "udpout:[::1]:14550",
+            "tcpin:0.0.0.0:5760",
+            "tcpout:[::1]:5760",
+            "serial:/dev/ttyUSB0:57600",
+        ] {
             let endpoint: Endpoint = name.parse().unwrap();
             assert_eq!(endpoint.to_string(), name);
         }
@@ -99,6 +119,7 @@ mod tests {
             "udpin:14550",
             "udpin:host:x",
             "tcp:host:1",
+            "tcpin:5760",
             "serial:/dev/x",
             "serial:/dev/x:9",
             "serial::57600",

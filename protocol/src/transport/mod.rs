@@ -2,36 +2,27 @@
 //! the callers'.
 //!
 //! A [`Transport`] is two bounded queues and a task. The task outlives trouble: a serial line that goes
-//! away is tried again twice a second, and a UDP peer that restarts on another port is picked up.
+//! away and a connection that breaks are tried again twice a second, and a UDP peer that restarts on another port is
+//! picked up.
 
 mod endpoint;
 mod serial;
+mod tcp;
 mod udp;
 
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 
+pub use crate::hub::Received;
 pub use endpoint::{Endpoint, EndpointError};
 
-const QUEUE: usize = 256;
-
-/// What a link brings.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Received {
-    /// One datagram: its end is the end of its frames.
-    Datagram(Vec<u8>),
-    /// A piece of a stream.
-    Stream(Vec<u8>),
-    /// The stream has paused for longer than a frame may: what is incomplete will stay so.
-    Silence,
-    /// The link works; says with whom.
-    Up(String),
-    /// The link does not work; says why. It is tried again.
-    Down(String),
-}
+const QUEUE: usize = 1024;
+/// What does not work is tried again after this long.
+const REOPEN_AFTER: Duration = Duration::from_millis(500);
 
 /// An open link.
 #[derive(Debug)]
@@ -68,8 +59,8 @@ impl Transport {
     /// Opens a link. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// A UDP address cannot be bound or resolved. A serial device that is not there is no error: it
-    /// may be plugged in later, and [`Received::Down`] says so until then.
+    /// An address cannot be bound or, for UDP, resolved. A serial device that is not there and a TCP server that does
+    /// not answer are no error: they may come later, and [`Received::Down`] says so until then.
     pub async fn open(mut endpoint: Endpoint) -> io::Result<Self> {
         let (inbox, received) = mpsc::channel(QUEUE);
         let (queue, outbox) = mpsc::channel(QUEUE);
@@ -82,13 +73,20 @@ impl Transport {
                 }
             }
             Endpoint::UdpOut(address) => udp::connect(address, inbox, outbox).await?,
+            Endpoint::TcpIn(address) => {
+                let bound = tcp::listen(address, inbox, outbox).await?;
+                if address.ends_with(":0") {
+                    *address = bound.to_string();
+                }
+            }
+            Endpoint::TcpOut(address) => tcp::connect(address.clone(), inbox, outbox),
             Endpoint::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
         }
         let sender = TransportSender { queue, dropped: Arc::new(AtomicU64::new(0)) };
         Ok(Self { endpoint, received, sender })
     }
 
-    /// Where it leads; for `udpin` with port 0, with the port that the system chose.
+    /// Where it leads; for `udpin` and `tcpin` with port 0, with the port that the system chose.
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
@@ -96,6 +94,14 @@ impl Transport {
     /// The next thing the link brings; `None` once its task has ended.
     pub async fn receive(&mut self) -> Option<Received> {
         self.received.recv().await
+    }
+
+    /// As [`Transport::receive`], to wait for several links at once.
+    pub fn poll_receive(
+        &mut self,
+        context: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<Option<Received>> {
+        self.received.poll_recv(context)
     }
 
     /// What is waiting already, without waiting for more.

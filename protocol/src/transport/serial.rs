@@ -6,9 +6,10 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, ReadHalf, WriteHalf};
 use tokio::sync::mpsc::{Receiver, Sender};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
-use super::Received;
+use super::{REOPEN_AFTER, Received};
 
-const REOPEN_AFTER: Duration = Duration::from_millis(500);
+/// A serial line is one stream, however often it is reopened.
+const STREAM: crate::hub::Peer = 0;
 /// A pause longer than any within a frame: at 9,600 baud the longest frame takes 0.3 s, but without pauses.
 const SILENCE: Duration = Duration::from_millis(100);
 
@@ -73,13 +74,13 @@ async fn read_all(mut reader: ReadHalf<SerialStream>, inbox: &Sender<Received>) 
             Err(_elapsed) => {
                 // Said once a burst, not ten times a second.
                 if std::mem::take(&mut in_burst) {
-                    inbox.send(Received::Silence).await.ok()?;
+                    inbox.send(Received::Silence(STREAM)).await.ok()?;
                 }
                 continue;
             }
         };
         in_burst = true;
-        inbox.send(Received::Stream(buffer[..count].to_vec())).await.ok()?;
+        inbox.send(Received::Stream(STREAM, buffer[..count].to_vec())).await.ok()?;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use tokio::net::{UdpSocket, lookup_host};
 use tokio::sync::mpsc::{Receiver, Sender};
@@ -11,6 +12,8 @@ use super::Received;
 const MAX_DATAGRAM: usize = 2048;
 /// Peers that a listening socket answers at the same time.
 const MAX_PEERS: usize = 4;
+/// After an error.
+const PAUSE: Duration = Duration::from_millis(10);
 
 /// Binds and listens; returns the address that was bound, which names the port if `address` left it open.
 pub(super) async fn listen(
@@ -55,12 +58,18 @@ async fn run(
     loop {
         tokio::select! {
             arrived = socket.recv_from(&mut buffer) => {
-                // An error here speaks of an earlier datagram of ours, not of this socket.
-                let Ok((count, from)) = arrived else { continue };
+                let Ok((count, from)) = arrived else {
+                    // It speaks of an earlier datagram of ours; should it last, it must not run hot.
+                    tokio::time::sleep(PAUSE).await;
+                    continue;
+                };
                 if fixed && !peers.contains(&from) {
                     continue;
                 }
-                if !peers.contains(&from) {
+                if let Some(place) = peers.iter().position(|peer| *peer == from) {
+                    // The most recent last: strangers displace whoever has been silent longest.
+                    peers[place..].rotate_left(1);
+                } else {
                     if peers.len() == MAX_PEERS {
                         peers.remove(0);
                     }

@@ -123,7 +123,7 @@ impl<'a> Export<'a> {
                     self.done.unreadable += 1;
                     self.done.first_unreadable.get_or_insert(reason);
                 }
-                Entry::RawFrame | Entry::Operator | Entry::Other => {}
+                Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
             }
         }
         self.events_until(u64::MAX)?;

@@ -223,7 +223,8 @@ pub struct VerdictLimit {
 }
 
 impl VerdictFacts {
-    pub(super) fn of(verdict: &v1::LandingVerdict) -> Self {
+    /// A recorded verdict.
+    pub fn of(verdict: &v1::LandingVerdict) -> Self {
         let limits = verdict.limits.iter().map(|limit| VerdictLimit {
             name: limit.name.clone(),
             value: limit.value,

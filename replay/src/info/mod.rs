@@ -80,7 +80,7 @@ impl Seen {
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
-            Entry::RawFrame | Entry::Operator | Entry::Other => {}
+            Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
         }
     }
 

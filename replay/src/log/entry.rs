@@ -3,8 +3,8 @@
 use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
-    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
-    TOPIC_TELEMETRY, TOPIC_VERDICT,
+    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
+    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_VERDICT,
 };
 use protocol::log::v1;
 
@@ -19,6 +19,8 @@ pub struct StampedEntry {
     pub log_time_ns: u64,
     /// Its number within its channel.
     pub sequence: u32,
+    /// Its bytes.
+    pub data: Vec<u8>,
     /// Its content.
     pub entry: Entry,
 }
@@ -34,20 +36,27 @@ pub enum Entry {
     Verdict(Box<v1::LandingVerdict>),
     /// What a ground station knew.
     Telemetry(Box<v1::Telemetry>),
-    /// A raw frame; not kept.
+    /// A raw frame: see the record's own bytes.
     RawFrame,
-    /// An operator's action; not kept.
+    /// An operator's action: see the record's own bytes.
     Operator,
+    /// Something that happened, for a person to read; many programs write such.
+    Event(Box<foxglove::messages::Log>),
     /// A record on one of our topics that this build cannot read.
     Unreadable {
         /// Why.
         reason: String,
     },
-    /// Anything else: events and transforms, which many programs write, and records of other programs.
+    /// Anything else: transforms, which many programs write, and records of other programs.
     Other,
 }
 
 impl Entry {
+    /// Whether only a flight log has such a record.
+    pub(super) fn is_ours(&self) -> bool {
+        !matches!(self, Self::Event(_) | Self::Other)
+    }
+
     /// The content of a message on `channel`.
     pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8]) -> Self {
         let Some(channel) = channel else {
@@ -61,6 +70,8 @@ impl Entry {
             TOPIC_OPERATOR => {
                 decoded::<v1::OperatorAction>(channel, "OperatorAction", data, |_| Self::Operator)
             }
+            TOPIC_EVENTS if channel.schema_name == "foxglove.Log" => foxglove::messages::Log::decode(data)
+                .map_or(Self::Other, |event| Self::Event(Box::new(event))),
             TOPIC_RAW_RX | TOPIC_RAW_TX if channel.message_encoding == ENCODING_MAVLINK => Self::RawFrame,
             _ => Self::Other,
         }

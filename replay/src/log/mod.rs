@@ -6,6 +6,7 @@
 mod entry;
 mod error;
 mod head;
+mod recording;
 mod schema;
 mod summary;
 mod tick_order;
@@ -14,7 +15,9 @@ mod tick_ranges;
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-pub(crate) use schema::tick_descriptor;
+pub use recording::{Recording, RecordingError};
+pub(crate) use schema::{described, tick_descriptor};
+pub(crate) use summary::chunk_offsets;
 pub use summary::{SummaryFacts, summary_of};
 pub use tick_order::{Ordered, TickOrder};
 pub use tick_ranges::{Gap, TickRanges};
@@ -96,6 +99,11 @@ impl<R: Read> FlightLog<R> {
         self.reader.channels()
     }
 
+    /// The channel of an entry that was handed out.
+    pub fn channel(&self, id: u16) -> Option<&LogChannel> {
+        self.reader.channel(id)
+    }
+
     /// What ended the reading early; `None` for a whole log, once the entries are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
         self.reader.damage()
@@ -118,9 +126,9 @@ impl<R: Read> FlightLog<R> {
                 None => return self.end().map(|()| None),
                 Some(LogItem::Message { channel_id, log_time_ns, sequence, data }) => {
                     let entry = Entry::decode(self.reader.channel(channel_id), &data);
-                    self.recognised |= !matches!(entry, Entry::Other);
+                    self.recognised |= entry.is_ours();
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
-                    return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, entry }));
+                    return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, data, entry }));
                 }
                 Some(item) => self.head.take(item),
             }

@@ -19,6 +19,11 @@ pub(crate) fn tick_descriptor() -> Option<MessageDescriptor> {
     POOL.get_message_by_name("touchdown.log.v1.ControllerTick")
 }
 
+/// Describes a record of the log's own package by its full name; `None` for any other.
+pub(crate) fn described(full_name: &str) -> Option<MessageDescriptor> {
+    full_name.starts_with(PACKAGE).then(|| POOL.get_message_by_name(full_name))?
+}
+
 /// What keeps a record from being understood exactly: a missing or an unknown field.
 pub(super) fn complaint(full_name: &str, data: &[u8]) -> Option<String> {
     let descriptor = POOL.get_message_by_name(full_name)?;

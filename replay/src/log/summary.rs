@@ -18,8 +18,21 @@ pub struct SummaryFacts {
     pub last_log_time_ns: u64,
 }
 
-/// The summary at the end of a file, if it has one that can be read.
+/// What the summary at the end of a file says, if it has one that can be read.
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
+    let stats = read_summary(path)?.stats?;
+    Some(SummaryFacts { message_count: stats.message_count, last_log_time_ns: stats.message_end_time })
+}
+
+/// Where the chunks of a file begin, in order, as its summary says; empty without one.
+pub(crate) fn chunk_offsets(path: &Path) -> Vec<u64> {
+    let indexes = read_summary(path).map(|summary| summary.chunk_indexes).unwrap_or_default();
+    let mut offsets: Vec<u64> = indexes.iter().map(|index| index.chunk_start_offset).collect();
+    offsets.sort_unstable();
+    offsets
+}
+
+fn read_summary(path: &Path) -> Option<mcap::Summary> {
     let mut file = File::open(path).ok()?;
     let size = file.metadata().ok()?.len();
     let options =
@@ -34,6 +47,5 @@ pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
             SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to).ok()?),
         }
     }
-    let stats = reader.finish()?.stats?;
-    Some(SummaryFacts { message_count: stats.message_count, last_log_time_ns: stats.message_end_time })
+    reader.finish()
 }

@@ -1,12 +1,26 @@
-//! Reports as text for people and as JSON for programs.
+//! Reports as text for people, as JSON for programs and as JUnit XML for build servers.
 //!
 //! Text from a log is made fit for a terminal first: a log may come from anywhere.
 
+mod compare;
+mod evaluate;
 mod info;
+mod junit;
+mod recover;
+mod refly;
+mod sweep;
+mod tick;
 mod verify;
 
+pub use compare::{compare_cases, print_compare};
+pub use evaluate::{print_evaluate, print_evaluate_csv};
 pub use info::print_info;
-pub use verify::print_verify;
+pub use junit::{JunitCase, JunitOutcome, print_junit};
+pub use recover::print_recovery;
+pub use refly::print_refly;
+pub use sweep::{print_bisect, print_sweep, print_sweep_csv};
+pub use tick::print_tick;
+pub use verify::{print_verify, verify_case};
 
 use std::io::{self, Write};
 

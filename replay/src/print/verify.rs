@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use super::{counted, shown};
-use crate::verify::{Divergence, FieldDifference, Outcome, VerifyReport};
+use super::{JunitCase, JunitOutcome, counted, shown};
+use crate::verify::{Consequence, Divergence, FieldDifference, Growth, GrowthStep, Outcome, VerifyReport};
 
 /// Fields of the first diverged tick that are shown.
 const FIELDS_SHOWN: usize = 5;
@@ -42,6 +42,12 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     if let Some(first) = &report.first_divergence {
         print_divergence(first, output)?;
     }
+    if let Some(growth) = &report.growth {
+        print_growth(growth, output)?;
+    }
+    if let Some(consequence) = &report.consequence {
+        print_consequence(consequence, output)?;
+    }
     if let Some(obstacle) = &report.obstacle {
         writeln!(output, "not every tick was compared: {}", shown(&obstacle.to_string()))?;
     }
@@ -76,4 +82,65 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
         writeln!(output, "    apart       {ulps} ULP")?;
     }
     Ok(())
+}
+
+/// The first tick, those twice and four times and so on behind it, the worst and the last.
+fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "how it grows (gimbal command, predicted touchdown, worst field):")?;
+    let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
+    let mut shown: Vec<&GrowthStep> = doubling.filter_map(|place| growth.steps.get(place)).collect();
+    shown.extend(growth.peak.iter().chain(&growth.last));
+    shown.sort_by_key(|step| step.tick);
+    shown.dedup_by_key(|step| step.tick);
+    for step in shown {
+        let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
+        writeln!(
+            output,
+            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {:>10.3e} m  {ulps} ULP in {}",
+            step.tick,
+            step.time_s,
+            step.gimbal_rad,
+            step.touchdown_m,
+            counted(step.fields_different as u64, "field")
+        )?;
+    }
+    Ok(())
+}
+
+fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::Result<()> {
+    if let Some(obstacle) = &consequence.obstacle {
+        return writeln!(output, "verdict: whether it would change is not known: {}", shown(obstacle));
+    }
+    let words = |verdict: Option<bool>| match verdict {
+        Some(true) => "LANDED",
+        Some(false) => "NOT LANDED",
+        None => "no verdict",
+    };
+    let answer = match consequence.changed {
+        Some(true) => "would CHANGE",
+        Some(false) => "would not change",
+        None => "is not comparable",
+    };
+    writeln!(
+        output,
+        "verdict: {answer}: recorded {}, flown on by this build from tick {} (closed loop) {}",
+        words(consequence.recorded.as_ref().map(|verdict| verdict.landed)),
+        consequence.from_tick,
+        words(consequence.reflown.as_ref().map(|verdict| verdict.landed))
+    )
+}
+
+/// A verification as a case for a build server.
+pub fn verify_case(report: &VerifyReport) -> JunitCase {
+    let mut text = Vec::new();
+    // Writing into memory cannot fail.
+    let _ = print_verify(report, &mut text);
+    let details = String::from_utf8_lossy(&text).into_owned();
+    let message = details.lines().next().unwrap_or_default().to_owned();
+    let outcome = match report.outcome {
+        Outcome::Identical | Outcome::IdenticalReadablePart => JunitOutcome::Passed,
+        Outcome::Diverged => JunitOutcome::Failed { message, details },
+        Outcome::NotReplayable => JunitOutcome::Error { message: details },
+    };
+    JunitCase { name: format!("verify {}", shown(&report.file)), outcome }
 }

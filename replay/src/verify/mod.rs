@@ -6,12 +6,19 @@
 //!
 //! The controller remembers its plan, so a tick can be re-executed only if every tick before it can: at a gap the
 //! comparison ends, and the report says so.
+//!
+//! Of a divergence the report says how it grows from tick to tick, and, when a whole file is verified, whether the
+//! landing would end otherwise: for that alone the flight is flown on in simulation from the first tick that differs.
 
+mod consequence;
 mod difference;
+mod growth;
 mod report;
 mod verifier;
 
+pub use consequence::Consequence;
 pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
+pub use growth::{Growth, GrowthStep};
 pub use report::{Divergence, Obstacle, Outcome, VerifyReport};
 pub use verifier::Verifier;
 
@@ -20,7 +27,7 @@ use std::path::Path;
 
 use flight::profile::Profile;
 
-use crate::log::{Entry, FlightLog, Head, LogError, Ordered, TickOrder};
+use crate::log::{Entry, FlightLog, Head, LogError, Ordered, Recording, TickOrder};
 
 /// Verifies a log file.
 ///
@@ -28,12 +35,19 @@ use crate::log::{Entry, FlightLog, Head, LogError, Ordered, TickOrder};
 /// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
 pub fn verify(path: &Path) -> Result<VerifyReport, LogError> {
     let mut log = FlightLog::open(path)?;
-    verify_log(&mut log, || {
+    let mut report = verify_log(&mut log, || {
         // Another tool may have moved the attachments behind the messages.
         let mut whole = FlightLog::open(path)?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
-    })
+    })?;
+    // A log too long to fly on from has been compared all the same.
+    if let Some(first) = &report.first_divergence
+        && let Ok(recording) = Recording::open(path)
+    {
+        report.consequence = Some(Consequence::of(&recording, first.tick));
+    }
+    Ok(report)
 }
 
 /// Verifies a log that is being read. `whole_head` is asked for the log's whole head if its first tick comes

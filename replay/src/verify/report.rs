@@ -3,7 +3,9 @@
 use serde::Serialize;
 use tick_log::TickLogError;
 
+use super::consequence::Consequence;
 use super::difference::FieldDifference;
+use super::growth::Growth;
 use super::verifier::Verifier;
 use crate::log::BuildComparison;
 
@@ -118,6 +120,10 @@ pub struct VerifyReport {
     pub flight_s: Option<f64>,
     /// The first tick that differs.
     pub first_divergence: Option<Divergence>,
+    /// How the divergence grows.
+    pub growth: Option<Growth>,
+    /// Whether the landing would end otherwise; of whole files only.
+    pub consequence: Option<Consequence>,
     /// Why not every tick was compared.
     pub obstacle: Option<Obstacle>,
     /// What ended the reading of the log early.
@@ -135,8 +141,8 @@ impl VerifyReport {
         damage: Option<String>,
         build: BuildComparison,
     ) -> Self {
-        let (counts, first_divergence) =
-            verifier.map(|verifier| (verifier.counts, verifier.first)).unwrap_or_default();
+        let (counts, first_divergence, growth) =
+            verifier.map(|verifier| (verifier.counts, verifier.first, verifier.growth)).unwrap_or_default();
         let outcome = if first_divergence.is_some() {
             Outcome::Diverged
         } else if obstacle.is_some() {
@@ -156,7 +162,9 @@ impl VerifyReport {
             fields_different: counts.fields_different,
             span: counts.first.zip(counts.last).map(|(first, last)| (first.tick, last.tick)),
             flight_s: counts.first.zip(counts.last).map(|(first, last)| last.time_s - first.time_s),
+            growth: first_divergence.is_some().then_some(growth),
             first_divergence,
+            consequence: None,
             obstacle,
             damage,
             build,

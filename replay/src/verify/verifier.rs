@@ -1,13 +1,15 @@
 //! The controller, fed from a log.
 
-use flight::controller::{ControllerConfig, ControllerState, step};
+use flight::phase::Phase;
 use flight::profile::Profile;
 use prost::Message as _;
 use protocol::log::v1;
-use tick_log::{TickLogError, input_from_log, tick_to_log};
+use tick_log::TickLogError;
 
 use super::difference::differences;
+use super::growth::Growth;
 use super::report::Divergence;
+use crate::controller::LoggedController;
 
 /// Fields of the first diverged tick that are kept.
 const FIELDS_KEPT: usize = 32;
@@ -15,11 +17,12 @@ const FIELDS_KEPT: usize = 32;
 /// Re-executes ticks and compares them; ticks must come in order, from the first one on.
 #[derive(Debug)]
 pub struct Verifier {
-    state: ControllerState,
+    controller: LoggedController,
     recorded: Vec<u8>,
     recomputed: Vec<u8>,
     pub(super) counts: Counts,
     pub(super) first: Option<Divergence>,
+    pub(super) growth: Growth,
 }
 
 /// What has been compared so far.
@@ -43,11 +46,12 @@ impl Verifier {
     /// The controller of a profile before its first tick.
     pub fn new(profile: &Profile) -> Self {
         Self {
-            state: ControllerState::new(&ControllerConfig::from_profile(profile)),
+            controller: LoggedController::new(profile),
             recorded: Vec::new(),
             recomputed: Vec::new(),
             counts: Counts::default(),
             first: None,
+            growth: Growth::default(),
         }
     }
 
@@ -56,28 +60,26 @@ impl Verifier {
     /// # Errors
     /// The recorded input cannot be given to this build's controller.
     pub fn check(&mut self, tick: &v1::ControllerTick) -> Result<(), TickLogError> {
-        let input = input_from_log(&tick.input)?;
-        let output = step(&mut self.state, &input);
-        // Measured times are copied: they were not decided.
-        let again = tick_to_log(&input, &output, self.state.digest(), tick.solve_time_s, tick.deadline_s);
+        let again = self.controller.run_again(tick)?;
         encode_into(tick, &mut self.recorded);
         encode_into(&again, &mut self.recomputed);
 
         self.counts.ticks += 1;
-        let moment = Moment { tick: input.tick, time_s: input.time_s };
+        let moment = Moment { tick: tick.input.tick, time_s: tick.input.time_s };
         self.counts.first.get_or_insert(moment);
         self.counts.last = Some(moment);
         if self.recorded != self.recomputed {
             let mut fields = differences(&self.recorded, &self.recomputed);
             self.counts.ticks_different += 1;
             self.counts.fields_different += fields.len() as u64;
+            self.growth.note(tick, &again, &fields);
             if self.first.is_none() {
                 let fields_different = fields.len();
                 fields.truncate(FIELDS_KEPT);
                 self.first = Some(Divergence {
                     tick: tick.input.tick,
                     time_s: tick.input.time_s,
-                    phase: input.phase.name(),
+                    phase: phase_name(tick.input.phase),
                     fields_different,
                     fields,
                 });
@@ -85,6 +87,11 @@ impl Verifier {
         }
         Ok(())
     }
+}
+
+/// The controller has taken the input, so the phase is a known one.
+fn phase_name(number: u32) -> &'static str {
+    u8::try_from(number).ok().and_then(Phase::from_index).map_or("unknown", Phase::name)
 }
 
 fn encode_into(tick: &v1::ControllerTick, bytes: &mut Vec<u8>) {

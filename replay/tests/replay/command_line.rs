@@ -8,29 +8,29 @@ use tempfile::TempDir;
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::foreign::foreign_mcap;
 
-struct Files {
-    directory: TempDir,
+pub(crate) struct Files {
+    pub(crate) directory: TempDir,
 }
 
 impl Files {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { directory: tempfile::tempdir().unwrap() }
     }
 
-    fn file(&self, bytes: &[u8]) -> PathBuf {
+    pub(crate) fn file(&self, bytes: &[u8]) -> PathBuf {
         let path = self.directory.path().join("flight.mcap");
         std::fs::write(&path, bytes).unwrap();
         path
     }
 }
 
-fn replay(question: &str, file: &PathBuf) -> Command {
+pub(crate) fn replay(question: &str, file: &PathBuf) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_replay"));
     command.arg(question).arg(file);
     command
 }
 
-fn run(command: &mut Command) -> (i32, String, String) {
+pub(crate) fn run(command: &mut Command) -> (i32, String, String) {
     let Output { status, stdout, stderr } = command.output().unwrap();
     (status.code().unwrap(), String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap())
 }

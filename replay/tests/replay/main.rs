@@ -2,8 +2,15 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod command_line;
+mod commands;
 mod damage;
 mod divergence;
 mod flown;
 mod foreign;
+mod limits;
 mod obstacles;
+mod pages;
+mod recovery;
+mod simulated;
+mod tables;
+mod what_if;

@@ -3,8 +3,9 @@
 use std::io::Cursor;
 
 use protocol::log::v1::ControllerTick;
+use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info_of};
-use replay::log::FlightLog;
+use replay::log::{FlightLog, Recording};
 use replay::verify::{Obstacle, Outcome};
 
 use crate::flown::{FLIGHT, PROFILE, Recipe, WHOLE, verify_bytes, verify_ticks, write_log};
@@ -105,9 +106,16 @@ fn a_tick_of_a_newer_version() {
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
     writer.write_to_known_channel(&header, &data).unwrap();
     writer.finish().unwrap();
-    let report = verify_bytes(&writer.into_inner().into_inner()).unwrap();
+    let bytes = writer.into_inner().into_inner();
+    let report = verify_bytes(&bytes).unwrap();
     assert_eq!(report.outcome, Outcome::NotReplayable);
     let reason = report.obstacle.unwrap().to_string();
+    assert!(reason.contains("newer version"), "{reason}");
+    let recording =
+        Recording::read(&mut FlightLog::read("test.mcap".to_owned(), &bytes[..]).unwrap()).unwrap();
+    let reason = evaluate(&recording, &[]).unwrap_err().to_string();
+    assert!(reason.contains("no attachment profile.toml"), "{reason}");
+    let reason = recording.replayable_ticks().unwrap_err().to_string();
     assert!(reason.contains("newer version"), "{reason}");
 }
 

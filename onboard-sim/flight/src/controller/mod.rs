@@ -9,6 +9,7 @@
 //! powered tick starts from a converged plan. When no converged plan can be had it degrades in announced steps:
 //! see [`ControlLevel`].
 
+mod inspect;
 mod plan;
 mod step;
 

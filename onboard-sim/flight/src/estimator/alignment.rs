@@ -46,14 +46,14 @@ pub enum AlignmentError {
 pub struct PadStart {
     /// The attitude, with the heading that was given.
     pub world_from_body: UnitQuaternion<f64>,
-    /// The gyro's bias, body, rad/s: to be taken from every later sample.
+    /// The gyro's bias, body, rad/s, for [`Estimator::with_gyro_bias`](super::Estimator::with_gyro_bias).
     pub gyro_bias_rad_s: Vector3<f64>,
 }
 
 impl PadAlignment {
-    /// Takes one sample; one that is not a number is left out.
+    /// Takes one sample; one that no inertial unit can send is left out.
     pub fn take(&mut self, imu: &ImuSample) {
-        if !imu.is_finite() {
+        if !imu.is_plausible() {
             return;
         }
         self.samples = self.samples.saturating_add(1);

@@ -75,7 +75,7 @@ impl Default for EstimatorConfig {
             gyro_noise_deg_s_sqrt_hz: 0.05,
             gyro_bias_walk_deg_s_sqrt_s: 0.002,
             accelerometer_noise_mg_sqrt_hz: 0.65,
-            accelerometer_bias_walk_mg_sqrt_s: 0.6,
+            accelerometer_bias_walk_mg_sqrt_s: 0.4,
             barometer_m: 0.08,
             barometer_offset_walk_m_sqrt_s: 0.03,
             barometer_ram_walk_sqrt_s: 0.001,
@@ -85,12 +85,74 @@ impl Default for EstimatorConfig {
             gnss_horizontal_walk_m_sqrt_s: 0.15,
             gnss_vertical_walk_m_sqrt_s: 0.25,
             lidar_m: 0.06,
-            wind_walk_m_s_sqrt_s: 0.7,
+            wind_walk_m_s_sqrt_s: 0.5,
             wind_shear_exponent: 1.0 / 7.0,
             sideways_force_share: 0.1,
             gate_sigmas: 5.0,
             health: HealthLimits::default(),
         }
+    }
+}
+
+/// A figure the estimator cannot work with.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("estimator: {field} is {found}, accepted is {accepted}")]
+pub struct EstimatorConfigError {
+    /// The field.
+    pub field: &'static str,
+    /// The value found.
+    pub found: f64,
+    /// What would be accepted.
+    pub accepted: &'static str,
+}
+
+impl EstimatorConfig {
+    /// Checks every figure.
+    ///
+    /// # Errors
+    /// The first one that the estimator cannot work with.
+    pub fn validate(&self) -> Result<(), EstimatorConfigError> {
+        if !(0.001..=0.02).contains(&self.frame_s) {
+            let accepted = "0.001 to 0.02";
+            return Err(EstimatorConfigError { field: "frame_s", found: self.frame_s, accepted });
+        }
+        let sizes = [
+            ("gravity_m_s2", self.gravity_m_s2),
+            ("gyro_noise_deg_s_sqrt_hz", self.gyro_noise_deg_s_sqrt_hz),
+            ("accelerometer_noise_mg_sqrt_hz", self.accelerometer_noise_mg_sqrt_hz),
+            ("barometer_m", self.barometer_m),
+            ("gnss_horizontal_m", self.gnss_horizontal_m),
+            ("gnss_vertical_m", self.gnss_vertical_m),
+            ("gnss_velocity_m_s", self.gnss_velocity_m_s),
+            ("lidar_m", self.lidar_m),
+            ("gate_sigmas", self.gate_sigmas),
+            ("health.velocity_m_s", self.health.velocity_m_s),
+            ("health.height_m", self.health.height_m),
+            ("health.horizontal_m", self.health.horizontal_m),
+            ("health.tilt_deg", self.health.tilt_deg),
+        ];
+        for (field, found) in sizes {
+            if !(found.is_finite() && found > 0.0) {
+                return Err(EstimatorConfigError { field, found, accepted: "a finite number above 0" });
+            }
+        }
+        let walks = [
+            ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
+            ("accelerometer_bias_walk_mg_sqrt_s", self.accelerometer_bias_walk_mg_sqrt_s),
+            ("barometer_offset_walk_m_sqrt_s", self.barometer_offset_walk_m_sqrt_s),
+            ("barometer_ram_walk_sqrt_s", self.barometer_ram_walk_sqrt_s),
+            ("gnss_horizontal_walk_m_sqrt_s", self.gnss_horizontal_walk_m_sqrt_s),
+            ("gnss_vertical_walk_m_sqrt_s", self.gnss_vertical_walk_m_sqrt_s),
+            ("wind_walk_m_s_sqrt_s", self.wind_walk_m_s_sqrt_s),
+            ("wind_shear_exponent", self.wind_shear_exponent),
+            ("sideways_force_share", self.sideways_force_share),
+        ];
+        for (field, found) in walks {
+            if !(found.is_finite() && found >= 0.0) {
+                return Err(EstimatorConfigError { field, found, accepted: "a finite number not below 0" });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -140,7 +202,7 @@ impl StartUncertainty {
             tilt_deg: 0.2,
             heading_deg: 2.0,
             gyro_bias_deg_s: 0.02,
-            accelerometer_bias_mg: 4.0,
+            accelerometer_bias_mg: 3.0,
             wind_m_s: 4.0,
             barometer_offset_m: 0.1,
             barometer_ram: 0.05,
@@ -158,11 +220,11 @@ impl StartUncertainty {
             tilt_deg: 0.7,
             heading_deg: 2.0,
             gyro_bias_deg_s: 0.02,
-            accelerometer_bias_mg: 4.0,
+            accelerometer_bias_mg: 3.0,
             wind_m_s: 4.0,
             barometer_offset_m: 0.3,
             barometer_ram: 0.05,
-            gnss_horizontal_offset_m: 0.7,
+            gnss_horizontal_offset_m: 0.65,
             gnss_vertical_offset_m: 1.1,
         }
     }
@@ -184,5 +246,36 @@ impl StartUncertainty {
             self.gnss_horizontal_offset_m,
             self.gnss_vertical_offset_m,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_changes_what_it_names_and_a_figure_that_cannot_be_is_refused_by_name() {
+        let config: EstimatorConfig = toml::from_str("lidar_m = 0.1\n[health]\ntilt_deg = 2.0").unwrap();
+        assert_eq!(config.validate(), Ok(()));
+        let expected = EstimatorConfig {
+            lidar_m: 0.1,
+            health: HealthLimits { tilt_deg: 2.0, ..HealthLimits::default() },
+            ..EstimatorConfig::default()
+        };
+        assert_eq!(config, expected);
+        assert!(toml::from_str::<EstimatorConfig>("lidar = 0.1").is_err());
+        let refused = |config: EstimatorConfig| config.validate().unwrap_err().to_string();
+        assert_eq!(
+            refused(EstimatorConfig { frame_s: 0.0, ..config }),
+            "estimator: frame_s is 0, accepted is 0.001 to 0.02"
+        );
+        assert_eq!(
+            refused(EstimatorConfig { lidar_m: f64::NAN, ..config }),
+            "estimator: lidar_m is NaN, accepted is a finite number above 0"
+        );
+        assert_eq!(
+            refused(EstimatorConfig { wind_walk_m_s_sqrt_s: -1.0, ..config }),
+            "estimator: wind_walk_m_s_sqrt_s is -1, accepted is a finite number not below 0"
+        );
     }
 }

@@ -14,7 +14,7 @@ pub struct GateCounters {
 /// The gates' counters, one a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gates {
-    /// Inertial samples; one that is not a number is replaced by the one before.
+    /// Inertial samples; one that no inertial unit can send is replaced by the one before.
     pub imu: GateCounters,
     /// Barometer.
     pub barometer: GateCounters,

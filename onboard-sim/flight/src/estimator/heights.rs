@@ -10,6 +10,9 @@ const BAROMETER_KEEPS_S: f64 = 0.25;
 /// Errors of the vertical velocity last about this long, s.
 const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 
+/// Growth of the height's variance with each measurement that does not fit.
+const DOUBT_FACTOR: f64 = 1.1;
+
 /// Heights of the centre of gravity over the pad, from two sources.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeightSources {
@@ -98,9 +101,9 @@ impl HeightChannel {
         let with_offset = height * self.cross_m2 + offset * self.offset_m2;
         let variance = height * with_height + offset * with_offset + noise;
         let gate = config.gate_sigmas * config.gate_sigmas * variance;
-        if !(innovation_m * innovation_m <= gate) {
-            // What does not fit makes the channel doubt itself a little, so that it cannot lock out a sensor.
-            self.height_m2 += 0.01 * noise;
+        if innovation_m.is_nan() || innovation_m * innovation_m > gate {
+            // What does not fit makes the channel doubt itself a little, so that it cannot lock a sensor out.
+            self.height_m2 *= DOUBT_FACTOR;
             return;
         }
         let (gain_height, gain_offset) = (with_height / variance, with_offset / variance);

@@ -60,7 +60,7 @@ impl History {
     pub(super) fn since(&self, valid_at_s: f64, velocity_m_s: &Vector3<f64>) -> Option<Since> {
         let now = self.ring[self.newest];
         let age_s = now.time_s - valid_at_s;
-        if !(age_s >= -1e-9) {
+        if age_s.is_nan() || age_s < -1e-9 {
             return None;
         }
         let mut later = now;

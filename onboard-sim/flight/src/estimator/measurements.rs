@@ -2,6 +2,11 @@
 
 use nalgebra::Vector3;
 
+/// Beyond the range of hobby gyros (4,000 deg/s), rad/s.
+pub const LARGEST_RATE_RAD_S: f64 = 75.0;
+/// Beyond the range of high-g accelerometers (200 g), m/s^2.
+pub const LARGEST_SPECIFIC_FORCE_M_S2: f64 = 2000.0;
+
 /// Inertial measurement unit, the mean over the frame that has just ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuSample {
@@ -12,9 +17,11 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
-    /// Every number is finite.
-    pub fn is_finite(&self) -> bool {
-        self.gyro_rad_s.iter().chain(self.specific_force_m_s2.iter()).all(|value| value.is_finite())
+    /// Every number is one that an inertial unit can send: below [`LARGEST_RATE_RAD_S`] and
+    /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
+    pub fn is_plausible(&self) -> bool {
+        self.gyro_rad_s.iter().all(|rate| rate.abs() <= LARGEST_RATE_RAD_S)
+            && self.specific_force_m_s2.iter().all(|force| force.abs() <= LARGEST_SPECIFIC_FORCE_M_S2)
     }
 }
 
@@ -40,25 +47,4 @@ pub struct Measurements {
     pub gnss: Option<GnssFix>,
     /// Distance to the ground along body `-x` from the lidar, m.
     pub lidar_range_m: Option<f64>,
-}
-
-/// What the flight computer knows about the vehicle this frame, and the estimator needs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VehicleNow {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Air density, kg/m^3.
-    pub air_density_kg_m3: f64,
-    /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their force is along the
-    /// relative wind, so this counts sideways as well.
-    pub fin_drag_area_m2: f64,
-    /// Distance of the fins ahead of the centre of gravity, m.
-    pub fin_ahead_of_cg_m: f64,
-    /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that times the
-    /// dynamic pressure of the sideways wind alone.
-    pub crossflow_area_m2: f64,
-    /// The landing motor is lit. Its sideways force is not known well enough to feel the wind beside it.
-    pub motor_burning: bool,
-    /// Distance of the lidar behind the centre of gravity, m.
-    pub lidar_behind_cg_m: f64,
 }

@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is taken in the world). The inertial unit carries the state forward in full
-//! every frame. Its error, 22 numbers ([`covariance`]), is corrected by scalars: barometer with offset and ram error,
+//! every frame. its error, 22 numbers, is corrected by scalars: barometer with offset and ram error,
 //! late satellite fixes with a slowly wandering offset, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are all that a frame depends on: a log of them flies the estimator again, bit
@@ -26,11 +26,12 @@ mod strapdown;
 #[cfg(test)]
 mod tests;
 mod updates;
+mod vehicle;
 mod wind;
 
 use nalgebra::{Vector2, Vector3};
 
-pub use self::config::{EstimatorConfig, GRAVITY_M_S2, HealthLimits, StartUncertainty};
+pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GYRO_BIAS, N,
     POSITION, Row, VELOCITY, WIND,
@@ -41,8 +42,11 @@ pub use self::health::{Doubt, Health};
 use self::heights::HeightChannel;
 pub use self::heights::HeightSources;
 use self::history::History;
-pub use self::measurements::{GnssFix, ImuSample, Measurements, VehicleNow};
+pub use self::measurements::{
+    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements,
+};
 use self::strapdown::{Noise, Nominal, Pending};
+pub use self::vehicle::VehicleNow;
 use self::wind::Sideways;
 use crate::rigid::RigidState;
 
@@ -144,6 +148,14 @@ impl Estimator {
             restarted_at_s: f64::NEG_INFINITY,
             surprised_at_s: f64::NEG_INFINITY,
         }
+    }
+
+    /// The same with a gyro bias known from the pad, body, rad/s.
+    #[must_use]
+    pub fn with_gyro_bias(mut self, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        self.nominal.gyro_bias_rad_s = gyro_bias_rad_s;
+        self.last_good = self.nominal;
+        self
     }
 
     /// End of the last frame, s.

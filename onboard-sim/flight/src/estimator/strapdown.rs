@@ -118,7 +118,7 @@ impl Estimator {
     /// attitude in the middle of the frame.
     pub(super) fn carry_forward(&mut self, imu: &ImuSample) {
         let interval_s = self.config.frame_s;
-        if self.gates.imu.count(imu.is_finite()) {
+        if self.gates.imu.count(imu.is_plausible()) {
             self.last_imu = *imu;
         }
         let state = &mut self.nominal;

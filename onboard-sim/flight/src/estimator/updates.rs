@@ -10,8 +10,8 @@ use super::{Estimator, GnssFix};
 const LIDAR_COS_TILT: f64 = 0.85;
 /// What the filter adds to its doubt when satellite velocities keep pulling one way: standard deviations.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
-const DOUBT_ATTITUDE_RAD: f64 = 0.02;
-const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.01;
+const DOUBT_ATTITUDE_RAD: f64 = 0.04;
+const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
 /// A barometer left out so often in a row has a new offset, m.
 const BAROMETER_REJECTIONS: u32 = 25;
@@ -46,7 +46,7 @@ impl Estimator {
         let normalised_squared = innovation * innovation / variance;
         let gate = self.config.gate_sigmas * self.config.gate_sigmas;
         // Written so that a number that is none is refused.
-        let accepted = normalised_squared <= gate && variance > 0.0;
+        let accepted = normalised_squared <= gate && variance > 0.0 && variance.is_finite();
         if accepted {
             let mut gain = with;
             for (index, value) in gain.iter_mut().enumerate() {
@@ -152,7 +152,7 @@ impl Estimator {
     /// are the height over the cosine of the tilt.
     pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
-        if !(nose.z > LIDAR_COS_TILT) {
+        if nose.z < LIDAR_COS_TILT {
             self.gates.lidar.count(false);
             return;
         }

@@ -7,8 +7,8 @@
 //!
 //! ```text
 //! roll  = sum ROLL[i]  C_l g(s_i)
-//! pitch = sum PITCH[i] (C_d sin 30 g(s_i) + a C_l cos 30 s_i)
-//! yaw   = sum YAW[i]   (C_d cos 30 g(s_i) - a C_l sin 30 s_i)
+//! pitch = sum PITCH[i] (C_d sin 30 g(s_i) - a C_l cos 30 s_i)
+//! yaw   = sum YAW[i]   (C_d cos 30 g(s_i) + a C_l sin 30 s_i)
 //! ```
 //!
 //! What does not fit between the stops is given up in the order drag, roll, then pitch and yaw together, so that a
@@ -99,6 +99,12 @@ fn largest_roll(tilt: &[f64; 4], sign: f64, room: f64) -> f64 {
     largest.max(0.0)
 }
 
+/// A slope, or the least of the same sense as that of half-open fins.
+fn floored(here: f64, half: f64) -> f64 {
+    let least = SLOPE_FLOOR * half.abs();
+    half.signum() * (here * half.signum()).max(least)
+}
+
 fn extremes(values: &[f64; 4]) -> (f64, f64) {
     values
         .iter()
@@ -138,8 +144,8 @@ impl Allocation {
             let s = sines[i];
             let g_m = self.model.radius_m(s) * s;
             sum.roll_n_m += ROLL[i] * lift_m2 * g_m;
-            sum.pitch_n_m += PITCH[i] * (drag_m2 * SIN_30 * g_m + self.arm_m * lift_m2 * COS_30 * s);
-            sum.yaw_n_m += YAW[i] * (drag_m2 * COS_30 * g_m - self.arm_m * lift_m2 * SIN_30 * s);
+            sum.pitch_n_m += PITCH[i] * (drag_m2 * SIN_30 * g_m - self.arm_m * lift_m2 * COS_30 * s);
+            sum.yaw_n_m += YAW[i] * (drag_m2 * COS_30 * g_m + self.arm_m * lift_m2 * SIN_30 * s);
         }
         sum
     }
@@ -151,15 +157,15 @@ impl Allocation {
             let g_slope_m = 0.5 * self.model.body_diameter_m + self.model.length_m * s;
             Moments {
                 roll_n_m: 4.0 * lift_m2 * g_slope_m,
-                pitch_n_m: 4.0 * (drag_m2 * SIN_30 * g_slope_m + self.arm_m * lift_m2 * COS_30),
-                yaw_n_m: 4.0 * (drag_m2 * COS_30 * g_slope_m - self.arm_m * lift_m2 * SIN_30),
+                pitch_n_m: 4.0 * (drag_m2 * SIN_30 * g_slope_m - self.arm_m * lift_m2 * COS_30),
+                yaw_n_m: 4.0 * (drag_m2 * COS_30 * g_slope_m + self.arm_m * lift_m2 * SIN_30),
             }
         };
         let (here, half) = (at(mean), at(0.5));
         Moments {
-            roll_n_m: here.roll_n_m.max(SLOPE_FLOOR * half.roll_n_m),
-            pitch_n_m: here.pitch_n_m.max(SLOPE_FLOOR * half.pitch_n_m),
-            yaw_n_m: here.yaw_n_m.max(SLOPE_FLOOR * half.yaw_n_m),
+            roll_n_m: floored(here.roll_n_m, half.roll_n_m),
+            pitch_n_m: floored(here.pitch_n_m, half.pitch_n_m),
+            yaw_n_m: floored(here.yaw_n_m, half.yaw_n_m),
         }
     }
 

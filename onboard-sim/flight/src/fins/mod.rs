@@ -25,8 +25,9 @@ pub use allocation::{Allocation, FinCommand, OpeningRange};
 
 use core::f64::consts::FRAC_PI_6;
 
-/// Signs of the fins' roll moments.
-pub const ROLL: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
+/// Signs of the fins' roll moments, for hinges on the side that makes the lift's side force turn the vehicle with the
+/// drag in yaw and against it, but harder, in pitch. Hinged on the other side the two would all but cancel in yaw.
+pub const ROLL: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 /// Signs of the fins' pitch moments (Eq. 16).
 pub const PITCH: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
 /// Signs of the fins' yaw moments (Eq. 17).

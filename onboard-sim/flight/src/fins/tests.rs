@@ -17,7 +17,7 @@ fn model() -> FinModel {
 
 fn allocation() -> Allocation {
     let range = OpeningRange { min_rad: 20.0_f64.to_radians(), max_rad: FRAC_PI_2 };
-    Allocation { model: model(), arm_m: 0.11, range }
+    Allocation { model: model(), arm_m: 0.23, range }
 }
 
 fn along_the_axis(dynamic_pressure_pa: f64) -> Flow {
@@ -128,7 +128,7 @@ fn pitch_takes_the_room_before_roll_and_drag() {
     let moments = Moments { roll_n_m: 5.0, pitch_n_m: 40.0, yaw_n_m: 0.0 };
     let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2: 0.0 }, 900.0);
     let closed_rad = 20.0_f64.to_radians();
-    for (found_rad, expected_rad) in kappa_rad.into_iter().zip([FRAC_PI_2, closed_rad, closed_rad, FRAC_PI_2])
+    for (found_rad, expected_rad) in kappa_rad.into_iter().zip([closed_rad, FRAC_PI_2, FRAC_PI_2, closed_rad])
     {
         close(found_rad, expected_rad, "opening");
     }

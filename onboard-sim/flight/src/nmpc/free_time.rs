@@ -137,6 +137,8 @@ pub fn solve_free_time_into(
         None => search.survey(best),
     }
     search.refine(best);
+    // A search of one solve leaves this without room.
+    search.workspace.trial.solution.make_room(&best.solution);
     best.solves = search.solves;
     best.earliest_s = earliest_s;
     best.solution.iterations = search.iterations;
@@ -278,6 +280,10 @@ impl<M: Motor> Search<'_, M> {
             &workspace.warm
         });
         solve_into(&posed, warm, &mut workspace.inner, &mut into.solution);
+        if from.is_none() {
+            // The next search may be warm, and must find room.
+            into.solution.resample_into(0.0, posed.step_s, posed.intervals(), &mut workspace.warm);
+        }
         into.final_time_s = final_time_s;
         let mut lagrangian = |at_s: f64| {
             pose(self.problem, self.motor, at_s, &mut posed);

@@ -151,6 +151,17 @@ impl Solution {
         refill(&mut warm.floor_multipliers, &self.floor_multipliers, steps);
     }
 
+    /// Back to nothing solved, with room for one as long as another.
+    fn make_room(&mut self, like: &Self) {
+        self.clear();
+        self.states.reserve(like.states.len());
+        self.costates.reserve(like.costates.len());
+        self.limit_multipliers.reserve(like.limit_multipliers.len());
+        self.inputs_rad.reserve(like.inputs_rad.len());
+        self.end_multipliers.reserve(like.end_multipliers.len());
+        self.floor_multipliers.reserve(like.floor_multipliers.len());
+    }
+
     /// Back to nothing solved, keeping the room.
     fn clear(&mut self) {
         let Self {

@@ -41,6 +41,9 @@ pub struct Problem {
     pub final_box: Option<FinalBox>,
     /// Lowest altitude at the nodes before the end, m.
     pub altitude_min_m: Option<f64>,
+    /// How much higher that floor is for each second before the end, m/s: a vehicle that leans needs room for its legs
+    /// until it is upright.
+    pub floor_rise_m_s: f64,
     /// Fastest touchdown that counts as a landing, m/s.
     pub touchdown_speed_max_m_s: f64,
     /// Limits of the solver.
@@ -107,6 +110,7 @@ impl Problem {
             x_final_m: nmpc.limits.x_final_m,
             final_box: nmpc.limits.final_box,
             altitude_min_m: nmpc.limits.altitude_min_m,
+            floor_rise_m_s: 0.0,
             touchdown_speed_max_m_s: profile.touchdown_limits.u_m_s,
             solver: nmpc.solver,
         };
@@ -155,12 +159,13 @@ impl Problem {
     /// Appends the conditions; allocates only if the vector never held as many.
     pub(super) fn append_conditions(&self, conditions: &mut Vec<Condition>) {
         self.append_end_conditions(conditions);
-        if let Some(offset) = self.altitude_min_m {
-            conditions.extend((1..self.intervals()).map(|node| Condition {
+        if let Some(altitude_min_m) = self.altitude_min_m {
+            let end = self.intervals();
+            conditions.extend((1..end).map(|node| Condition {
                 node,
                 component: Z,
                 sign: 1.0,
-                offset,
+                offset: altitude_min_m + self.floor_rise_m_s * (end - node) as f64 * self.step_s,
                 equality: false,
             }));
         }
@@ -240,6 +245,7 @@ impl Problem {
             && self.thrust_n.iter().all(|thrust| thrust.is_finite())
             && (self.mass_kg.is_empty() || self.mass_kg.len() == self.intervals())
             && self.mass_kg.iter().all(|mass| mass.is_finite() && *mass > 0.0)
+            && self.floor_rise_m_s.is_finite()
             && self.gimbal_limit_rad.is_finite()
     }
 }

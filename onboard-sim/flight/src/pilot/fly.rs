@@ -13,13 +13,16 @@ use crate::descent::DescentSituation;
 use crate::estimator::{Estimate, VehicleNow};
 use crate::fins::{Allocation, FinCommand, Moments, OpeningRange};
 use crate::gate::{GateInput, gate_checks};
+use crate::motor_estimate::MotorSample;
 use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
 
 /// A fin that is farther than this from its command is not there, rad.
 const FIN_THERE_RAD: f64 = 0.1;
-/// Drag is believed from this airspeed on, m/s, and followed with this time constant, s.
-const DRAG_SPEED_M_S: f64 = 15.0;
-const DRAG_LAG_S: f64 = 1.0;
+/// The thrust's uncertainty is looked up so far ahead, s, and never taken for more than this share.
+const CAUTION_AHEAD_S: f64 = 1.0;
+const LARGEST_CAUTION: f64 = 0.06;
+/// It fades over so long before the thrust falls through the weight, s.
+const CAUTION_FADES_S: f64 = 2.0;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -31,18 +34,18 @@ impl Pilot {
         self.estimate = Some(estimate);
         let density_kg_m3 =
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
-        self.feel(time_s, &estimate, density_kg_m3, &input.fins_rad);
+        self.feel(input, &estimate, density_kg_m3);
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         if planning && self.mode.phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }
         self.move_through_phases(input, &estimate);
 
-        let burning_s = self.known.motor.burning_s(time_s);
+        let burning_s = self.known.burning_s(time_s);
         let mass = self.known.mass_now(burning_s);
         let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3 });
         let flying = self.mode.phase.in_landing_burn();
-        let gimbal_rad = match &situation {
+        self.gimbal_rad = match &situation {
             Some(situation) if flying => {
                 if planning {
                     self.plan(time_s, &estimate, situation, &input.fins_rad);
@@ -53,7 +56,7 @@ impl Pilot {
         };
         self.fins_rad = self.fins(&estimate, &mass, density_kg_m3, burning_s.is_some() && flying);
         PilotOutput {
-            gimbal_rad,
+            gimbal_rad: self.gimbal_rad,
             fins_rad: self.fins_rad,
             ignite: self.mode.phase == Phase::Ignition && !self.mode.interlocks.landing_motor_inhibited,
             parachute: self.mode.phase == Phase::Chute,
@@ -66,38 +69,60 @@ impl Pilot {
         match input.sensed {
             Sensed::Known(estimate) => estimate,
             Sensed::Measured(measurements) => {
-                let burning_s = self.known.motor.burning_s(input.time_s);
+                let burning_s = self.known.burning_s(input.time_s);
                 let mass = self.known.mass_now(burning_s);
                 let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
                 let air = Air::at_height_m(self.known.mission.pad_altitude_m + height_m);
-                let vehicle = VehicleNow {
-                    mass_kg: mass.mass_kg,
-                    air_density_kg_m3: air.density_kg_m3,
-                    fin_drag_area_m2: self.known.drag_scale * self.known.fin_drag_area_m2(&input.fins_rad),
-                    fin_ahead_of_cg_m: self.known.airframe().fins.station_m - mass.cg_station_m,
-                    crossflow_area_m2: self.known.crossflow_area_m2(),
-                    motor_burning: burning_s.is_some() || self.mode.phase.in_landing_burn(),
-                    lidar_behind_cg_m: self.known.airframe().above_feet_m(mass.cg_station_m),
-                };
+                let vehicle = VehicleNow::of(
+                    self.known.airframe(),
+                    &mass,
+                    air.density_kg_m3,
+                    input.fins_rad,
+                    burning_s.is_some() || self.mode.phase.in_landing_burn(),
+                    self.known.mission.lidar_ahead_of_feet_m,
+                );
                 self.estimator.step(&measurements, &vehicle)
             }
         }
     }
 
-    /// Motor and drag from the specific force along the axis.
-    fn feel(&mut self, time_s: f64, estimate: &Estimate, density_kg_m3: f64, fins_rad: &[f64; 4]) {
-        let mass = self.known.mass_now(self.known.motor.burning_s(time_s));
-        let through_air = estimate.velocity_through_air_m_s();
-        let along_m_s = through_air.dot(&estimate.state.nose_in_world());
-        let area_m2 = self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(fins_rad);
-        let drag_n = -0.5 * density_kg_m3 * through_air.norm() * along_m_s * area_m2;
-        let felt_n = mass.mass_kg * estimate.specific_force_m_s2.x;
-        if self.mode.phase.in_landing_burn() {
-            self.known.motor.feel(time_s, felt_n - self.known.drag_scale * drag_n, &self.known.curve);
-        } else if self.mode.phase.in_descent() && -along_m_s > DRAG_SPEED_M_S {
-            let share = self.known.mission.estimator.frame_s / DRAG_LAG_S;
-            self.known.drag_scale += share * ((felt_n / drag_n).clamp(0.7, 1.3) - self.known.drag_scale);
+    /// Motor and drag from the specific force along the axis. On the ground it says nothing about either.
+    fn feel(&mut self, input: &PilotInput, estimate: &Estimate, density_kg_m3: f64) {
+        if input.contact || self.mode.phase == Phase::Chute {
+            return;
         }
+        let mass = self.known.mass_now(self.known.burning_s(input.time_s));
+        let burning = self.mode.phase.in_landing_burn();
+        let mission = &self.known.mission;
+        let vehicle = VehicleNow::of(
+            self.known.airframe(),
+            &mass,
+            density_kg_m3,
+            input.fins_rad,
+            burning,
+            mission.lidar_ahead_of_feet_m,
+        );
+        let through_air_m_s =
+            estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
+        let sample = MotorSample {
+            time_s: input.time_s,
+            axial_specific_force_m_s2: estimate.specific_force_m_s2.x,
+            mass_kg: mass.mass_kg,
+            axial_air_force_n: vehicle.air_force_n(&through_air_m_s, &estimate.state.rate_rad_s).x,
+            gimbal_rad: self.gimbal_rad,
+            may_burn: burning,
+        };
+        self.known.motor.update(&self.known.curve, &sample);
+        let ahead = self.known.motor.predict(&self.known.curve, input.time_s + CAUTION_AHEAD_S, input.time_s);
+        self.known.caution = if ahead.thrust_n > 0.0 {
+            // Nothing is thrown away late when it is late already.
+            let carried_until_s = self.known.carried_until_s().unwrap_or(0.0)
+                - self.known.burning_s(input.time_s).unwrap_or(0.0);
+            let early = (carried_until_s / CAUTION_FADES_S).clamp(0.0, 1.0);
+            early * (mission.caution_sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
+        } else {
+            0.0
+        };
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
@@ -105,7 +130,7 @@ impl Pilot {
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let vertical_m_s = state.velocity_m_s.z;
-        let fins_m2 = self.known.drag_scale * self.known.fin_drag_area_m2(&self.fins_rad);
+        let fins_m2 = self.known.motor.air_scale() * self.known.fin_drag_area_m2(&self.fins_rad);
         let ignition =
             self.known.mission.ignition.outlook(&column, &self.known.curve, height_m, vertical_m_s, fins_m2);
         let parachute = &self.known.airframe().parachute;
@@ -150,7 +175,7 @@ impl Pilot {
             }
             Phase::LandArmed => self.consider_ignition(input, estimate),
             Phase::Ignition => {
-                if self.known.motor.burning_s(time_s).is_some() {
+                if self.known.burning_s(time_s).is_some() {
                     self.happen(Event::ThrustConfirmed, time_s);
                 } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
                     && !self.mode.interlocks.no_light_latched
@@ -161,7 +186,7 @@ impl Pilot {
             _ => {}
         }
         if input.contact && !matches!(self.mode.phase, Phase::Touchdown | Phase::Safed) {
-            let burning_s = self.known.motor.burning_s(time_s);
+            let burning_s = self.known.burning_s(time_s);
             let mass = self.known.mass_now(burning_s);
             let thrust_n = burning_s.map_or(0.0, |burning_s| self.known.burn().thrust_n(burning_s));
             let thrust_below_weight = thrust_n < mass.mass_kg * self.known.mission.gravity_m_s2;
@@ -227,7 +252,13 @@ impl Pilot {
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
         let burn = self.known.burn();
-        self.fin_share = column.fin_share(&burn, situation.burning_s, state.velocity_m_s.z, height_m);
+        self.fin_share = column.fin_share(
+            &burn,
+            situation.burning_s,
+            state.velocity_m_s.z,
+            height_m,
+            self.known.mission.ignition.place,
+        );
         if self.mode.interlocks.degraded {
             return;
         }

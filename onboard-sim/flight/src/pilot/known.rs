@@ -1,10 +1,10 @@
 //! What the pilot knows of its vehicle, and has learnt of motor and drag.
 
-use super::MotorWatch;
 use crate::airframe::{Airframe, MassModel, MassProperties};
 use crate::burn::Burn;
 use crate::estimator::Estimate;
 use crate::mission::Mission;
+use crate::motor_estimate::MotorEstimate;
 use crate::powered::PoweredSituation;
 use crate::thrust_curve::ThrustCurve;
 use crate::vertical::{Braking, Column};
@@ -15,9 +15,11 @@ pub(super) struct Known {
     pub(super) mission: Mission,
     pub(super) curve: ThrustCurve,
     pub(super) mass: MassModel,
-    pub(super) motor: MotorWatch,
-    /// Drag felt over drag expected.
-    pub(super) drag_scale: f64,
+    /// Motor and scale of the air's forces, as felt.
+    pub(super) motor: MotorEstimate,
+    /// How much less impulse than estimated is planned with, as a share: what turns out to be too much can be thrown
+    /// away late, what is missing cannot be had.
+    pub(super) caution: f64,
 }
 
 /// The burning vehicle of a frame.
@@ -50,17 +52,31 @@ impl Known {
         self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
     }
 
+    /// Time since the landing motor's thrust began, s.
+    pub(super) fn burning_s(&self, time_s: f64) -> Option<f64> {
+        self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
+    }
+
     pub(super) fn mass_now(&self, burning_s: Option<f64>) -> MassProperties {
-        self.mass.at(burning_s.map_or(0.0, |burning_s| self.curve.propellant_burnt_kg(burning_s)))
+        self.mass.at(burning_s.map_or(0.0, |burning_s| self.burn().burnt_kg(burning_s)))
     }
 
     pub(super) fn burn(&self) -> Burn<'_> {
-        Burn { curve: &self.curve, impulse_scale: self.motor.scale(), time_scale: 1.0 }
+        Burn {
+            curve: &self.curve,
+            impulse_scale: self.motor.impulse_scale() - self.caution,
+            time_scale: self.motor.burn_time_stretch(),
+        }
+    }
+
+    /// When thrust falls through the weight, s since it began.
+    pub(super) fn carried_until_s(&self) -> Option<f64> {
+        self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64) -> Column {
         let mission = &self.mission;
-        let scaled = |area_m2: f64| self.drag_scale * area_m2;
+        let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;
         Column {
             mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
             gravity_m_s2: mission.gravity_m_s2,
@@ -71,6 +87,7 @@ impl Known {
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
             touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
             latest_after_s: mission.powered.latest_after_s,
+            settle_s: mission.settle_s,
         }
     }
 
@@ -94,9 +111,11 @@ impl Known {
             gravity_m_s2: self.mission.gravity_m_s2,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            body_drag_area_m2: self.drag_scale * self.body_drag_area_m2(),
+            body_drag_area_m2: self.motor.air_scale() * self.body_drag_area_m2(),
             crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.drag_scale * self.fin_drag_area_m2(fins_rad),
+            fin_drag_area_m2: self.motor.air_scale()
+                * (self.mission.fins_kept * self.fin_drag_area_m2(fins_rad)
+                    + 0.5 * (1.0 - self.mission.fins_kept) * self.largest_fin_drag_area_m2()),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
         }
     }

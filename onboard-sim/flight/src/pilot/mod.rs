@@ -4,13 +4,13 @@
 //! [`PilotOutput`]s, so a log of inputs flies the flight again. A frame is 5 ms: estimate, watch the motor, move through
 //! the [phase table](crate::phase), point fins and gimbal. Every tenth frame the outlook and the landing are planned.
 
+mod digest;
 mod fly;
 mod known;
-mod motor_watch;
 mod outlook;
+mod restart;
 
 use known::Known;
-pub use motor_watch::MotorWatch;
 pub use outlook::Outlook;
 
 use crate::aim::AimLoop;
@@ -18,6 +18,7 @@ use crate::airframe::MassModel;
 use crate::controller::ControlLevel;
 use crate::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::mission::{Mission, MissionError};
+use crate::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::phase::{Event, Mode, Phase, StartPoint, transition};
 use crate::powered::{PoweredGuidance, PoweredReport};
 use crate::rigid::RigidState;
@@ -83,6 +84,7 @@ pub struct Pilot {
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
+    gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
 }
 
@@ -120,13 +122,14 @@ impl Pilot {
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
+            gimbal_rad: [0.0; 2],
             gate_refusal: None,
             known: Known {
                 mission: mission.clone(),
                 mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
                 curve,
-                motor: MotorWatch::new(frame_s, mission.motor_lag_s),
-                drag_scale: 1.0,
+                motor: MotorEstimate::new(&MotorPrior { frame_s, ..MotorPrior::default() }),
+                caution: 0.0,
             },
         })
     }
@@ -151,19 +154,14 @@ impl Pilot {
         &self.outlook
     }
 
-    /// Thrust felt over thrust certified.
-    pub fn thrust_scale(&self) -> f64 {
-        self.known.motor.scale()
-    }
-
-    /// Drag felt over drag expected.
-    pub fn drag_scale(&self) -> f64 {
-        self.known.drag_scale
+    /// The motor as estimated in flight, and the scale of the air's forces.
+    pub fn motor(&self) -> &MotorEstimate {
+        &self.known.motor
     }
 
     /// Time since the landing motor's thrust began, s.
     pub fn burning_s(&self, time_s: f64) -> Option<f64> {
-        self.known.motor.burning_s(time_s)
+        self.known.burning_s(time_s)
     }
 
     /// When the landing motor was commanded to light, s.

@@ -32,8 +32,6 @@ use crate::rigid::RigidState;
 /// Longest and shortest horizons, intervals.
 const MOST_INTERVALS: usize = 60;
 const LEAST_INTERVALS: usize = 6;
-/// A plan that ends sooner than this is flown out, s.
-const FLOWN_OUT_S: f64 = 0.12;
 
 /// How the landing burn is planned and flown.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -43,6 +41,8 @@ pub struct PoweredSettings {
     pub interval_s: f64,
     /// Weights of the plan.
     pub weights: StateWeights,
+    /// A plan that tilts further than this is planned again with more weight on being upright, degrees.
+    pub tilt_max_deg: f64,
     /// Largest planned gimbal angle on either side, degrees; the rest of the travel is the attitude loop's.
     pub gimbal_deg: f64,
     /// Largest horizontal distance at the end, m.
@@ -50,8 +50,14 @@ pub struct PoweredSettings {
     /// Box the plan ends in; its lateral speed is over the ground.
     #[serde(rename = "final")]
     pub final_box: FinalBox,
+    /// Least height of the feet for each second before touchdown, m/s.
+    pub floor_rise_m_s: f64,
     /// How long after thrust has fallen through the weight a plan may end, s.
     pub latest_after_s: f64,
+    /// How long before touchdown a plan is inside the box but for its axial velocity, s.
+    pub settled_s: f64,
+    /// A plan that ends sooner than this is flown out, s.
+    pub flown_out_s: f64,
     /// Most final times tried in a tick.
     pub max_solves: u32,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
@@ -63,6 +69,9 @@ pub struct PoweredSettings {
     /// Limits of the solver.
     pub solver: SolverLimits,
 }
+
+/// How much dearer a tilt becomes when a plan tilts too far.
+const UPRIGHT_DEARER: f64 = 8.0;
 
 /// What a tick must know besides the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -240,17 +249,22 @@ impl PoweredGuidance {
     pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
         let plane =
             *self.plane.get_or_insert_with(|| Plane::choose(&state.velocity_m_s, &situation.wind_m_s));
-        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < FLOWN_OUT_S) {
+        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
             return;
         }
         let wind_m_s = situation.wind_m_s.dot(&plane.along);
         let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let Some(problem) = self.pose(initial, wind_m_s, situation) else {
+        let Some(mut problem) = self.pose(initial, wind_m_s, situation) else {
             self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
             return;
         };
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
         solve_free_time_into(&problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+        if largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians() {
+            // A loop is a landing for the equations, not for a vehicle in air: ask again, upright dearer.
+            problem.landing.state_weights[2] *= UPRIGHT_DEARER;
+            solve_free_time_into(&problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
+        }
         self.take(time_s, plane, &problem, situation);
     }
 
@@ -271,6 +285,8 @@ impl PoweredGuidance {
         let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+        let step_s = horizon_s / intervals as f64;
+        let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
         let landing = Problem {
             model: situation.model(),
             initial,
@@ -282,8 +298,9 @@ impl PoweredGuidance {
             input_weight: settings.weights.delta,
             gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
             x_final_m: settings.x_final_m,
-            final_box: Some(settings.final_box),
+            final_box: Some(FinalBox { settled_nodes, ..settings.final_box }),
             altitude_min_m: Some(0.0),
+            floor_rise_m_s: settings.floor_rise_m_s,
             // How soft it can be is the plan's to say; a bound from straight-up thrust would only hide it.
             touchdown_speed_max_m_s: f64::MAX,
             solver: settings.solver,
@@ -323,7 +340,6 @@ impl PoweredGuidance {
             () => ControlLevel::BestFeasible,
         };
         let touchdown = solution.states.last().copied().unwrap_or_default();
-        let tilt = |planned: &PlanarState| (planned.theta_rad - FRAC_PI_2).abs();
         self.report = PoweredReport {
             level,
             status: solution.status,
@@ -334,7 +350,7 @@ impl PoweredGuidance {
             condition_miss: solution.condition_miss,
             touchdown_in_s: self.trial.final_time_s,
             touchdown,
-            largest_tilt_rad: solution.states.iter().map(tilt).fold(0.0, f64::max),
+            largest_tilt_rad: largest_tilt_rad(&self.trial),
         };
         if !usable {
             return;
@@ -388,6 +404,10 @@ impl PoweredGuidance {
         self.flown = None;
         self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
     }
+}
+
+fn largest_tilt_rad(plan: &FreeTimeSolution) -> f64 {
+    plan.solution.states.iter().map(|planned| (planned.theta_rad - FRAC_PI_2).abs()).fold(0.0, f64::max)
 }
 
 impl Flown {

@@ -94,7 +94,7 @@ fn noise_has_the_stated_size_and_a_seed_repeats_it() {
     };
     // Densities over the square root of a frame's 5 ms; four standard errors of 4,000 samples are 4.5 %.
     let gyro = spread(seen.iter().map(|m| m.imu.gyro_rad_s.x).collect());
-    assert!((gyro.to_degrees() / 0.707_107 - 1.0).abs() < 0.045, "{gyro}");
+    assert!((gyro.to_degrees() / (0.05 / 0.005_f64.sqrt()) - 1.0).abs() < 0.045, "{gyro}");
     let force = spread(seen.iter().map(|m| m.imu.specific_force_m_s2.y).collect());
     assert!((force / 0.090_147 - 1.0).abs() < 0.045, "{force}");
 }

@@ -109,6 +109,22 @@ impl Elastic {
         Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
     }
 
+    /// The elastic of a condition at value `c` with the multiplier of an optimum, which may be at an end of its range.
+    pub(super) fn settled(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+        /// Least distance from the ends: nothing, but above zero.
+        const NOTHING: f64 = 1e-9;
+        let least = if equality { price } else { 0.0 };
+        let (a, b) = ((multiplier + least).max(NOTHING), (price - multiplier).max(NOTHING));
+        let (above, below) = (barrier / a, barrier / b);
+        let mut settled = Self { a, b, above, below, least, price };
+        if c >= 0.0 {
+            settled.below = below.min(barrier / price);
+        } else {
+            settled.above = above.min(barrier / price);
+        }
+        settled.fitted(c)
+    }
+
     /// With `s - e` equal to the condition's value `c`: the smaller of the two is kept.
     #[inline]
     pub(super) fn fitted(mut self, c: f64) -> Self {

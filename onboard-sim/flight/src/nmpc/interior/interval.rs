@@ -11,186 +11,20 @@
 //! The directions of differentiation are (theta, u, w, q, delta).
 #![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
-use super::lanes::{LANES, Lanes};
+use super::block::{
+    AHEAD, Block, Constants, D, Held, Points, Q, Stage, TH, TURNED, U, W, WEIGHTS, lateral_sign,
+};
+use super::lanes::Lanes;
 use super::tangent::differentiate;
-use crate::dynamics::{ModelKind, PlanarModel};
-
-/// Directions of differentiation: theta, u, w, q, delta.
-pub(super) const DIRECTIONS: usize = 5;
-pub(super) const TH: usize = 0;
-pub(super) const U: usize = 1;
-pub(super) const W: usize = 2;
-pub(super) const Q: usize = 3;
-pub(super) const D: usize = 4;
-
-/// Number of entries of a symmetric matrix over the directions.
-pub(super) const PAIRS: usize = 15;
-
-/// Position of each pair of directions in a packed upper triangle, row by row.
-pub(super) const fn pair(row: usize, column: usize) -> usize {
-    row * (9 - row) / 2 + column
-}
 
 /// Below this speed (m/s) the drag's derivatives, which have no limit at rest, count as zero.
 const REST_SPEED_M_S: f64 = 1e-9;
 
-/// The constants of an interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Constants {
-    pub(super) step_s: f64,
-    pub(super) mass_kg: f64,
-    pub(super) arm_per_inertia: f64,
-    /// These three at the model's own mass.
-    pub(super) drag_per_m: f64,
-    pub(super) lateral_drag_per_m: f64,
-    pub(super) crossflow_per_m: f64,
-    pub(super) gravity_m_s2: f64,
-    /// Sign of `w sin(theta)` in the horizontal velocity; -1 in the printed equations.
-    pub(super) lateral: f64,
-    pub(super) printed: bool,
-}
-
-impl Constants {
-    pub(super) fn of(model: &PlanarModel, step_s: f64) -> Self {
-        let params = &model.params;
-        let printed = model.kind == ModelKind::AsPrinted;
-        Self {
-            step_s,
-            mass_kg: params.mass_kg,
-            arm_per_inertia: params.thrust_arm_m / params.pitch_inertia_kg_m2,
-            drag_per_m: params.drag_per_m,
-            lateral_drag_per_m: params.lateral_drag_per_m,
-            crossflow_per_m: params.crossflow_per_m,
-            gravity_m_s2: params.gravity_m_s2,
-            lateral: if printed { -1.0 } else { 1.0 },
-            printed,
-        }
-    }
-
-    /// Whether the air pushes across the body; the equations are shorter where it does not.
-    pub(super) fn pushed_across(&self) -> bool {
-        !self.printed && (self.lateral_drag_per_m != 0.0 || self.crossflow_per_m != 0.0)
-    }
-}
-
-/// Where intervals are linearised: state at their beginning, input, thrust, mass, and the costate of the state after
-/// them.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Points {
-    pub(super) state: [Lanes; 6],
-    pub(super) gimbal: Lanes,
-    pub(super) thrust: Lanes,
-    pub(super) inverse_mass: Lanes,
-    /// The model's own mass over that of the interval.
-    pub(super) lightness: Lanes,
-    pub(super) costate: [Lanes; 6],
-}
-
-impl Points {
-    /// At rest, at the model's own mass.
-    pub(super) fn rest(c: &Constants) -> Self {
-        Self {
-            state: [Lanes::ZERO; 6],
-            gimbal: Lanes::ZERO,
-            thrust: Lanes::ZERO,
-            inverse_mass: Lanes::splat(1.0 / c.mass_kg),
-            lightness: Lanes::splat(1.0),
-            costate: [Lanes::ZERO; 6],
-        }
-    }
-}
-
-/// Intervals and their derivatives.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Block {
-    /// The state after the interval.
-    pub(super) after: [Lanes; 6],
-    /// Derivative of `lambda . step` by theta, u, w, q, delta; by x and z it is lambda's own.
-    pub(super) pulled: [Lanes; DIRECTIONS],
-    /// Derivatives of x, z, u and w after the interval by the directions.
-    pub(super) tangent: [[Lanes; DIRECTIONS]; 4],
-    /// Derivative of q after the interval by delta; that of theta is half a step times it.
-    pub(super) turn: Lanes,
-    /// Second derivative of `lambda . step` by the directions, packed.
-    pub(super) curvature: [Lanes; PAIRS],
-}
-
-impl Block {
-    pub(super) const EMPTY: Self = Self {
-        after: [Lanes::ZERO; 6],
-        pulled: [Lanes::ZERO; DIRECTIONS],
-        tangent: [[Lanes::ZERO; DIRECTIONS]; 4],
-        turn: Lanes::ZERO,
-        curvature: [Lanes::ZERO; PAIRS],
-    };
-}
-
-/// What is held over the whole interval.
-#[derive(Clone, Copy)]
-pub(super) struct Held {
-    /// Acceleration along the nose axis and along the second body axis, m/s^2; each is the other's derivative by the
-    /// gimbal angle, up to the sign.
-    pub(super) push: Lanes,
-    pub(super) side: Lanes,
-    /// Pitch acceleration, rad/s^2, and its derivative by the gimbal angle.
-    pub(super) turn_acc: Lanes,
-    pub(super) turn_acc_d: Lanes,
-    /// Air forces per mass and squared speed, 1/m.
-    pub(super) drag: Lanes,
-    pub(super) lateral_drag: Lanes,
-    pub(super) crossflow: Lanes,
-}
-
-impl Held {
-    #[inline(always)]
-    fn of(c: &Constants, points: &Points) -> Self {
-        let (sin, cos) = points.gimbal.sin_cos();
-        let acceleration = points.thrust * points.inverse_mass;
-        let torque = points.thrust * c.arm_per_inertia;
-        Self {
-            push: acceleration * cos,
-            side: -(acceleration * sin),
-            turn_acc: -(torque * sin),
-            turn_acc_d: -(torque * cos),
-            drag: points.lightness * c.drag_per_m,
-            lateral_drag: points.lightness * c.lateral_drag_per_m,
-            crossflow: points.lightness * c.crossflow_per_m,
-        }
-    }
-}
-
-/// What the derivatives need of a stage.
-#[derive(Clone, Copy)]
-pub(super) struct Stage {
-    pub(super) sin: Lanes,
-    pub(super) cos: Lanes,
-    pub(super) u: Lanes,
-    pub(super) w: Lanes,
-    pub(super) q: Lanes,
-    pub(super) x_dot: Lanes,
-    pub(super) z_dot: Lanes,
-    /// Derivative of the drag's acceleration by u and w.
-    pub(super) drag_u: Lanes,
-    pub(super) drag_w: Lanes,
-    /// Derivative of the air's acceleration across the body by u and w.
-    pub(super) across_u: Lanes,
-    pub(super) across_w: Lanes,
-    /// u and w over the speed.
-    pub(super) along: Lanes,
-    pub(super) across: Lanes,
-}
-
-pub(super) const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
-/// How far along the step a stage lies, by which q and delta move its pitch and pitch rate.
-pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
-/// Share of half a squared step by which the pitch acceleration moves a stage's pitch.
-pub(super) const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
-
-/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`. `ACROSS`
-/// tells whether the air [pushes across](Constants::pushed_across) the body.
+/// Evaluates intervals; with `DERIVATIVES`, tangent and curvature too, without only `after` and `pulled`. `PRINTED` and
+/// `ACROSS` tell which equations they are: [`Constants::printed`], [`Constants::pushed_across`].
 #[inline(always)]
 #[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
-pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
+pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>(
     c: &Constants,
     points: &Points,
     block: &mut Block,
@@ -209,6 +43,8 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
         q: q0,
         x_dot: Lanes::ZERO,
         z_dot: Lanes::ZERO,
+        u_dot: Lanes::ZERO,
+        w_dot: Lanes::ZERO,
         drag_u: Lanes::ZERO,
         drag_w: Lanes::ZERO,
         across_u: Lanes::ZERO,
@@ -217,53 +53,81 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
         across: Lanes::ZERO,
     }; 4];
     let (mut x_sum, mut z_sum, mut u_sum, mut w_sum) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-    let (mut u, mut w) = (u0, w0);
-    for i in 0..4 {
-        let theta = th0 + (q0 * AHEAD[i] + turn_acc * (0.5 * h * TURNED[i])) * h;
-        let q = q0 + turn_acc * (h * AHEAD[i]);
-        let (sin, cos) = theta.sin_cos();
-        let squared = u * u + w * w;
-        let (drag, drag_u, drag_w, along, across);
-        let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
-        if c.printed {
-            drag = squared * drag_per_m;
-            drag_u = u * (drag_per_m * 2.0);
-            drag_w = w * (drag_per_m * 2.0);
-            (along, across) = (Lanes::ZERO, Lanes::ZERO);
-        } else {
-            let speed = squared.sqrt();
-            let inverse = speed.reciprocal_above(REST_SPEED_M_S);
-            along = u * inverse;
-            across = w * inverse;
-            drag = speed * u * -drag_per_m;
-            drag_u = (speed + u * along) * -drag_per_m;
-            drag_w = u * across * -drag_per_m;
-            if ACROSS {
-                let aside = w.abs();
-                across_acc = -((lateral_drag * speed + crossflow * aside) * w);
-                across_u = -(lateral_drag * (u * across));
-                across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
+    // Written out by a macro: left as a loop, the compiler keeps it one, and multiplies by the zeros of its tables.
+    macro_rules! stage {
+        ($i:literal) => {{
+            const I: usize = $i;
+            let (u, w) = if I == 0 {
+                (u0, w0)
+            } else {
+                let Stage { u_dot, w_dot, .. } = stages[(I + 3) % 4];
+                (u0 + u_dot * (h * AHEAD[I]), w0 + w_dot * (h * AHEAD[I]))
+            };
+            let (theta, q) = if I == 0 {
+                (th0, q0)
+            } else {
+                let theta = th0 + (q0 * AHEAD[I] + turn_acc * (0.5 * h * TURNED[I])) * h;
+                (theta, q0 + turn_acc * (h * AHEAD[I]))
+            };
+            let (sin, cos) = theta.sin_cos();
+            let squared = u * u + w * w;
+            let (drag, drag_u, drag_w, along, across);
+            let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
+            if PRINTED {
+                drag = squared * drag_per_m;
+                drag_u = u * (drag_per_m * 2.0);
+                drag_w = w * (drag_per_m * 2.0);
+                (along, across) = (Lanes::ZERO, Lanes::ZERO);
+            } else {
+                let speed = squared.sqrt();
+                let inverse = speed.reciprocal_above(REST_SPEED_M_S);
+                along = u * inverse;
+                across = w * inverse;
+                drag = speed * u * -drag_per_m;
+                drag_u = (speed + u * along) * -drag_per_m;
+                drag_w = u * across * -drag_per_m;
+                if ACROSS {
+                    let aside = w.abs();
+                    across_acc = -((lateral_drag * speed + crossflow * aside) * w);
+                    across_u = -(lateral_drag * (u * across));
+                    across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
+                }
             }
-        }
-        let lateral = w * c.lateral;
-        let x_dot = u * cos + lateral * sin;
-        let z_dot = u * sin - lateral * cos;
-        let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
-        let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
-        if ACROSS {
-            w_dot += across_acc;
-        }
-        x_sum += x_dot * WEIGHTS[i];
-        z_sum += z_dot * WEIGHTS[i];
-        u_sum += u_dot * WEIGHTS[i];
-        w_sum += w_dot * WEIGHTS[i];
-        stages[i] =
-            Stage { sin, cos, u, w, q, x_dot, z_dot, drag_u, drag_w, across_u, across_w, along, across };
-        if i < 3 {
-            u = u0 + u_dot * (h * AHEAD[i + 1]);
-            w = w0 + w_dot * (h * AHEAD[i + 1]);
-        }
+            let lateral = w * lateral_sign(PRINTED);
+            let x_dot = u * cos + lateral * sin;
+            let z_dot = u * sin - lateral * cos;
+            let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
+            let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
+            if ACROSS {
+                w_dot += across_acc;
+            }
+            x_sum += x_dot * WEIGHTS[I];
+            z_sum += z_dot * WEIGHTS[I];
+            u_sum += u_dot * WEIGHTS[I];
+            w_sum += w_dot * WEIGHTS[I];
+            stages[I] = Stage {
+                sin,
+                cos,
+                u,
+                w,
+                q,
+                x_dot,
+                z_dot,
+                u_dot,
+                w_dot,
+                drag_u,
+                drag_w,
+                across_u,
+                across_w,
+                along,
+                across,
+            };
+        }};
     }
+    stage!(0);
+    stage!(1);
+    stage!(2);
+    stage!(3);
     block.after = [
         x0 + x_sum * h,
         z0 + z_sum * h,
@@ -278,44 +142,46 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const ACROSS: bool>(
     let mut pulled = [lt, lu, lw, lq, Lanes::ZERO];
     let mut slope_adjoints = [[Lanes::ZERO; 5]; 4];
     let mut later = [Lanes::ZERO; 4];
-    for i in (0..4).rev() {
-        let stage = &stages[i];
-        let weight = WEIGHTS[i] * h;
-        let (kx, kz) = (lx * weight, lz * weight);
-        let (mut kt, mut ku, mut kw, mut kq) = (lt * weight, lu * weight, lw * weight, lq * weight);
-        if i < 3 {
-            let along = AHEAD[i + 1] * h;
-            kt += later[TH] * along;
-            ku += later[U] * along;
-            kw += later[W] * along;
-            kq += later[Q] * along;
-        }
-        let heading = kx * stage.cos + kz * stage.sin;
-        let sideways = (kx * stage.sin - kz * stage.cos) * c.lateral;
-        later = [
-            kz * stage.x_dot - kx * stage.z_dot - (ku * stage.cos + kw * stage.sin) * c.gravity_m_s2,
-            heading + ku * stage.drag_u + kw * stage.q,
-            sideways + ku * (stage.drag_w - stage.q),
-            kt - ku * stage.w + kw * stage.u,
-        ];
-        if ACROSS {
-            later[U] += kw * stage.across_u;
-            later[W] += kw * stage.across_w;
-        }
-        pulled[TH] += later[TH];
-        pulled[U] += later[U];
-        pulled[W] += later[W];
-        pulled[Q] += later[Q];
-        pulled[D] += ku * side - kw * push + kq * turn_acc_d;
-        slope_adjoints[i] = [kx, kz, ku, kw, kq];
+    macro_rules! back {
+        ($i:literal) => {{
+            const I: usize = $i;
+            let stage = &stages[I];
+            let weight = WEIGHTS[I] * h;
+            let (kx, kz) = (lx * weight, lz * weight);
+            let (mut kt, mut ku, mut kw, mut kq) = (lt * weight, lu * weight, lw * weight, lq * weight);
+            if I < 3 {
+                let along = AHEAD[(I + 1) & 3] * h;
+                kt += later[TH] * along;
+                ku += later[U] * along;
+                kw += later[W] * along;
+                kq += later[Q] * along;
+            }
+            let heading = kx * stage.cos + kz * stage.sin;
+            let sideways = (kx * stage.sin - kz * stage.cos) * lateral_sign(PRINTED);
+            later = [
+                kz * stage.x_dot - kx * stage.z_dot - (ku * stage.cos + kw * stage.sin) * c.gravity_m_s2,
+                heading + ku * stage.drag_u + kw * stage.q,
+                sideways + ku * (stage.drag_w - stage.q),
+                kt - ku * stage.w + kw * stage.u,
+            ];
+            if ACROSS {
+                later[U] += kw * stage.across_u;
+                later[W] += kw * stage.across_w;
+            }
+            pulled[TH] += later[TH];
+            pulled[U] += later[U];
+            pulled[W] += later[W];
+            pulled[Q] += later[Q];
+            pulled[D] += ku * side - kw * push + kq * turn_acc_d;
+            slope_adjoints[I] = [kx, kz, ku, kw, kq];
+        }};
     }
+    back!(3);
+    back!(2);
+    back!(1);
+    back!(0);
     block.pulled = pulled;
     if DERIVATIVES {
-        differentiate::<ACROSS>(c, &held, &stages, &slope_adjoints, block);
+        differentiate::<PRINTED, ACROSS>(c, &held, &stages, &slope_adjoints, block);
     }
-}
-
-/// Number of blocks that hold `intervals`.
-pub(super) fn blocks_for(intervals: usize) -> usize {
-    intervals.div_ceil(LANES)
 }

@@ -1,7 +1,11 @@
 //! An iterate: the states, inputs and multipliers of every node, with the intervals evaluated there.
+#![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
+
+use pulp::{Arch, NullaryFnOnce};
 
 use super::barrier::{Elastic, Limits};
-use super::interval::{Block, Constants, Points, blocks_for, evaluate};
+use super::block::{Block, Constants, Points, blocks_for};
+use super::interval::evaluate;
 use super::lanes::LANES;
 use crate::nmpc::Problem;
 use crate::nmpc::problem::Condition;
@@ -41,6 +45,7 @@ impl Iterate {
         let (thrust_n, mass_kg) = (&problem.thrust_n, &problem.mass_kg);
         let across = constants.pushed_across();
         let mut points = Points::rest(constants);
+        let arch = Arch::new();
         for (index, block) in self.blocks.iter_mut().enumerate() {
             for lane in 0..LANES {
                 // Lanes beyond the end repeat the last interval.
@@ -56,10 +61,11 @@ impl Iterate {
                     points.lightness.0[lane] = constants.mass_kg / mass_kg;
                 }
             }
-            if across {
-                evaluate_block::<DERIVATIVES, true>(constants, &points, block);
-            } else {
-                evaluate_block::<DERIVATIVES, false>(constants, &points, block);
+            let points = &points;
+            match (constants.printed, across) {
+                (true, _) => Kernel::<DERIVATIVES, true, false> { constants, points, block }.run(arch),
+                (false, true) => Kernel::<DERIVATIVES, false, true> { constants, points, block }.run(arch),
+                (false, false) => Kernel::<DERIVATIVES, false, false> { constants, points, block }.run(arch),
             }
         }
     }
@@ -133,12 +139,28 @@ impl Iterate {
     }
 }
 
-/// Not inlined into the loop: one function of straight-line vector code.
-#[inline(never)]
-fn evaluate_block<const DERIVATIVES: bool, const ACROSS: bool>(
-    constants: &Constants,
-    points: &Points,
-    block: &mut Block,
-) {
-    evaluate::<DERIVATIVES, ACROSS>(constants, points, block);
+/// One block, evaluated in the widest vectors that the machine has.
+struct Kernel<'a, const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> {
+    constants: &'a Constants,
+    points: &'a Points,
+    block: &'a mut Block,
+}
+
+impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> NullaryFnOnce
+    for Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        evaluate::<DERIVATIVES, PRINTED, ACROSS>(self.constants, self.points, self.block);
+    }
+}
+
+impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>
+    Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
+{
+    fn run(self, arch: Arch) {
+        arch.dispatch(self);
+    }
 }

@@ -2,7 +2,7 @@
 //! that moves dynamics, cost or conditions is that of the optimal price.
 
 use super::Workspace;
-use super::interval::Constants;
+use super::block::Constants;
 use crate::nmpc::{Problem, Solution};
 
 impl Workspace {

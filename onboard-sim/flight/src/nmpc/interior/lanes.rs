@@ -7,8 +7,8 @@
 use core::array::from_fn;
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// Nodes evaluated together: as many as the compiler's vectors hold.
-pub(super) const LANES: usize = if cfg!(target_feature = "avx") { 4 } else { 2 };
+/// Nodes evaluated together: one vector register of AVX, two of SSE or NEON.
+pub(super) const LANES: usize = 4;
 
 /// One number for each of [`LANES`] nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]

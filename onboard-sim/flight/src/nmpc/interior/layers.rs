@@ -1,7 +1,7 @@
 //! The layers of an iteration, one by one, for measuring them.
 
 use super::Workspace;
-use super::interval::Constants;
+use super::block::Constants;
 use super::solver::{LAST_BARRIER, RAISED_BARRIER};
 use super::start;
 use crate::nmpc::{Problem, WarmStart};

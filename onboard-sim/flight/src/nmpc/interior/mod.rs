@@ -16,7 +16,7 @@
 //!
 //! # Steps of an iteration
 //!
-//! 1. `interval`, `tangent`: `F`, its derivatives `A_k`, `b_k`, and the second derivative of `lambda_{k+1}' F_k`, all
+//! 1. `block`, `interval`, `tangent`: `F`, its derivatives `A_k`, `b_k`, and the second derivative of `lambda_{k+1}' F_k`, all
 //!    nodes, several at once in vector registers (`lanes`).
 //! 2. `residual`: stop if the optimality conditions hold; lower the barrier `mu` if its problem is solved.
 //! 3. `newton`: slacks and limit multipliers eliminated, which leaves diagonal terms at the nodes.
@@ -25,10 +25,14 @@
 //! 5. `newton`: the longest fractions of the step that keep slacks and multipliers positive, primal and dual apart.
 //! 6. `filter`: the step is halved until defects or objective make progress.
 //!
-//! `solver` is the loop. A cold solve runs it from two bent guesses (`start`). A warm one carries states, inputs and
-//! every multiplier over and first looks whether they are still optimal; it starts at the last barrier, and raises it
-//! once if the first step shows that many limits and conditions must change sides. Iterations are capped; there is no
-//! clock.
+//! `solver` is the loop. A cold solve runs it from two bent guesses (`start`). A warm one (`warm`) carries states,
+//! inputs and every multiplier over and first looks whether they are still optimal. If not, it takes the limits and
+//! conditions that hold for equations (`clamped`), which needs no barrier and no line search; where that does not
+//! converge, the loop starts at the last barrier, and raises it once if the first step shows that many limits and
+//! conditions must change sides. Iterations are capped; there is no clock.
+//!
+//! Derivatives and sweeps are compiled twice, for plain vectors and for wider ones, and the program takes what the
+//! machine has (`pulp`). Both do the same operations in the same order and fuse none, so the bits are the same.
 //!
 //! # References
 //!
@@ -42,6 +46,8 @@
 //!   2020: fixed-size stage kernels.
 
 mod barrier;
+mod block;
+mod clamped;
 mod filter;
 mod interval;
 mod iterate;
@@ -51,9 +57,12 @@ mod layers;
 mod newton;
 mod residual;
 mod riccati;
+mod rows;
+mod sides;
 mod solver;
 mod start;
 mod tangent;
+mod warm;
 
 pub use solver::Workspace;
 

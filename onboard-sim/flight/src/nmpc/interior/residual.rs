@@ -104,7 +104,7 @@ impl Residual {
 
 /// The larger of two numbers, in one instruction.
 #[inline]
-fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

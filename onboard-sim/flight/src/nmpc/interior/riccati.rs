@@ -13,21 +13,12 @@
 //! stage, is positive throughout.
 #![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
-use super::interval::{Block, DIRECTIONS, pair};
+use pulp::{Arch, NullaryFnOnce};
+
+use super::block::pair;
 use super::iterate::Iterate;
 use super::lanes::LANES;
-
-const X: usize = 0;
-const Z: usize = 1;
-const T: usize = 2;
-const U: usize = 3;
-const W: usize = 4;
-const Q: usize = 5;
-/// The input among the directions.
-const D: usize = 4;
-
-/// The directions, filled up to whole vectors.
-const WIDE: usize = DIRECTIONS + 1;
+use super::rows::{D, Interval, Q, T, U, W, WIDE, X, Z};
 
 /// Least curvature by an input that counts as positive, relative to the input's own terms.
 const LEAST_CURVATURE: f64 = 1e-11;
@@ -37,81 +28,6 @@ const LEAST_CURVATURE: f64 = 1e-11;
 struct Feedback {
     gain: [f64; 6],
     offset: f64,
-}
-
-/// One interval's derivatives, out of its block.
-///
-/// The rows of `(A, b)` over the directions, filled up with a zero to whole vectors: x, z, u and w, then theta and q.
-struct Interval {
-    tangent: [[f64; WIDE]; 4],
-    theta: [f64; WIDE],
-    q: [f64; WIDE],
-}
-
-impl Interval {
-    #[inline(always)]
-    fn of(block: &Block, lane: usize, step_s: f64) -> Self {
-        let turn = block.turn.0[lane];
-        let mut tangent = [[0.0; WIDE]; 4];
-        for (row, lanes) in tangent.iter_mut().zip(&block.tangent) {
-            for (entry, value) in row.iter_mut().zip(lanes) {
-                *entry = value.0[lane];
-            }
-        }
-        Self {
-            tangent,
-            theta: [1.0, 0.0, 0.0, step_s, 0.5 * step_s * turn, 0.0],
-            q: [0.0, 0.0, 0.0, 1.0, turn, 0.0],
-        }
-    }
-
-    /// `(A, b)' g` without its x and z.
-    #[inline(always)]
-    fn pull(&self, g: &[f64; 6]) -> [f64; WIDE] {
-        let a = &self.tangent;
-        let mut pulled = [0.0; WIDE];
-        for j in 0..WIDE {
-            pulled[j] = (a[0][j] * g[X] + a[1][j] * g[Z])
-                + (a[2][j] * g[U] + a[3][j] * g[W])
-                + (self.theta[j] * g[T] + self.q[j] * g[Q]);
-        }
-        pulled
-    }
-
-    /// `(A, b)' M` without its x and z, for the rows of an `M` over the directions.
-    #[inline(always)]
-    fn square(&self, m: &[[f64; WIDE]; 6]) -> [[f64; WIDE]; DIRECTIONS] {
-        let a = &self.tangent;
-        let mut square = [[0.0; WIDE]; DIRECTIONS];
-        for (i, row) in square.iter_mut().enumerate() {
-            for j in 0..WIDE {
-                row[j] = (a[0][i] * m[X][j] + a[1][i] * m[Z][j]) + (a[2][i] * m[U][j] + a[3][i] * m[W][j]);
-            }
-        }
-        for j in 0..WIDE {
-            square[0][j] += m[T][j];
-            square[3][j] += self.theta[3] * m[T][j] + m[Q][j];
-            square[D][j] += self.theta[D] * m[T][j] + self.q[D] * m[Q][j];
-        }
-        square
-    }
-
-    /// `A dx + b dd`.
-    #[inline(always)]
-    fn push(&self, dx: &[f64; 6], dd: f64) -> [f64; 6] {
-        let a = &self.tangent;
-        let row = |i: usize| {
-            (a[i][0] * dx[T] + a[i][1] * dx[U]) + (a[i][2] * dx[W] + a[i][3] * dx[Q]) + a[i][D] * dd
-        };
-        [
-            dx[X] + row(0),
-            dx[Z] + row(1),
-            dx[T] + self.theta[3] * dx[Q] + self.theta[D] * dd,
-            row(2),
-            row(3),
-            dx[Q] + self.q[D] * dd,
-        ]
-    }
 }
 
 /// The Newton step and what it is made from.
@@ -134,6 +50,38 @@ pub(super) struct Sweep {
     share: f64,
 }
 
+/// The backward sweep, in the widest vectors that the machine has.
+struct Backward<'a> {
+    sweep: &'a mut Sweep,
+    iterate: &'a Iterate,
+    step_s: f64,
+}
+
+impl NullaryFnOnce for Backward<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.sweep.eliminate(self.iterate, self.step_s)
+    }
+}
+
+/// The forward sweep, in the same.
+struct Forward<'a> {
+    sweep: &'a mut Sweep,
+    iterate: &'a Iterate,
+    step_s: f64,
+}
+
+impl NullaryFnOnce for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.sweep.substitute(self.iterate, self.step_s);
+    }
+}
+
 impl Sweep {
     /// Makes room for a problem; allocates only if none was ever as long.
     pub(super) fn resize(&mut self, intervals: usize) {
@@ -149,6 +97,18 @@ impl Sweep {
     /// The backward sweep with a share of the dynamics' curvature; whether the inertia is right.
     pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, share: f64) -> bool {
         self.share = share;
+        Arch::new().dispatch(Backward { sweep: self, iterate, step_s })
+    }
+
+    /// The forward sweep: states, inputs, and then the costates, backwards again.
+    pub(super) fn forward(&mut self, iterate: &Iterate, step_s: f64) {
+        Arch::new().dispatch(Forward { sweep: self, iterate, step_s });
+    }
+
+    /// [`backward`](Self::backward) in the vectors of the function it is inlined into.
+    #[inline(always)]
+    pub(super) fn eliminate(&mut self, iterate: &Iterate, step_s: f64) -> bool {
+        let share = self.share;
         let count = self.inputs.len();
         let mut p = [[0.0; 6]; 6];
         for (i, weight) in self.weights[count].iter().enumerate() {
@@ -237,15 +197,17 @@ impl Sweep {
         let (block, lane) = (&iterate.blocks[k / LANES], k % LANES);
         let dx = &self.states[k];
         let moved = [dx[T], dx[U], dx[W], dx[Q], self.inputs[k]];
-        let bent: f64 =
-            (0..DIRECTIONS).map(|j| self.share * block.curvature[pair(j, D)].0[lane] * moved[j]).sum();
+        let bent: f64 = (0..super::block::DIRECTIONS)
+            .map(|j| self.share * block.curvature[pair(j, D)].0[lane] * moved[j])
+            .sum();
         let pulled = Interval::of(block, lane, step_s).pull(&self.costates[k + 1])[D];
         let (curvature, slope) = self.input_terms[k];
         curvature * self.inputs[k] + slope + bent + pulled
     }
 
-    /// The forward sweep: states, inputs, and then the costates, backwards again.
-    pub(super) fn forward(&mut self, iterate: &Iterate, step_s: f64) {
+    /// [`forward`](Self::forward) in the vectors of the function it is inlined into.
+    #[inline(always)]
+    pub(super) fn substitute(&mut self, iterate: &Iterate, step_s: f64) {
         let count = self.inputs.len();
         let mut dx = [0.0; 6];
         self.states[0] = dx;

@@ -1,11 +1,12 @@
 //! The main loop.
 
 use super::barrier::Elastic;
+use super::block::Constants;
 use super::filter::{Filter, Measures};
-use super::interval::Constants;
 use super::iterate::Iterate;
 use super::newton::{Fractions, Newton};
 use super::residual::Residual;
+use super::sides::Sides;
 use super::start;
 use crate::dynamics::PlanarState;
 use crate::nmpc::problem::Condition;
@@ -40,7 +41,7 @@ const KEPT_MOST: f64 = 1e-2;
 
 /// Shares of the dynamics' curvature that are tried until the inertia is right, from the one before the last that was;
 /// without it, the Hessian is that of Gauss and Newton and always is.
-const CURVATURE_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
+pub(super) const CURVATURE_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
 
 /// Shortest fraction of a step that is tried, of what the slacks allow.
 const SHORTEST_STEP: f64 = 1.0 / 1024.0;
@@ -57,18 +58,18 @@ const LANDING_MISS: f64 = 1e-3;
 
 /// How a solve from one start ended.
 #[derive(Debug, Clone, Copy)]
-struct Outcome {
-    status: SolveStatus,
-    iterations: usize,
-    sweeps: u32,
-    residual: Residual,
+pub(super) struct Outcome {
+    pub(super) status: SolveStatus,
+    pub(super) iterations: usize,
+    pub(super) sweeps: u32,
+    pub(super) residual: Residual,
     /// The largest miss of a condition.
-    miss: f64,
+    pub(super) miss: f64,
 }
 
 impl Outcome {
     /// Nothing finite was found.
-    const BAD: Self = Self {
+    pub(super) const BAD: Self = Self {
         status: SolveStatus::BadInput,
         iterations: 0,
         sweeps: 0,
@@ -90,8 +91,9 @@ pub struct Workspace {
     pub(super) trial: Iterate,
     other: Iterate,
     pub(super) newton: Newton,
+    pub(super) sides: Sides,
     filter: Filter,
-    scratch: Vec<[f64; 6]>,
+    pub(super) scratch: Vec<[f64; 6]>,
 }
 
 impl Workspace {
@@ -104,15 +106,7 @@ impl Workspace {
             self.report(problem, outcome, solution);
             return;
         };
-        start::warm(problem, &self.conditions, warm, LAST_BARRIER, &mut self.current);
-        let mut outcome = self.descend(problem, LAST_BARRIER, true, cap);
-        let left = cap - outcome.iterations;
-        if matches!(outcome.status, SolveStatus::Stalled | SolveStatus::SubproblemFailed) && left > 0 {
-            let (iterations, sweeps) = (outcome.iterations, outcome.sweeps);
-            outcome = self.cold(problem, left);
-            outcome.iterations += iterations;
-            outcome.sweeps += sweeps;
-        }
+        let outcome = self.warm(problem, warm, cap);
         self.report(problem, outcome, solution);
     }
 
@@ -124,11 +118,12 @@ impl Workspace {
             iterate.resize(intervals, conditions);
         }
         self.newton.resize(intervals, conditions);
+        self.sides.resize(intervals, conditions);
         self.scratch.resize(intervals + 1, [0.0; 6]);
     }
 
     /// Solves from bent guesses, at most `cap` iterations each; the best result ends as `current`.
-    fn cold(&mut self, problem: &Problem, cap: usize) -> Outcome {
+    pub(super) fn cold(&mut self, problem: &Problem, cap: usize) -> Outcome {
         let mut best: Option<(Outcome, f64)> = None;
         let (mut iterations, mut sweeps) = (0, 0);
         for (index, bend) in BENDS.into_iter().enumerate() {
@@ -137,7 +132,7 @@ impl Workspace {
             }
             let amplitude_rad = bend * problem.solver.guess_amplitude_rad;
             start::cold(problem, &self.conditions, amplitude_rad, COLD_BARRIER, &mut self.current);
-            let mut outcome = self.descend(problem, COLD_BARRIER, false, cap);
+            let mut outcome = self.descend(problem, COLD_BARRIER, cap);
             iterations += outcome.iterations;
             sweeps += outcome.sweeps;
             if outcome.status != SolveStatus::Converged {
@@ -155,20 +150,12 @@ impl Workspace {
         Outcome { iterations, sweeps, ..best }
     }
 
-    /// Newton iterations from `current`, which ends as the last iterate; with `check_first`, without derivatives for
-    /// a start that is optimal already.
-    fn descend(&mut self, problem: &Problem, first_barrier: f64, check_first: bool, cap: usize) -> Outcome {
+    /// Newton iterations from `current`, which ends as the last iterate.
+    pub(super) fn descend(&mut self, problem: &Problem, first_barrier: f64, cap: usize) -> Outcome {
         let constants = Constants::of(&problem.model, problem.step_s);
         let tolerance = problem.solver.kkt_tolerance;
         let mut barrier = first_barrier;
         let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
-        if check_first {
-            self.current.evaluate::<false>(&constants, problem);
-            let residual = self.residual(problem);
-            if residual.largest(0.0) <= tolerance {
-                return Outcome { status: SolveStatus::Converged, residual, ..Outcome::BAD };
-            }
-        }
         self.current.evaluate::<true>(&constants, problem);
         let mut residual = self.residual(problem);
         self.filter = Filter::starting_at(residual.infeasibility);
@@ -253,7 +240,7 @@ impl Workspace {
         false
     }
 
-    fn residual(&mut self, problem: &Problem) -> Residual {
+    pub(super) fn residual(&mut self, problem: &Problem) -> Residual {
         Residual::of(problem, &self.conditions, &self.current, &mut self.scratch)
     }
 

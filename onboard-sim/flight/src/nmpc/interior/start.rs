@@ -39,14 +39,14 @@ pub(super) fn cold(
 
 /// A start from an earlier solution, shifted to the present. Its states stay where they are, but for the first: that
 /// the vehicle is not where it was expected becomes one defect, and no limit or condition jumps. Without states,
-/// costates and limit multipliers, or with some that are not finite, the inputs are rolled out.
+/// costates and limit multipliers, or with some that are not finite, the inputs are rolled out; whether all were there.
 pub(super) fn warm(
     problem: &Problem,
     conditions: &[Condition],
     warm: &WarmStart,
     barrier: f64,
     start: &mut Iterate,
-) {
+) -> bool {
     let limit = problem.gimbal_limit_rad;
     let price = problem.solver.terminal_penalty;
     let count = problem.intervals();
@@ -84,6 +84,7 @@ pub(super) fn warm(
         let value = condition.value(&start.states);
         *elastic = Elastic::warm(value, multiplier, condition.equality, price, barrier);
     }
+    complete
 }
 
 /// The same states with slacks and multipliers raised to a larger barrier: too many limits and conditions change

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
-use super::interval::{Block, Constants, DIRECTIONS, Points, evaluate, pair};
+use super::block::{Block, Constants, DIRECTIONS, Points, pair};
+use super::interval::evaluate;
 use super::lanes::{LANES, Lanes};
 use super::*;
 use crate::dynamics::{ModelKind, PlanarModel, PlanarState};
@@ -40,10 +41,10 @@ fn block((model, mass_kg): &Vehicle, (state, gimbal, costate): &Point) -> Block 
         costate: costate.map(Lanes::splat),
     };
     let mut block = Block::EMPTY;
-    if constants.pushed_across() {
-        evaluate::<true, true>(&constants, &points, &mut block);
-    } else {
-        evaluate::<true, false>(&constants, &points, &mut block);
+    match (constants.printed, constants.pushed_across()) {
+        (true, _) => evaluate::<true, true, false>(&constants, &points, &mut block),
+        (false, true) => evaluate::<true, false, true>(&constants, &points, &mut block),
+        (false, false) => evaluate::<true, false, false>(&constants, &points, &mut block),
     }
     block
 }
@@ -156,5 +157,37 @@ fn the_sweeps_solve_the_newton_system() {
             let left = workspace.newton.sweep.input_residual(&workspace.current, problem.step_s, k);
             assert!(left.abs() < 1e-6, "{k}: {left}");
         }
+    }
+}
+
+/// Derivatives and sweeps in the vectors that the machine has and in those that every machine has.
+#[test]
+fn the_width_of_the_vectors_does_not_change_a_bit() {
+    let profile = Profile::builtin("paper-calibrated").unwrap();
+    let mut problem = Problem::from_profile(&profile, profile.start.planar_state(), 0.0, 50, 1.0);
+    let warm = solve(&problem, None).shifted(0);
+    for vehicle in vehicles() {
+        problem.model = vehicle.0;
+        let mut workspace = Workspace::default();
+        workspace.load(&problem, &warm);
+        workspace.evaluate_intervals(&problem);
+        for k in 0..50 {
+            let (wide, lane) = (&workspace.current.blocks[k / LANES], k % LANES);
+            let current = &workspace.current;
+            let point = (current.states[k], current.inputs_rad[k], current.costates[k + 1]);
+            let plain = block(&(vehicle.0, vehicle.0.params.mass_kg), &point);
+            for (wide, plain) in wide.curvature.iter().zip(&plain.curvature) {
+                assert_eq!(wide.0[lane].to_bits(), plain.0[0].to_bits(), "{k}");
+            }
+            for (wide, plain) in wide.after.iter().zip(&plain.after) {
+                assert_eq!(wide.0[lane].to_bits(), plain.0[0].to_bits(), "{k}");
+            }
+        }
+        workspace.sweep(&problem);
+        let sweep = &mut workspace.newton.sweep;
+        let wide = (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone());
+        sweep.eliminate(&workspace.current, problem.step_s);
+        sweep.substitute(&workspace.current, problem.step_s);
+        assert_eq!(wide, (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone()));
     }
 }

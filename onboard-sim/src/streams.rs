@@ -2,53 +2,71 @@
 
 use mavlink::MessageData as _;
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
-    MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA,
+    HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
+use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
 
 /// Bytes around a payload: header and checksum.
 const FRAME_OVERHEAD: usize = 12;
+/// Time, mask and six of the 32 outputs; the others are nought and therefore cut.
+const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
+/// Default rates are at most this where frames are signed, Hz: a signature is as long as a short message.
+const SIGNED_RATE_MAX_HZ: f64 = 6.0;
 /// Slowest interval that can be asked for, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
 /// A message that is sent by itself, with its longest payload and its default rate.
-pub(super) struct Standard {
-    pub(super) message_id: u32,
+pub struct Standard {
+    /// Message.
+    pub message_id: u32,
+    /// The parameter that holds its rate.
+    pub parameter: &'static str,
     payload_len: usize,
-    pub(super) rate_hz: f64,
+    /// Default rate, Hz; 0 is off.
+    pub rate_hz: f64,
 }
 
-const fn standard(message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
-    Standard { message_id, payload_len, rate_hz }
+const fn standard(parameter: &'static str, message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
+    Standard { message_id, parameter, payload_len, rate_hz }
 }
 
 /// What is sent unasked. In the order in which it is given up when the budget runs short: last first.
-pub(super) const STANDARD: [Standard; 14] = [
-    standard(HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
-    standard(TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
-    standard(TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
+pub const STANDARD: [Standard; 16] = [
+    standard("RATE_HEARTBEAT", HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_FLIGHT_STAT", TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
+    standard("RATE_VERDICT", TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
     // Without its optional offset quaternion, which is never set and therefore cut.
-    standard(ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
-    standard(LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
-    standard(TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
-    standard(TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
-    standard(TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
-    standard(TD_TOUCHDOWN_PREDICTION_DATA::ID, TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN, 2.0),
-    standard(TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
-    standard(SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard(EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
-    standard(VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
-    standard(TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+    standard("RATE_ATTITUDE", ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
+    standard("RATE_POSITION", LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
+    standard("RATE_GIMBAL", TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
+    standard("RATE_CONTROLLER", TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
+    standard("RATE_FINS", TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
+    standard(
+        "RATE_PREDICTION",
+        TD_TOUCHDOWN_PREDICTION_DATA::ID,
+        TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN,
+        2.0,
+    ),
+    standard("RATE_PATH", TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_SYS_STATUS", SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_EXT_STATE", EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_VFR_HUD", VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_LIMITS", TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+    // For other people's clients, off until asked for: what they say is in the messages above already.
+    standard("RATE_ACTUATORS", ACTUATOR_OUTPUT_STATUS_DATA::ID, ACTUATOR_PAYLOAD_LEN, 0.0),
+    standard("RATE_MODE", CURRENT_MODE_DATA::ID, CURRENT_MODE_DATA::ENCODED_LEN, 0.0),
 ];
 
 #[derive(Debug, Clone, Copy)]
 struct Stream {
     message_id: u32,
-    payload_len: usize,
-    default_interval_s: f64,
+    frame_len: usize,
+    /// `None`: off unless asked for.
+    default_interval_s: Option<f64>,
     /// `None`: switched off.
     interval_s: Option<f64>,
     due_s: f64,
@@ -56,35 +74,47 @@ struct Stream {
 
 impl Stream {
     fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
-        interval_s.map_or(0.0, |interval_s| (self.payload_len + FRAME_OVERHEAD) as f64 / interval_s)
+        interval_s.map_or(0.0, |interval_s| self.frame_len as f64 / interval_s)
     }
 }
 
 /// Every stream, in the order of [`STANDARD`].
-pub(super) struct Streams(Vec<Stream>);
+pub struct Streams(Vec<Stream>);
 
 impl Streams {
     /// Every standard message at its default rate.
-    pub(super) fn standard() -> Self {
-        let streams = STANDARD.iter().enumerate().map(|(place, standard)| Stream {
-            message_id: standard.message_id,
-            payload_len: standard.payload_len,
-            default_interval_s: 1.0 / standard.rate_hz,
-            interval_s: Some(1.0 / standard.rate_hz),
-            // Spread, so that the slow ones do not all fall into the same instant.
-            due_s: 0.02 * place as f64,
+    pub fn standard() -> Self {
+        Self::of(0, f64::INFINITY)
+    }
+
+    /// The same where every frame carries a signature: the fastest are slowed down, so that the radio's budget holds.
+    pub fn signed() -> Self {
+        Self::of(SIGNATURE_LEN, SIGNED_RATE_MAX_HZ)
+    }
+
+    fn of(signature_len: usize, rate_max_hz: f64) -> Self {
+        let streams = STANDARD.iter().enumerate().map(|(place, standard)| {
+            let interval_s = (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
+            Stream {
+                message_id: standard.message_id,
+                frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
+                default_interval_s: interval_s,
+                interval_s,
+                // Spread, so that the slow ones do not all fall into the same instant.
+                due_s: 0.02 * place as f64,
+            }
         });
         Self(streams.collect())
     }
 
     /// The messages whose time has come, most important first.
-    pub(super) fn due(&self, now_s: f64) -> Vec<u32> {
+    pub fn due(&self, now_s: f64) -> Vec<u32> {
         let due = |stream: &&Stream| stream.interval_s.is_some() && now_s >= stream.due_s;
         self.0.iter().filter(due).map(|stream| stream.message_id).collect()
     }
 
     /// A message was sent, or there was nothing to say in it.
-    pub(super) fn on_sent(&mut self, message_id: u32, now_s: f64) {
+    pub fn on_sent(&mut self, message_id: u32, now_s: f64) {
         for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
             let Some(interval_s) = stream.interval_s else { continue };
             // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
@@ -95,20 +125,19 @@ impl Streams {
     }
 
     /// Sends a message at the next opportunity.
-    pub(super) fn hurry(&mut self, message_id: u32) {
+    pub fn hurry(&mut self, message_id: u32) {
         for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.due_s = f64::NEG_INFINITY;
         }
     }
 
     /// Bytes per second of all of them, at their longest.
-    #[cfg(test)]
-    pub(super) fn bytes_s(&self) -> f64 {
+    pub fn bytes_s(&self) -> f64 {
         self.0.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
     }
 
     /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
-    pub(super) fn set_interval(
+    pub fn set_interval(
         &mut self,
         message_id: u32,
         interval_us: f32,
@@ -122,7 +151,7 @@ impl Streams {
         };
         let wanted = match interval_us {
             -1.0 => None,
-            0.0 => Some(self.0[place].default_interval_s),
+            0.0 => self.0[place].default_interval_s,
             us if us >= 1.0 && f64::from(us) * 1e-6 <= MAX_INTERVAL_S => Some(f64::from(us) * 1e-6),
             _ => {
                 let reason =
@@ -132,7 +161,7 @@ impl Streams {
         };
         let default_s = self.0[place].default_interval_s;
         let vital = matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID);
-        if vital && wanted.is_none_or(|interval_s| interval_s > default_s) {
+        if vital && wanted.is_none_or(|interval_s| default_s.is_none_or(|default_s| interval_s > default_s)) {
             let reason = format!("message {message_id}: the crew lives by it; it is not slowed down");
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
@@ -159,8 +188,14 @@ impl Streams {
         (MavResult::MAV_RESULT_ACCEPTED, None)
     }
 
+    /// How often a message is sent, Hz; 0 if it is off or none of ours.
+    pub fn rate_hz(&self, message_id: u32) -> f64 {
+        let stream = self.0.iter().find(|stream| stream.message_id == message_id);
+        stream.and_then(|stream| stream.interval_s).map_or(0.0, |interval_s| 1.0 / interval_s)
+    }
+
     /// MESSAGE_INTERVAL of a message.
-    pub(super) fn interval_of(&self, message_id: u32) -> MavMessage {
+    pub fn interval_of(&self, message_id: u32) -> MavMessage {
         let stream = self.0.iter().find(|stream| stream.message_id == message_id);
         let interval_us = match stream.map(|stream| stream.interval_s) {
             Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,

@@ -1,0 +1,265 @@
+//! One row a flight: what chance decided, what became of it, and what it cost.
+//!
+//! The columns are named with their units once, here; CSV, Parquet and the summary take them from
+//! [`COLUMNS`]. A quantity that a flight never had (the height of an ignition that never came) is empty.
+
+use serde::{Deserialize, Serialize};
+
+/// A cell's value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Value<'a> {
+    /// A whole number.
+    Count(u64),
+    /// A number.
+    Real(f64),
+    /// A number, if there is one.
+    Maybe(Option<f64>),
+    /// Yes or no.
+    Flag(bool),
+    /// A word.
+    Word(&'a str),
+}
+
+impl Value<'_> {
+    /// The value as a number: flags are 0 and 1, words are none.
+    pub fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Count(count) => Some(count as f64),
+            Self::Real(real) => Some(real),
+            Self::Maybe(maybe) => maybe,
+            Self::Flag(flag) => Some(f64::from(u8::from(flag))),
+            Self::Word(_) => None,
+        }
+    }
+}
+
+/// What all cells of a column are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Value::Count`].
+    Count,
+    /// [`Value::Real`].
+    Real,
+    /// [`Value::Maybe`].
+    Maybe,
+    /// [`Value::Flag`].
+    Flag,
+    /// [`Value::Word`].
+    Word,
+}
+
+/// A type that a column can have.
+trait Cell {
+    const KIND: Kind;
+
+    fn value(&self) -> Value<'_>;
+}
+
+impl Cell for u64 {
+    const KIND: Kind = Kind::Count;
+
+    fn value(&self) -> Value<'_> {
+        Value::Count(*self)
+    }
+}
+
+impl Cell for f64 {
+    const KIND: Kind = Kind::Real;
+
+    fn value(&self) -> Value<'_> {
+        Value::Real(*self)
+    }
+}
+
+impl Cell for Option<f64> {
+    const KIND: Kind = Kind::Maybe;
+
+    fn value(&self) -> Value<'_> {
+        Value::Maybe(*self)
+    }
+}
+
+impl Cell for bool {
+    const KIND: Kind = Kind::Flag;
+
+    fn value(&self) -> Value<'_> {
+        Value::Flag(*self)
+    }
+}
+
+impl Cell for String {
+    const KIND: Kind = Kind::Word;
+
+    fn value(&self) -> Value<'_> {
+        Value::Word(self)
+    }
+}
+
+/// A column: its name and how to read it off a row.
+pub struct Column {
+    /// The name, with its unit.
+    pub name: &'static str,
+    /// What its cells are.
+    pub kind: Kind,
+    /// The cell of a row.
+    pub value: for<'a> fn(&'a Row) -> Value<'a>,
+}
+
+macro_rules! row {
+    ($($(#[$documentation:meta])* $name:ident: $kind:ty,)*) => {
+        /// A flight in a table.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub struct Row {
+            $($(#[$documentation])* pub $name: $kind,)*
+        }
+
+        /// Every column, in order.
+        pub const COLUMNS: &[Column] =
+            &[$(Column { name: stringify!($name), kind: <$kind as Cell>::KIND, value: |row| row.$name.value() },)*];
+    };
+}
+
+row! {
+    /// Number of the flight.
+    number: u64,
+    /// Drawn: true impulse over certified.
+    impulse_scale: f64,
+    /// Drawn: true burn time over certified.
+    burn_time_scale: f64,
+    /// Drawn: from the ignition command to the first thrust, s.
+    ignition_delay_s: f64,
+    /// Drawn: thrust direction off the axis in pitch, degrees.
+    thrust_misalignment_pitch_deg: f64,
+    /// Drawn: thrust direction off the axis in yaw, degrees.
+    thrust_misalignment_yaw_deg: f64,
+    /// Drawn: true mass over the data's.
+    mass_scale: f64,
+    /// Drawn: true drag over the data's.
+    drag_scale: f64,
+    /// Drawn: centre of gravity off the axis along body y, m.
+    cg_offset_y_m: f64,
+    /// Drawn: centre of gravity off the axis along body z, m.
+    cg_offset_z_m: f64,
+    /// Drawn: mean wind 10 m above the ground, m/s.
+    wind_m_s: f64,
+    /// Drawn: where the wind blows to, from world x towards world y, degrees.
+    wind_towards_deg: f64,
+    /// Drawn: height of apogee, m.
+    apogee_height_m: f64,
+    /// Drawn: horizontal distance of apogee from the pad, m.
+    apogee_distance_m: f64,
+    /// Drawn: horizontal speed at apogee, m/s.
+    apogee_speed_m_s: f64,
+    /// Drawn: tilt of the nose at apogee, degrees.
+    apogee_tilt_deg: f64,
+    /// Drawn: size of the rotation rate at apogee, degrees per second.
+    apogee_rate_deg_s: f64,
+    /// The landing motor was commanded to light.
+    ignited: bool,
+    /// It was commanded while a check of the ignition gate failed. Never true.
+    ignition_outside_gate: bool,
+    /// The parachute was thrown out.
+    parachute: bool,
+    /// Height of the feet that was chosen for the first thrust, m, as of the command.
+    chosen_onset_height_m: Option<f64>,
+    /// Height of the feet at the ignition command, m.
+    ignition_height_m: Option<f64>,
+    /// Height of the feet at the first thrust, m.
+    onset_height_m: Option<f64>,
+    /// Vertical velocity at the first thrust, up, m/s.
+    onset_vertical_m_s: Option<f64>,
+    /// Time since the first thrust at contact, s.
+    burn_time_at_contact_s: Option<f64>,
+    /// Time of contact since apogee, s.
+    touchdown_time_s: Option<f64>,
+    /// Vertical velocity at contact, up, m/s.
+    touchdown_vertical_m_s: Option<f64>,
+    /// Horizontal speed at contact, m/s.
+    touchdown_lateral_m_s: Option<f64>,
+    /// Tilt at contact, degrees.
+    touchdown_tilt_deg: Option<f64>,
+    /// Size of the rotation rate at contact, degrees per second.
+    touchdown_rate_deg_s: Option<f64>,
+    /// Place of contact, world x, m from the pad.
+    touchdown_x_m: Option<f64>,
+    /// Place of contact, world y, m from the pad.
+    touchdown_y_m: Option<f64>,
+    /// Thrust over weight at contact.
+    touchdown_thrust_over_weight: Option<f64>,
+    /// The largest share of what the legs take that the contact asked of them: above 1 is too much.
+    leg_use: Option<f64>,
+    /// Inside the landing paper's Table 2, and upright afterwards.
+    strict: bool,
+    /// Within what the legs take, and upright afterwards.
+    legs: bool,
+    /// Why not within what the legs take; empty if it is.
+    failure: String,
+    /// How it lies; empty if it does not.
+    rest: String,
+    /// Last phase.
+    phase: String,
+    /// Plans that converged and land.
+    plans_converged: u64,
+    /// Plans flown though not converged, or missing the end a little.
+    plans_best_feasible: u64,
+    /// Plans that the previous one stood in for.
+    plans_shifted: u64,
+    /// Plans that the upright law stood in for.
+    plans_stabiliser: u64,
+    /// Iterations of the solver in all.
+    solver_iterations: u64,
+    /// Solves that did not converge.
+    solver_failures: u64,
+    /// Share of the frames under thrust with a gimbal axis commanded to its stop.
+    gimbal_saturation_share: f64,
+    /// Largest error of the estimated vertical velocity below 10 m, m/s.
+    error_vertical_m_s: f64,
+    /// Largest error of the estimated horizontal velocity below 10 m, m/s.
+    error_lateral_m_s: f64,
+    /// Largest error of the estimated height below 10 m, m.
+    error_height_m: f64,
+    /// Largest error of the estimated direction of the nose below 10 m, degrees.
+    error_nose_deg: f64,
+    /// Faults that came about.
+    faults: u64,
+    /// From apogee until it lay still, s.
+    flight_time_s: f64,
+}
+
+impl Row {
+    /// The columns that chance decides, in order, with what they would be without chance, if that is one value.
+    pub const DRAWN: [(&'static str, Option<f64>); 15] = [
+        ("impulse_scale", Some(1.0)),
+        ("burn_time_scale", Some(1.0)),
+        ("ignition_delay_s", Some(0.15)),
+        ("thrust_misalignment_pitch_deg", Some(0.0)),
+        ("thrust_misalignment_yaw_deg", Some(0.0)),
+        ("mass_scale", Some(1.0)),
+        ("drag_scale", Some(1.0)),
+        ("cg_offset_y_m", Some(0.0)),
+        ("cg_offset_z_m", Some(0.0)),
+        ("wind_m_s", None),
+        ("apogee_height_m", None),
+        ("apogee_distance_m", None),
+        ("apogee_speed_m_s", None),
+        ("apogee_tilt_deg", None),
+        ("apogee_rate_deg_s", None),
+    ];
+}
+
+/// The column of a name.
+pub fn column(name: &str) -> Option<&'static Column> {
+    COLUMNS.iter().find(|column| column.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_drawn_quantity_is_a_column() {
+        for (name, _) in Row::DRAWN {
+            assert!(column(name).is_some(), "{name}");
+        }
+    }
+}

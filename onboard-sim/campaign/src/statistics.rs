@@ -1,0 +1,120 @@
+//! The statistics of a campaign's summary.
+
+use serde::Serialize;
+
+/// 97.5 % point of the normal distribution.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// How many of how many, with a 95 % interval for the true share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Share {
+    /// How many.
+    pub count: u64,
+    /// Of how many.
+    pub of: u64,
+    /// Their share.
+    pub share: f64,
+    /// Low end of the interval.
+    pub low: f64,
+    /// High end of the interval.
+    pub high: f64,
+}
+
+impl Share {
+    /// With E. B. Wilson's score interval (Journal of the American Statistical Association 22, 1927): unlike the
+    /// normal approximation it is right near 0 and 1.
+    pub fn new(count: u64, of: u64) -> Self {
+        if of == 0 {
+            return Self { count, of, share: 0.0, low: 0.0, high: 1.0 };
+        }
+        let (n, share) = (of as f64, count as f64 / of as f64);
+        let z2 = Z_95 * Z_95;
+        let centre = share + z2 / (2.0 * n);
+        let half = Z_95 * libm::sqrt(share * (1.0 - share) / n + z2 / (4.0 * n * n));
+        let scale = 1.0 + z2 / n;
+        let low = if count == 0 { 0.0 } else { (centre - half) / scale };
+        let high = if count == of { 1.0 } else { (centre + half) / scale };
+        Self { count, of, share, low, high }
+    }
+}
+
+/// The value below which a share of the values lies, between neighbours by a straight line (R's type 7); `None`
+/// without values. `sorted` ascends.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let place = share.clamp(0.0, 1.0) * last as f64;
+    let below = libm::floor(place) as usize;
+    let above = (below + 1).min(last);
+    Some(sorted[below] + (place - below as f64) * (sorted[above] - sorted[below]))
+}
+
+/// Sorted, numbers only.
+pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// Spearman's rank correlation, equal values sharing their mean rank; 0 where one side does not vary.
+pub fn rank_correlation(pairs: &[(f64, f64)]) -> f64 {
+    let ranks = |values: Vec<f64>| {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|one, two| values[*one].total_cmp(&values[*two]));
+        let mut ranks = vec![0.0; values.len()];
+        let mut from = 0;
+        while from < order.len() {
+            let same = |place: &usize| values[order[*place]].total_cmp(&values[order[from]]).is_eq();
+            let to = (from..order.len()).take_while(same).last().unwrap_or(from);
+            for place in from..=to {
+                ranks[order[place]] = 0.5 * (from + to) as f64;
+            }
+            from = to + 1;
+        }
+        ranks
+    };
+    let one = ranks(pairs.iter().map(|(one, _)| *one).collect());
+    let two = ranks(pairs.iter().map(|(_, two)| *two).collect());
+    let mean = (pairs.len() as f64 - 1.0) / 2.0;
+    let sum = |left: &[f64], right: &[f64]| -> f64 {
+        left.iter().zip(right).map(|(left, right)| (left - mean) * (right - mean)).sum()
+    };
+    let spread = libm::sqrt(sum(&one, &one) * sum(&two, &two));
+    if spread > 0.0 { sum(&one, &two) / spread } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: 8 of 10, z = 1.96: centre (0.8 + 0.19207) / 1.38415 = 0.71674, half 0.22659.
+    #[test]
+    fn val_wilson_by_hand() {
+        let share = Share::new(8, 10);
+        assert!((share.low - 0.490_16).abs() < 1e-5 && (share.high - 0.943_32).abs() < 1e-5, "{share:?}");
+        let all = Share::new(1000, 1000);
+        // n / (n + z^2).
+        assert!((all.low - 1000.0 / 1_003.841_459).abs() < 1e-9, "{all:?}");
+        assert!((all.high - 1.0).abs() < 1e-15);
+        assert!(Share::new(0, 5).low.abs() < 1e-15 && Share::new(0, 0).high >= 1.0);
+    }
+
+    #[test]
+    fn val_quantiles_by_hand() {
+        let values = sorted([4.0, 1.0, f64::NAN, 2.0, 3.0].into_iter());
+        assert_eq!(quantile(&values, 0.5), Some(2.5));
+        assert_eq!(quantile(&values, 0.25), Some(1.75));
+        assert_eq!(quantile(&values, 1.0), Some(4.0));
+        assert_eq!(quantile(&[], 0.5), None);
+    }
+
+    /// Ranks 1 2 3 4 5 against 2 1 4 3 5: 1 - 6 * 4 / (5 * 24) = 0.8.
+    #[test]
+    fn val_rank_correlation_by_hand() {
+        let pairs = [(10.0, 0.2), (20.0, 0.1), (30.0, 0.4), (40.0, 0.3), (50.0, 9.0)];
+        assert!((rank_correlation(&pairs) - 0.8).abs() < 1e-12);
+        assert!(rank_correlation(&[(1.0, 2.0), (1.0, 3.0)]).abs() < 1e-15);
+        // Ties: ranks 0.5 0.5 2 against 0 1 2.
+        let tied = [(1.0, 1.0), (1.0, 2.0), (2.0, 3.0)];
+        assert!((rank_correlation(&tied) - 0.866_025_403_784).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,249 @@
+//! The directory of a campaign: its manifest, the chunks of flights that are done, and what is made of them.
+//!
+//! A chunk is written under another name and renamed when it is whole, so that a campaign that was stopped goes on
+//! with the chunks that are there. A directory belongs to one order of flights: another is refused.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::order::{Manifest, Order, Shard};
+use crate::row::Row;
+use crate::table;
+
+/// Flights of a chunk.
+pub const CHUNK_FLIGHTS: u64 = 10;
+
+/// Why a directory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A file cannot be read or written.
+    #[error("{path}")]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        source: io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{path}: {message}")]
+    Content {
+        /// Which.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// It holds other results.
+    #[error("{path} holds other results: {difference}; give another directory")]
+    OtherOrder {
+        /// The directory.
+        path: PathBuf,
+        /// In what they differ.
+        difference: String,
+    },
+    /// Another process is at work in it.
+    #[error("{path} is in use by another process")]
+    InUse {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// Flights are missing.
+    #[error("flights {from} to {to} are in none of the directories; run what is missing first")]
+    Missing {
+        /// The first of them.
+        from: u64,
+        /// The last of them.
+        to: u64,
+    },
+    /// The same flights differ.
+    #[error("flights {from} and on are in {one} and in {two}, and differ")]
+    Contradiction {
+        /// The first flight of the chunk.
+        from: u64,
+        /// A directory.
+        one: PathBuf,
+        /// Another.
+        two: PathBuf,
+    },
+}
+
+fn file_error(path: &Path) -> impl FnOnce(io::Error) -> StoreError {
+    let path = path.to_owned();
+    move |source| StoreError::File { path, source }
+}
+
+/// A directory in use by this process.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    manifest: Manifest,
+    /// Held as long as the directory is in use.
+    _lock: File,
+}
+
+impl Store {
+    /// Makes a directory for an order, or goes on with one that was made for the same.
+    ///
+    /// # Errors
+    /// It was made for another order, is in use, or cannot be written.
+    pub fn open(path: &Path, order: &Order, manifest: &Manifest) -> Result<Self, StoreError> {
+        let chunks = path.join("chunks");
+        fs::create_dir_all(&chunks).map_err(file_error(&chunks))?;
+        let lock_path = path.join("lock");
+        let lock = File::create(&lock_path).map_err(file_error(&lock_path))?;
+        lock.try_lock().map_err(|_held| StoreError::InUse { path: path.to_owned() })?;
+        if path.join("manifest.json").exists() {
+            if let Some(difference) = read_manifest(path)?.difference(manifest) {
+                return Err(StoreError::OtherOrder { path: path.to_owned(), difference });
+            }
+        } else {
+            write_whole(&path.join("mission.toml"), order.mission_toml.as_bytes())?;
+            write_whole(&path.join("dispersion.toml"), order.dispersion_toml.as_bytes())?;
+            let text = serde_json::to_string_pretty(manifest).map_err(|error| StoreError::Content {
+                path: path.join("manifest.json"),
+                message: error.to_string(),
+            })?;
+            write_whole(&path.join("manifest.json"), text.as_bytes())?;
+        }
+        Ok(Self { path: path.to_owned(), manifest: manifest.clone(), _lock: lock })
+    }
+
+    /// What it was made for.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The directory.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The chunks that belong here, as their numbers.
+    pub fn chunks(&self) -> impl Iterator<Item = u64> + use<> {
+        let shard = self.manifest.shard;
+        (0..self.manifest.flights.div_ceil(CHUNK_FLIGHTS)).filter(move |chunk| shard.has(*chunk))
+    }
+
+    /// The flights of a chunk.
+    pub fn flights_of(&self, chunk: u64) -> core::ops::Range<u64> {
+        let from = chunk * CHUNK_FLIGHTS;
+        from..(from + CHUNK_FLIGHTS).min(self.manifest.flights)
+    }
+
+    /// Whether a chunk is done.
+    pub fn has(&self, chunk: u64) -> bool {
+        chunk_path(&self.path, chunk).exists()
+    }
+
+    /// Writes a chunk.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&self, chunk: u64, rows: &[Row]) -> Result<(), StoreError> {
+        let path = chunk_path(&self.path, chunk);
+        let content = |message: String| StoreError::Content { path: path.clone(), message };
+        let text = table::to_csv(rows).map_err(|error| content(error.to_string()))?;
+        write_whole(&path, &text)
+    }
+
+    /// Every flight that belongs here, in order.
+    ///
+    /// # Errors
+    /// A chunk is missing or damaged.
+    pub fn rows(&self) -> Result<Vec<Row>, StoreError> {
+        let mut rows = Vec::new();
+        for chunk in self.chunks() {
+            let path = chunk_path(&self.path, chunk);
+            let bytes = fs::read(&path).map_err(file_error(&path))?;
+            let content = |message: String| StoreError::Content { path: path.clone(), message };
+            let found = table::from_csv(&bytes).map_err(|error| content(error.to_string()))?;
+            if !found.iter().map(|row| row.number).eq(self.flights_of(chunk)) {
+                return Err(content(format!("does not hold the flights {:?}", self.flights_of(chunk))));
+            }
+            rows.extend(found);
+        }
+        Ok(rows)
+    }
+
+    /// Writes a file of results; `name` is its name in the directory.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn publish(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
+        write_whole(&self.path.join(name), bytes)
+    }
+}
+
+fn chunk_path(directory: &Path, chunk: u64) -> PathBuf {
+    directory.join("chunks").join(format!("{chunk:06}.csv"))
+}
+
+/// Under another name first: a file of this name is always whole.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
+    let unfinished = path.with_extension("unfinished");
+    let written = File::create(&unfinished).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    written.and_then(|()| fs::rename(&unfinished, path)).map_err(file_error(path))
+}
+
+/// The manifest of a directory.
+///
+/// # Errors
+/// There is none, or it is not one.
+pub fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
+    let path = directory.join("manifest.json");
+    let text = fs::read_to_string(&path).map_err(file_error(&path))?;
+    serde_json::from_str(&text).map_err(|error| StoreError::Content { path, message: error.to_string() })
+}
+
+/// Gathers the parts of a campaign into one directory. The order is rebuilt from the texts the parts keep.
+///
+/// # Errors
+/// The parts are of different campaigns, contradict each other or leave flights out.
+pub fn merge(
+    parts: &[PathBuf],
+    out: &Path,
+    order_of: impl FnOnce(&Manifest, &str, &str) -> Result<Order, String>,
+) -> Result<(Store, Order), StoreError> {
+    let nothing = || StoreError::Missing { from: 0, to: 0 };
+    let first = parts.first().ok_or_else(nothing)?;
+    let whole = |directory: &Path| -> Result<Manifest, StoreError> {
+        Ok(Manifest { shard: Shard::WHOLE, ..read_manifest(directory)? })
+    };
+    let manifest = whole(first)?;
+    for part in parts {
+        if let Some(difference) = whole(part)?.difference(&manifest) {
+            return Err(StoreError::OtherOrder { path: part.clone(), difference });
+        }
+    }
+    let text = |name: &str| {
+        let path = first.join(name);
+        fs::read_to_string(&path).map_err(file_error(&path))
+    };
+    let order = order_of(&manifest, &text("mission.toml")?, &text("dispersion.toml")?)
+        .map_err(|message| StoreError::Content { path: first.clone(), message })?;
+    let store = Store::open(out, &order, &manifest)?;
+    for chunk in store.chunks() {
+        let mut found: Option<(Vec<u8>, &PathBuf)> = None;
+        for part in parts.iter().filter(|part| chunk_path(part, chunk).exists()) {
+            let path = chunk_path(part, chunk);
+            let bytes = fs::read(&path).map_err(file_error(&path))?;
+            match &found {
+                Some((known, one)) if *known != bytes => {
+                    let (one, two) = ((*one).clone(), part.clone());
+                    return Err(StoreError::Contradiction { from: chunk * CHUNK_FLIGHTS, one, two });
+                }
+                Some(_) => {}
+                None => found = Some((bytes, part)),
+            }
+        }
+        let flights = store.flights_of(chunk);
+        let missing = StoreError::Missing { from: flights.start, to: flights.end.saturating_sub(1) };
+        let (bytes, _) = found.ok_or(missing)?;
+        write_whole(&chunk_path(out, chunk), &bytes)?;
+    }
+    Ok((store, order))
+}

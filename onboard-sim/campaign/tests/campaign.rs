@@ -1,0 +1,169 @@
+//! A campaign's results do not depend on how it was flown.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs;
+use std::path::Path;
+
+use campaign::baseline::Controller;
+use campaign::dispersion::{self, Dispersion};
+use campaign::order::{Order, Shard};
+use campaign::store::{CHUNK_FLIGHTS, Store, StoreError, merge};
+use campaign::{results, run, table};
+use flight::mission::{self, Mission};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::RowAccessor as _;
+
+const FLIGHTS: u64 = 23;
+
+/// Passive descents, low: quick to fly.
+fn order(seed: u64) -> Order {
+    let mission_toml = mission::BUILTIN[0].1.replace("height_m = 300.0", "height_m = 60.0");
+    let mut mission = Mission::from_toml(&mission_toml, "test").unwrap();
+    mission.steered = false;
+    let (name, dispersion_toml) = dispersion::BUILTIN[2];
+    Order {
+        mission,
+        mission_toml,
+        dispersion: Dispersion::builtin(name).unwrap(),
+        dispersion_name: name.to_owned(),
+        dispersion_toml: dispersion_toml.to_owned(),
+        seed,
+        flights: FLIGHTS,
+        controller: Controller::Nmpc,
+        faults: Vec::new(),
+    }
+}
+
+fn fly(order: &Order, shard: Shard, jobs: usize, out: &Path) -> u64 {
+    let store = Store::open(out, order, &order.manifest("test", shard)).unwrap();
+    let flown = run::run(order, &store, jobs, &|_| ()).unwrap().flown;
+    results::publish(order, &store).unwrap();
+    flown
+}
+
+const FILES: [&str; 8] = [
+    "flights.csv",
+    "flights.parquet",
+    "summary.json",
+    "summary.md",
+    "touchdown.svg",
+    "vertical-speed.svg",
+    "ignition-height.svg",
+    "tilt.svg",
+];
+
+fn assert_same(one: &Path, two: &Path) {
+    for file in FILES {
+        assert!(fs::read(one.join(file)).unwrap() == fs::read(two.join(file)).unwrap(), "{file} differs");
+    }
+}
+
+#[test]
+fn the_results_depend_neither_on_threads_nor_on_shards_nor_on_a_stop() {
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    let order = order(1);
+    assert_eq!(fly(&order, Shard::WHOLE, 1, &at("one")), FLIGHTS);
+    assert_eq!(fly(&order, Shard::WHOLE, 3, &at("three")), FLIGHTS);
+    assert_same(&at("one"), &at("three"));
+
+    let parts = [at("part-1"), at("part-2")];
+    let flown: u64 =
+        (1..=2).zip(&parts).map(|(index, part)| fly(&order, Shard { index, count: 2 }, 1, part)).sum();
+    assert_eq!(flown, FLIGHTS);
+    let (store, merged) = merge(&parts, &at("merged"), |_, _, _| Ok(order.clone())).unwrap();
+    results::publish(&merged, &store).unwrap();
+    assert_same(&at("one"), &at("merged"));
+
+    // Stopped after a chunk, gone on with.
+    fs::remove_file(at("three").join("chunks/000001.csv")).unwrap();
+    fs::remove_file(at("three").join("flights.csv")).unwrap();
+    assert_eq!(fly(&order, Shard::WHOLE, 2, &at("three")), CHUNK_FLIGHTS);
+    assert_same(&at("one"), &at("three"));
+    assert_eq!(fly(&order, Shard::WHOLE, 2, &at("three")), 0);
+
+    read_them(&at("one"));
+}
+
+/// What other programs read.
+fn read_them(out: &Path) {
+    let csv = fs::read(out.join("flights.csv")).unwrap();
+    let rows = table::from_csv(&csv).unwrap();
+    assert!(rows.iter().map(|row| row.number).eq(0..FLIGHTS));
+    assert!(rows.iter().all(|row| row.touchdown_vertical_m_s.is_some_and(f64::is_finite)));
+    assert_eq!(table::to_csv(&rows).unwrap(), csv);
+
+    let reader = SerializedFileReader::new(fs::File::open(out.join("flights.parquet")).unwrap()).unwrap();
+    let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
+    let column = |name: &str| columns.iter().position(|column| column.name() == name).unwrap();
+    let [number, impulse, vertical, legs, failure, onset] =
+        ["number", "impulse_scale", "touchdown_vertical_m_s", "legs", "failure", "onset_height_m"]
+            .map(column);
+    let mut count = 0;
+    for (record, row) in reader.get_row_iter(None).unwrap().zip(&rows) {
+        let record = record.unwrap();
+        assert_eq!(record.get_long(number).unwrap(), i64::try_from(row.number).unwrap());
+        assert_eq!(record.get_double(impulse).unwrap().to_bits(), row.impulse_scale.to_bits());
+        assert_eq!(record.get_double(vertical).ok(), row.touchdown_vertical_m_s);
+        assert_eq!(record.get_bool(legs).unwrap(), row.legs);
+        assert_eq!(record.get_string(failure).unwrap(), &row.failure);
+        assert_eq!(record.get_double(onset).ok(), row.onset_height_m);
+        count += 1;
+    }
+    assert_eq!(count, rows.len());
+
+    let summary: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["legs"]["of"], FLIGHTS);
+    for file in FILES.iter().filter(|file| file.ends_with(".svg")) {
+        let text = fs::read_to_string(out.join(file)).unwrap();
+        let picture = roxmltree::Document::parse(&text).unwrap();
+        assert_eq!(picture.root_element().tag_name().name(), "svg", "{file}");
+        assert!(picture.root_element().attribute("width").is_some(), "{file}");
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{file}");
+    }
+}
+
+#[test]
+fn a_directory_of_other_flights_or_in_use_is_refused_with_the_reason() {
+    let root = tempfile::tempdir().unwrap();
+    let order_1 = order(1);
+    let store = Store::open(root.path(), &order_1, &order_1.manifest("test", Shard::WHOLE)).unwrap();
+    let again = Store::open(root.path(), &order_1, &order_1.manifest("test", Shard::WHOLE)).unwrap_err();
+    assert!(matches!(again, StoreError::InUse { .. }), "{again}");
+    drop(store);
+
+    let refused = |order: &Order, build: &str, shard: Shard| {
+        Store::open(root.path(), order, &order.manifest(build, shard)).unwrap_err().to_string()
+    };
+    let message = refused(&order(2), "test", Shard::WHOLE);
+    assert!(message.contains("its seed is `1`, this run's is `2`"), "{message}");
+    let message = refused(&order_1, "other", Shard::WHOLE);
+    assert!(message.contains("its program is `test`, this run's is `other`"), "{message}");
+    let message = refused(&order_1, "test", Shard { index: 1, count: 2 });
+    assert!(message.contains("its shard is `1/1`, this run's is `1/2`"), "{message}");
+    let mut heavier = order_1.clone();
+    heavier.mission_toml.push('\n');
+    let message = refused(&heavier, "test", Shard::WHOLE);
+    assert!(message.contains("text of the mission"), "{message}");
+}
+
+#[test]
+fn parts_of_other_campaigns_and_gaps_are_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    let (order_1, order_2) = (order(1), order(2));
+    let half = Shard { index: 1, count: 2 };
+    for (name, order) in [("one", &order_1), ("other", &order_2)] {
+        let store = Store::open(&at(name), order, &order.manifest("test", half)).unwrap();
+        store.write(0, &[]).unwrap();
+    }
+    let same = |order: &Order| {
+        let order = order.clone();
+        move |_: &_, _: &str, _: &str| Ok(order)
+    };
+    let error = merge(&[at("one"), at("other")], &at("both"), same(&order_1)).unwrap_err();
+    assert!(error.to_string().contains("its seed is `2`, this run's is `1`"), "{error}");
+    let error = merge(&[at("one")], &at("half"), same(&order_1)).unwrap_err();
+    assert!(error.to_string().contains("flights 10 to 19"), "{error}");
+}

@@ -1,0 +1,187 @@
+//! `onboard-sim campaign`: a mission flown many times.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use campaign::baseline::Controller;
+use campaign::dispersion::{self, Dispersion};
+use campaign::fault::{Expected, Scenario, TimedFault};
+use campaign::order::{Manifest, Order, Shard};
+use campaign::store::{Store, merge};
+use campaign::summary::to_text;
+use campaign::{results, run, timing};
+use clap::{Args, Subcommand};
+use flight::mission::{self, Mission};
+use protocol::log::build::build_info;
+use sha2::Digest as _;
+
+use super::cost::Stopwatch;
+use super::single;
+
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct CampaignArguments {
+    #[command(subcommand)]
+    command: Option<CampaignCommand>,
+    /// Built-in mission or TOML file.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    profile: String,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh) or TOML file.
+    #[arg(long, default_value = "field", value_name = "NAME|FILE")]
+    dispersion: String,
+    /// How many flights; they are numbered from 0.
+    #[arg(long, default_value_t = 1000, value_name = "N")]
+    flights: u64,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Flights at the same time; the results do not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Fly only this part of the chunks of flights, counted from 1.
+    #[arg(long, default_value = "1/1", value_name = "I/N")]
+    shard: Shard,
+    /// Who flies the landing burn: nmpc, open-loop or oscillating.
+    #[arg(long, default_value = "nmpc", value_name = "NAME")]
+    controller: Controller,
+    /// Fall on open, equal fins that steer nothing.
+    #[arg(long)]
+    passive: bool,
+    /// Break something in every flight: NAME[:VALUE]@WHEN, as in gnss-out@5 or fin-stuck:2@apogee; may be repeated.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<TimedFault>,
+    /// Break what a scenario file says.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Directory of the results. One that holds part of the same campaign is gone on with.
+    #[arg(long, value_name = "DIR", required_unless_present = "only")]
+    out: Option<PathBuf>,
+    /// Fly only this flight, and print its row.
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["out", "shard", "jobs"])]
+    only: Option<u64>,
+    /// Log of that flight (MCAP). An existing file is not overwritten.
+    #[arg(long, value_name = "FILE", requires = "only")]
+    log: Option<PathBuf>,
+}
+
+#[derive(Subcommand)]
+enum CampaignCommand {
+    /// Gather the parts of a campaign that was flown in shards.
+    Merge {
+        /// Directories of the parts.
+        #[arg(required = true, value_name = "DIR")]
+        parts: Vec<PathBuf>,
+        /// Directory of the whole.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
+    if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
+        return gather(parts, out);
+    }
+    let (order, expected) = order(arguments)?;
+    if let Some(number) = arguments.only {
+        return single::fly(&order, number, expected, arguments.log.as_deref());
+    }
+    let out = arguments.out.as_deref().context("--out is missing")?;
+    let store = Store::open(out, &order, &order.manifest(&program()?, arguments.shard))?;
+    let jobs = arguments.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let stopwatch = Stopwatch::start();
+    let flown = run::run(&order, &store, jobs, &|progress| stopwatch.show(progress))?;
+    let cost = stopwatch.cost(&flown, jobs);
+    let summary = results::publish(&order, &store)?;
+    let mut stdout = std::io::stdout().lock();
+    write!(stdout, "{}", to_text(&summary))?;
+    if let Some(cost) = cost {
+        store.publish("cost.json", cost.to_json().as_bytes())?;
+        writeln!(stdout, "\n{cost}")?;
+    }
+    writeln!(stdout, "results {}", out.display())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
+    let (store, order) = merge(parts, out, |manifest, mission_toml, dispersion_toml| {
+        order_of(manifest, mission_toml, dispersion_toml).map_err(|error| format!("{error:#}"))
+    })?;
+    let summary = results::publish(&order, &store)?;
+    let mut stdout = std::io::stdout().lock();
+    write!(stdout, "{}", to_text(&summary))?;
+    writeln!(stdout, "results {}", out.display())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The order that a directory was made for, from what it keeps.
+fn order_of(manifest: &Manifest, mission_toml: &str, dispersion_toml: &str) -> anyhow::Result<Order> {
+    let mut mission = Mission::from_toml(mission_toml, "mission.toml")?;
+    mission.steered = manifest.steered;
+    let faults = manifest.faults.iter().map(|fault| fault.parse()).collect::<Result<_, _>>()?;
+    Ok(Order {
+        mission,
+        mission_toml: mission_toml.to_owned(),
+        dispersion: Dispersion::from_toml(dispersion_toml, "dispersion.toml")?,
+        dispersion_name: manifest.dispersion.clone(),
+        dispersion_toml: dispersion_toml.to_owned(),
+        seed: manifest.seed,
+        flights: manifest.flights,
+        controller: manifest.controller.parse()?,
+        faults,
+    })
+}
+
+fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
+    let mission_toml = text_of(&arguments.profile, mission::BUILTIN, "mission")?;
+    let mut mission = Mission::from_toml(&mission_toml, &arguments.profile)?;
+    mission.steered &= !arguments.passive;
+    if mission.ignition.fixed_height_m.is_none() {
+        mission.ignition.fixed_height_m = timing::fixed_height_m(arguments.controller, &mission)?;
+    }
+    let dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+    let mut faults = arguments.faults.clone();
+    let mut expected = None;
+    if let Some(path) = &arguments.scenario {
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let scenario = Scenario::from_toml(&text, &path.display().to_string())?;
+        faults.extend(scenario.faults);
+        expected = scenario.expected;
+    }
+    let order = Order {
+        mission,
+        mission_toml,
+        dispersion: Dispersion::from_toml(&dispersion_toml, &arguments.dispersion)?,
+        dispersion_name: arguments.dispersion.clone(),
+        dispersion_toml,
+        seed: arguments.seed,
+        flights: arguments.flights,
+        controller: arguments.controller,
+        faults,
+    };
+    Ok((order, expected))
+}
+
+/// The text of a built-in, or of a file.
+fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
+    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
+        return Ok((*text).to_owned());
+    }
+    fs::read_to_string(name).with_context(|| {
+        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
+    })
+}
+
+/// The build and a digest of the running program: results of different programs are not mixed.
+fn program() -> anyhow::Result<String> {
+    let path = std::env::current_exe().context("which program this is")?;
+    let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let digest = sha2::Sha256::digest(&bytes);
+    let short: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let build = build_info();
+    let commit = build.get("git_commit").map_or("unknown", String::as_str);
+    Ok(format!("{} {commit} {short}", env!("CARGO_PKG_VERSION")))
+}

@@ -1,0 +1,181 @@
+//! Parameters, files and versions, asked as other people's clients ask.
+
+use mavlink::types::CharArray;
+use protocol::dialect::{
+    FILE_TRANSFER_PROTOCOL_DATA, MavParamError, MavParamType, PARAM_REQUEST_LIST_DATA,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+};
+
+use super::*;
+use crate::parameters::COUNT;
+
+fn name(text: &str) -> CharArray<16> {
+    let mut bytes = [0; 16];
+    bytes[..text.len()].copy_from_slice(text.as_bytes());
+    CharArray::new(bytes)
+}
+
+fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
+    let value = |frame: &Frame| match frame.decode() {
+        Ok(MavMessage::PARAM_VALUE(value)) => Some(value),
+        _ => None,
+    };
+    frames.iter().filter_map(value).collect()
+}
+
+impl Bench {
+    fn tell(&mut self, message: &MavMessage) {
+        let frame = self.ground.encode(message);
+        self.endpoint.on_frame(&frame, &mut self.vehicle);
+    }
+
+    fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
+        self.tell(&MavMessage::PARAM_SET(PARAM_SET_DATA {
+            param_value: value,
+            target_system: 1,
+            target_component: 1,
+            param_id: name(id),
+            param_type,
+        }));
+        let sent = self.run(0.1);
+        (values(&sent), texts(&sent).join("; "))
+    }
+
+    fn set_real(&mut self, id: &str, value: f32) -> (f32, String) {
+        let (values, words) = self.set(id, value, MavParamType::MAV_PARAM_TYPE_REAL32);
+        assert_eq!(values.len(), 1, "one answer to one PARAM_SET");
+        (values[0].param_value, words)
+    }
+}
+
+#[test]
+fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
+    let mut bench = Bench::new();
+    bench.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+        target_system: 1,
+        target_component: 0,
+    }));
+    let sent = bench.run(10.0);
+    let places: Vec<u16> = values(&sent).iter().map(|value| value.param_index).collect();
+    assert_eq!(places, (0..COUNT).collect::<Vec<_>>());
+    assert!(values(&sent).iter().all(|value| value.param_count == COUNT));
+    assert!(count(&sent, ATTITUDE_QUATERNION_DATA::ID) >= 99);
+}
+
+#[test]
+fn one_is_read_by_name_or_place_and_what_is_not_there_is_said() {
+    let mut bench = Bench::new();
+    let read = |param_id, param_index| {
+        MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
+            param_index,
+            target_system: 1,
+            target_component: 1,
+            param_id,
+        })
+    };
+    bench.tell(&read(name("NMPC_W_THETA"), -1));
+    bench.tell(&read(name("ignored"), 0));
+    let found: Vec<f32> = values(&bench.run(0.5)).iter().map(|value| value.param_value).collect();
+    assert_eq!(found, [150.0, 1.0]);
+    bench.tell(&read(name("NO_SUCH"), -1));
+    bench.tell(&read(name(""), 999));
+    let errors = bench.run(0.5).into_iter().filter(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::PARAM_ERROR(error))
+            if error.error == MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST)
+    });
+    assert_eq!(errors.count(), 2);
+}
+
+#[test]
+fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.set_real("RATE_FINS", 4.0), (4.0, String::new()));
+    let found = count(&bench.run(3.0), TD_FINS_DATA::ID);
+    assert!((11..=13).contains(&found), "{found} in 3 s at 4 Hz");
+    for (id, asked, holds, why) in [
+        ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
+        ("RATE_FINS", -3.0, 4.0, "must be"),
+        ("RATE_FINS", f32::NAN, 4.0, "must be"),
+        ("RATE_HEARTBEAT", 0.0, 1.0, "the crew lives by it"),
+        ("NMPC_W_U", 51.0, 50.0, "from the profile"),
+    ] {
+        let (found, words) = bench.set_real(id, asked);
+        assert_eq!(found.to_bits(), f32::to_bits(holds), "{id} = {asked}");
+        assert!(words.contains(why), "{id} = {asked}: {words}");
+    }
+    let (values, words) = bench.set("RATE_FINS", 2.0, MavParamType::MAV_PARAM_TYPE_INT32);
+    assert_eq!(values[0].param_value.to_bits(), 4.0f32.to_bits());
+    assert!(words.contains("REAL32"), "{words}");
+    let (values, words) = bench.set("TOUCHDOWN_U", 9.0, MavParamType::MAV_PARAM_TYPE_REAL32);
+    assert!(values.is_empty() && words.contains("none of this name"), "{words}");
+    assert_eq!(bench.set_real("RATE_FINS", 0.0).0.to_bits(), 0.0f32.to_bits());
+    assert_eq!(count(&bench.run(2.0), TD_FINS_DATA::ID), 0, "switched off");
+}
+
+#[test]
+fn nothing_is_set_once_armed() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+    let (found, words) = bench.set_real("RATE_FINS", 1.0);
+    assert_eq!(found.to_bits(), 2.0f32.to_bits());
+    assert!(words.contains("disarmed on the pad"), "{words}");
+}
+
+#[test]
+fn questions_for_another_system_are_left_alone() {
+    let mut bench = Bench::new();
+    bench.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+        target_system: 2,
+        target_component: 1,
+    }));
+    bench.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+        target_system: 2,
+        target_component: 1,
+        ..FILE_TRANSFER_PROTOCOL_DATA::default()
+    }));
+    let sent = bench.run(2.0);
+    assert!(values(&sent).is_empty() && count(&sent, FILE_TRANSFER_PROTOCOL_DATA::ID) == 0);
+}
+
+#[test]
+fn a_file_request_is_declined_at_once() {
+    let mut bench = Bench::new();
+    let mut payload = [0; 251];
+    payload[3] = 4;
+    bench.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+        target_system: 1,
+        target_component: 1,
+        payload,
+        ..FILE_TRANSFER_PROTOCOL_DATA::default()
+    }));
+    let declined = bench.run(0.3).iter().any(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::FILE_TRANSFER_PROTOCOL(answer)) if answer.payload[3] == 129)
+    });
+    assert!(declined);
+}
+
+#[test]
+fn versions_capabilities_and_the_mode_are_told_to_those_who_ask() {
+    let mut bench = Bench::new();
+    for (command, param1, message_id) in [
+        (512, 300.0, 300),
+        (519, 1.0, 300),
+        (520, 1.0, 148),
+        (512, 148.0, 148),
+        (512, 436.0, 436),
+        (512, 375.0, 375),
+    ] {
+        let frame = {
+            let mut payload = [0; 33];
+            payload[..4].copy_from_slice(&f32::to_le_bytes(param1));
+            payload[28..30].copy_from_slice(&u16::to_le_bytes(command));
+            payload[30..32].copy_from_slice(&[1, 1]);
+            bench.ground.encode_payload(COMMAND_LONG_DATA::ID, &payload).unwrap()
+        };
+        bench.endpoint.on_frame(&frame, &mut bench.vehicle);
+        let sent = bench.run(0.5);
+        assert_eq!(count(&sent, message_id), 1, "command {command} with {param1}");
+        let results: Vec<u8> = sent.iter().filter_map(CommandAnswer::from_frame).map(|a| a.result).collect();
+        assert_eq!(results, [0]);
+    }
+}

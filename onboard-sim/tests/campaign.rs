@@ -1,0 +1,98 @@
+//! The campaign's command line, and that a logged flight can be flown again from its log alone.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Output};
+
+use flight::estimator::StartUncertainty;
+use flight::mission::Mission;
+use flight::pilot::Pilot;
+use prost::Message as _;
+use protocol::log::flight_v1::{PilotStart, PilotTick};
+use protocol::log::reader::{LogItem, LogReader};
+use protocol::log::record::{ATTACHMENT_PROFILE, TOPIC_PILOT_START, TOPIC_PILOT_TICK};
+use tick_log::pilot::{input_from_log, output_to_log, state_from_log};
+
+fn campaign(directory: &Path, arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_onboard-sim");
+    Command::new(program).current_dir(directory).arg("campaign").args(arguments).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// With sensors, a fault in the estimator's way and a restart in the middle.
+#[test]
+fn a_logged_flight_flies_again_bit_for_bit() {
+    let directory = tempfile::tempdir().unwrap();
+    let flown = campaign(
+        directory.path(),
+        &["--only", "3", "--log", "k.mcap", "--fault", "gnss-out@6", "--fault", "reboot:0.1@descent+2"],
+    );
+    assert!(matches!(flown.status.code(), Some(0 | 3)), "{}", stderr(&flown));
+
+    let mut reader = LogReader::new(File::open(directory.path().join("k.mcap")).unwrap());
+    let (mut toml, mut start, mut ticks) = (None, None, Vec::new());
+    while let Some(item) = reader.next_item().unwrap() {
+        match item {
+            LogItem::Attachment { name, data } if name == ATTACHMENT_PROFILE => {
+                toml = Some(String::from_utf8(data).unwrap());
+            }
+            LogItem::Message { channel_id, data, .. } => {
+                let topic = &reader.channel(channel_id).unwrap().topic;
+                if topic == TOPIC_PILOT_START {
+                    start = Some(PilotStart::decode(data.as_slice()).unwrap());
+                } else if topic == TOPIC_PILOT_TICK {
+                    ticks.push(PilotTick::decode(data.as_slice()).unwrap());
+                }
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(reader.damage(), None);
+    assert!(ticks.len() > 2000, "{} frames", ticks.len());
+
+    let (mission, start) = (Mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
+    let believed = state_from_log(&start.believed);
+    let mut pilot =
+        Pilot::at_apogee(&mission, start.time_s, &believed, &StartUncertainty::at_apogee()).unwrap();
+    let (mut expected_frame, mut restarts) = (1, 0);
+    for tick in &ticks {
+        let input = input_from_log(&tick.input).unwrap();
+        if input.frame > expected_frame {
+            // It was dead meanwhile, and came back at the end of the frame before this.
+            pilot = pilot.restarted((input.frame - 1) as f64 * 5.0 * 1e-3);
+            restarts += 1;
+        }
+        let output = output_to_log(&pilot.step(&input));
+        assert_eq!(output, tick.output, "frame {}", input.frame);
+        assert_eq!(pilot.digest(), tick.state_digest, "frame {}", input.frame);
+        expected_frame = input.frame + 1;
+    }
+    assert_eq!(restarts, 1);
+}
+
+#[test]
+fn what_is_asked_for_wrongly_is_refused_with_the_reason() {
+    let directory = tempfile::tempdir().unwrap();
+    for (arguments, words) in [
+        (&["--out", "x", "--dispersion", "windy"][..], "neither a built-in set of dispersions"),
+        (&["--out", "x", "--profile", "mk9"], "neither a built-in mission (mk2"),
+        (&["--out", "x", "--controller", "pid"], "nmpc, open-loop and oscillating"),
+        (&["--out", "x", "--shard", "3/2"], "I/N"),
+        (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
+        (&["--only", "1", "--out", "x"], "cannot be used with"),
+        (&[], "--out"),
+        (&["merge", "nowhere", "--out", "x"], "nowhere"),
+    ] {
+        let refused = campaign(directory.path(), arguments);
+        assert!(!refused.status.success() && stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+    let scenario = "name = \"dark\"\nfaults = [\"no-light@0\"]\nexpected = \"inhibit\"";
+    fs::write(directory.path().join("dark.toml"), scenario).unwrap();
+    let dark = campaign(directory.path(), &["--only", "0", "--scenario", "dark.toml"]);
+    assert!(String::from_utf8_lossy(&dark.stdout).contains("expected to inhibit: it did"), "{dark:?}");
+    assert_eq!(dark.status.code(), Some(0));
+}

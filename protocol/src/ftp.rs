@@ -1,0 +1,106 @@
+//! MAVLink FTP for a vehicle without files: every request is declined at once.
+//!
+//! A client that hears nothing waits and asks again; MAVProxy stalls for about 11 s before it reads parameters the
+//! plain way. Protocol: <https://mavlink.io/en/services/ftp.html>.
+
+use crate::dialect::{FILE_TRANSFER_PROTOCOL_DATA, MavMessage};
+use crate::frame::Frame;
+use crate::identity::Address;
+
+const FILE_TRANSFER_PROTOCOL_ID: u32 = 110;
+/// Opcodes and errors of the FTP service.
+const TERMINATE_SESSION: u8 = 1;
+const RESET_SESSIONS: u8 = 2;
+const ACK: u8 = 128;
+const NAK: u8 = 129;
+const ERROR_UNKNOWN_COMMAND: u8 = 7;
+const ERROR_FILE_NOT_FOUND: u8 = 10;
+/// Opcodes that name a file: open for reading, create, remove, open for writing.
+const OPENING: [u8; 5] = [3, 4, 6, 8, 11];
+
+/// A file request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FileRequest {
+    /// Who asks.
+    pub source: Address,
+    /// Who is asked; 0 means all.
+    pub target: Address,
+    sequence: u16,
+    session: u8,
+    opcode: u8,
+}
+
+impl FileRequest {
+    /// The request in a FILE_TRANSFER_PROTOCOL frame; `None` for any other message, and for answers, which
+    /// nobody may answer again.
+    pub fn from_frame(frame: &Frame) -> Option<Self> {
+        if frame.message_id() != FILE_TRANSFER_PROTOCOL_ID {
+            return None;
+        }
+        let bytes = frame.padded_payload();
+        let opcode = bytes[6];
+        (opcode < ACK).then_some(Self {
+            source: frame.source(),
+            target: Address { system_id: bytes[1], component_id: bytes[2] },
+            sequence: u16::from_le_bytes([bytes[3], bytes[4]]),
+            session: bytes[5],
+            opcode,
+        })
+    }
+
+    /// The answer of a vehicle without files: nothing is found, nothing was open, nothing else is known.
+    pub fn decline(&self) -> MavMessage {
+        let (opcode, error) = match self.opcode {
+            TERMINATE_SESSION | RESET_SESSIONS => (ACK, None),
+            opening if OPENING.contains(&opening) => (NAK, Some(ERROR_FILE_NOT_FOUND)),
+            _ => (NAK, Some(ERROR_UNKNOWN_COMMAND)),
+        };
+        let mut payload = [0; 251];
+        payload[..2].copy_from_slice(&self.sequence.wrapping_add(1).to_le_bytes());
+        payload[2] = self.session;
+        payload[3] = opcode;
+        payload[4] = u8::from(error.is_some());
+        payload[5] = self.opcode;
+        payload[12] = error.unwrap_or(0);
+        MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+            target_network: 0,
+            target_system: self.source.system_id,
+            target_component: self.source.component_id,
+            payload,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Encoder;
+    use crate::identity::{GROUND, VEHICLE};
+
+    fn asked(opcode: u8) -> Frame {
+        let mut payload = [0; 254];
+        payload[1..7].copy_from_slice(&[1, 1, 0xFF, 0xFF, 3, opcode]);
+        Encoder::new(GROUND).encode_payload(FILE_TRANSFER_PROTOCOL_ID, &payload).unwrap()
+    }
+
+    fn answer(opcode: u8) -> Option<[u8; 13]> {
+        let request = FileRequest::from_frame(&asked(opcode))?;
+        assert_eq!((request.source, request.target), (GROUND, VEHICLE));
+        let MavMessage::FILE_TRANSFER_PROTOCOL(data) = request.decline() else { panic!("an answer") };
+        assert_eq!((data.target_system, data.target_component), (255, 190));
+        data.payload[..13].try_into().ok()
+    }
+
+    #[test]
+    fn every_request_is_declined_with_the_next_number_and_its_own_opcode() {
+        // Open for reading: not found. Burst read: not known. Reset: nothing was open, so it is done.
+        assert_eq!(answer(4), Some([0, 0, 3, NAK, 1, 4, 0, 0, 0, 0, 0, 0, ERROR_FILE_NOT_FOUND]));
+        assert_eq!(answer(15), Some([0, 0, 3, NAK, 1, 15, 0, 0, 0, 0, 0, 0, ERROR_UNKNOWN_COMMAND]));
+        assert_eq!(answer(2), Some([0, 0, 3, ACK, 0, 2, 0, 0, 0, 0, 0, 0, 0]));
+    }
+
+    #[test]
+    fn answers_are_not_answered() {
+        assert_eq!((answer(ACK), answer(NAK)), (None, None));
+    }
+}

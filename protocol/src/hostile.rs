@@ -1,0 +1,142 @@
+//! Hostile input for every decoder of this crate: what the fuzz targets (`fuzz/`) and the bounded tests both run.
+//!
+//! Each function takes any bytes, makes the most of them, and panics only if a promise is broken. Checksums are put
+//! right, so that what is behind them is reached, too.
+
+use std::time::Duration;
+
+use crate::command::{CommandAnswer, CommandRequest, CommandSender};
+use crate::dialect::MavMessage;
+use crate::frame::{Encoder, Frame, Framer};
+use crate::ftp::FileRequest;
+use crate::hub::{Hub, News, Received};
+use crate::identity::{Address, GROUND};
+use crate::link::LinkStats;
+use crate::parameter::ParamRequest;
+use crate::signing::{Key, Memory, Signing};
+use crate::text::{Reassembler, printable};
+
+/// A frame of these bytes: message id (low byte, then high), source, payload. `None` for an id outside the dialect.
+pub fn frame_of(bytes: &[u8]) -> Option<Frame> {
+    let [low, high, system_id, component_id, payload @ ..] = bytes else { return None };
+    let source = Address { system_id: *system_id, component_id: *component_id };
+    let payload = &payload[..payload.len().min(255)];
+    let payload = if payload.is_empty() { &[0][..] } else { payload };
+    Encoder::new(source).encode_payload(u32::from(u16::from_le_bytes([*low, *high])), payload)
+}
+
+/// Bytes of a stream in pieces whose sizes the bytes choose themselves. Every byte is accounted for.
+///
+/// # Panics
+/// One is not, or the framer holds more than one frame.
+pub fn stream(data: &[u8]) {
+    let mut framer = Framer::new();
+    let mut framed = 0;
+    let mut rest = data;
+    while let Some(first) = rest.first() {
+        let piece = rest.len().min(1 + usize::from(*first));
+        framer.push(&rest[..piece]);
+        rest = &rest[piece..];
+        while let Some(frame) = framer.next_frame() {
+            framed += frame.as_bytes().len();
+            every_decoder(&frame);
+        }
+    }
+    framer.on_silence();
+    while let Some(frame) = framer.next_frame() {
+        framed += frame.as_bytes().len();
+    }
+    let garbage = usize::try_from(framer.counters().garbage_bytes).unwrap_or(usize::MAX);
+    assert_eq!(garbage + framed, data.len(), "every byte is garbage or framed");
+}
+
+/// Frames with right checksums through every decoder. A byte of length stands before each.
+///
+/// # Panics
+/// A frame does not survive its own bytes, or a text could move a terminal's cursor.
+pub fn frames(data: &[u8]) {
+    let mut texts = Reassembler::new();
+    let mut stats = LinkStats::new();
+    let mut sender = CommandSender::new();
+    let mut rest = data;
+    let mut now = Duration::ZERO;
+    while let [len, tail @ ..] = rest {
+        let (piece, after) = tail.split_at(tail.len().min(usize::from(*len)));
+        rest = after;
+        now += Duration::from_millis(u64::from(*len));
+        let Some(frame) = frame_of(piece) else { continue };
+        let mut framer = Framer::new();
+        framer.push_datagram(frame.as_bytes());
+        assert_eq!(framer.next_frame().as_ref(), Some(&frame), "a frame survives its bytes");
+        every_decoder(&frame);
+        stats.on_frame(&frame, now);
+        if let Some(answer) = CommandAnswer::from_frame(&frame) {
+            sender.on_answer(&answer, now);
+        }
+        if let Ok(MavMessage::STATUSTEXT(chunk)) = frame.decode() {
+            for text in texts.push(frame.source(), &chunk, now) {
+                assert!(!text.text.chars().any(char::is_control), "{:?}", text.text);
+            }
+        }
+    }
+    stats.figures(now);
+    stats.sources(now);
+    sender.poll(now);
+}
+
+/// Several links that bring anything; with a key, nothing of it is believed.
+///
+/// # Panics
+/// Something is.
+pub fn hub(data: &[u8]) {
+    let key = Signing::new(Key::new([7; Key::LEN]), Memory::default());
+    let mut hubs = [Hub::new(2, None), Hub::new(2, Some(key))];
+    let mut rest = data;
+    let mut now = Duration::ZERO;
+    while let [kind, len, tail @ ..] = rest {
+        let (piece, after) = tail.split_at(tail.len().min(usize::from(*len)));
+        rest = after;
+        now += Duration::from_millis(u64::from(*kind));
+        let link = usize::from(kind % 3);
+        let peer = u64::from(kind >> 6);
+        let received = match (kind >> 2) % 6 {
+            0 => Received::Datagram(piece.to_vec()),
+            1 => Received::Stream(peer, piece.to_vec()),
+            2 => Received::Silence(peer),
+            3 => Received::Gone(peer),
+            // Frames that are whole, so that more than framing is reached.
+            _ => match frame_of(piece) {
+                Some(frame) if kind & 1 == 0 => Received::Datagram(frame.as_bytes().to_vec()),
+                Some(frame) => Received::Datagram(forged(&frame)),
+                None => Received::Down(printable(piece)),
+            },
+        };
+        for (keyed, hub) in hubs.iter_mut().enumerate() {
+            for news in hub.take(link, received.clone(), now, 1_000) {
+                if let (1, News::Frame(frame) | News::Copy(frame)) = (keyed, news) {
+                    // A radio's report about itself is all that may come unsigned.
+                    assert_eq!(frame.message_id(), 109, "believed without a signature");
+                }
+            }
+        }
+    }
+}
+
+/// Signed with a key that is not the hub's.
+fn forged(frame: &Frame) -> Vec<u8> {
+    let mut forger = Signing::new(Key::new([8; Key::LEN]), Memory::default());
+    forger.sign(frame, 0, 2_000).as_bytes().to_vec()
+}
+
+fn every_decoder(frame: &Frame) {
+    // What they say is theirs; that they return is ours.
+    let _ = frame.decode();
+    let _ = frame.for_log();
+    let _ = frame.without_signature();
+    let _ = CommandRequest::from_frame(frame);
+    let _ = CommandAnswer::from_frame(frame);
+    let _ = ParamRequest::from_frame(frame);
+    if let Some(request) = FileRequest::from_frame(frame) {
+        Encoder::new(GROUND).encode(&request.decline());
+    }
+}

@@ -1,0 +1,102 @@
+//! Several links at once, on a simulated clock.
+
+use super::*;
+use crate::dialect::{HEARTBEAT_DATA, MavMessage};
+use crate::frame::Encoder;
+use crate::identity::VEHICLE;
+use crate::signing::{Key, Memory};
+
+const CLOCK: u64 = 37_000_000_000_000;
+
+fn beats(count: usize) -> Vec<Frame> {
+    let mut encoder = Encoder::new(VEHICLE);
+    (0..count).map(|_| encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()))).collect()
+}
+
+fn datagram(frame: &Frame) -> Received {
+    Received::Datagram(frame.as_bytes().to_vec())
+}
+
+fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+#[test]
+fn over_two_lossy_links_everything_is_heard_once() {
+    let mut hub = Hub::new(2, None);
+    let mut heard = Vec::new();
+    // Link 0 loses every third, link 1 every fifth and lags; 300 frames at 20 a second.
+    let frames = beats(300);
+    let mut arrivals: Vec<(u64, usize, &Frame)> = Vec::new();
+    for (place, frame) in frames.iter().enumerate() {
+        let sent_at = 50 * place as u64;
+        if place % 3 != 0 {
+            arrivals.push((sent_at, 0, frame));
+        }
+        if place % 5 != 0 {
+            arrivals.push((sent_at + 320, 1, frame));
+        }
+    }
+    arrivals.sort_by_key(|(at, link, _)| (*at, *link));
+    for (at, link, frame) in arrivals {
+        for news in hub.take(link, datagram(frame), ms(at), CLOCK) {
+            if let News::Frame(frame) = news {
+                heard.push(frame.sequence());
+            }
+        }
+    }
+    assert_eq!(heard.len(), 280, "only what both lost is missing");
+    let loss = |link: usize| hub.links()[link].stats().figures(ms(15_300)).loss;
+    assert!((loss(0) - 1.0 / 3.0).abs() < 0.02 && (loss(1) - 0.2).abs() < 0.02, "{} {}", loss(0), loss(1));
+    assert_eq!(hub.links()[0].copies() + hub.links()[1].copies(), 200 + 240 - 280);
+}
+
+#[test]
+fn streams_of_one_link_are_framed_apart() {
+    let frames = beats(2);
+    let mut hub = Hub::new(1, None);
+    let (head, tail) = frames[0].as_bytes().split_at(9);
+    assert!(hub.take(0, Received::Stream(1, head.to_vec()), ms(0), 0).is_empty());
+    let other = hub.take(0, Received::Stream(2, frames[1].as_bytes().to_vec()), ms(1), 0);
+    assert_eq!(other, [News::Frame(frames[1].clone())]);
+    let rest = hub.take(0, Received::Stream(1, tail.to_vec()), ms(2), 0);
+    assert_eq!(rest, [News::Frame(frames[0].clone())]);
+    hub.take(0, Received::Gone(1), ms(3), 0);
+    assert_eq!(hub.links()[0].framing().frames, 2, "an ended stream keeps its counts");
+    for peer in 0..100 {
+        hub.take(0, Received::Stream(peer, vec![0xFD]), ms(4), 0);
+    }
+    assert!(hub.links()[0].streams.len() <= MAX_STREAMS);
+}
+
+#[test]
+fn a_forged_frame_does_not_shadow_the_true_one() {
+    let side = || Some(Signing::new(Key::new([7; Key::LEN]), Memory::default()));
+    let (mut near, mut far) = (Hub::new(2, side()), Hub::new(2, side()));
+    let frame = &beats(1)[0];
+    // The forger knows number, message and checksum, but not the key.
+    let rejected = far.take(0, datagram(frame), ms(0), CLOCK);
+    assert_eq!(rejected, [News::Rejected(frame.clone(), Rejection::Unsigned)]);
+    let bytes: Vec<Vec<u8>> = (0..2).map(|link| near.bytes_for(link, frame, CLOCK)).collect();
+    let first = far.take(0, Received::Datagram(bytes[0].clone()), ms(1), CLOCK);
+    assert!(matches!(&first[..], [News::Frame(_)]));
+    let second = far.take(1, Received::Datagram(bytes[1].clone()), ms(2), CLOCK);
+    assert!(matches!(&second[..], [News::Copy(_)]), "signed anew for its own link, and yet the same frame");
+    assert_eq!(far.signing().map(|counters| (counters.accepted, counters.unsigned)), Some((2, 1)));
+}
+
+#[test]
+fn a_link_that_is_not_there_brings_nothing() {
+    let mut hub = Hub::new(1, None);
+    assert!(hub.take(1, datagram(&beats(1)[0]), ms(0), 0).is_empty());
+    hub.on_sent(1, 5, ms(0));
+}
+
+#[test]
+fn trouble_is_known_until_it_is_over() {
+    let mut hub = Hub::new(1, None);
+    hub.take(0, Received::Down("unplugged".to_owned()), ms(0), 0);
+    assert_eq!(hub.links()[0].trouble(), Some("unplugged"));
+    hub.take(0, Received::Up("/dev/x".to_owned()), ms(1), 0);
+    assert_eq!(hub.links()[0].trouble(), None);
+}

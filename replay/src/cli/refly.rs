@@ -1,0 +1,120 @@
+//! `replay refly`.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, anyhow};
+use clap::{Args, ValueEnum};
+use flight::phase::Phase;
+use replay::log::Recording;
+use replay::print::{print_json, print_refly};
+use replay::refly::{From, Law, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::settings::Setting;
+
+use super::settings::SettingArguments;
+use super::{Answer, answer, warn_of_damage};
+
+#[derive(Debug, Args)]
+pub(super) struct Ask {
+    /// The log, an MCAP file.
+    file: PathBuf,
+    #[command(flatten)]
+    how: FlownHow,
+    /// Begin at this tick instead of the landing's first.
+    #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase"])]
+    tick: Option<u64>,
+    /// Begin at this vehicle time, s.
+    #[arg(long, value_name = "SECONDS", conflicts_with = "phase")]
+    at: Option<f64>,
+    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED.
+    #[arg(long, value_name = "PHASE", value_parser = phase_named)]
+    phase: Option<Phase>,
+    /// Write the flight as a log of its own. An existing file is not overwritten.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How a flight is flown again, wherever it begins.
+#[derive(Debug, Args)]
+pub(super) struct FlownHow {
+    #[command(flatten)]
+    pub(super) settings: SettingArguments,
+    /// Another setting of the plant alone, which the controller does not know of: motor.thrust_n=31,
+    /// plant.thrust_scale=0.97. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE")]
+    plant: Vec<Setting>,
+    /// The recorded state to begin from.
+    #[arg(long, value_enum, default_value_t = Origin::Truth)]
+    from: Origin,
+    /// Which law flies.
+    #[arg(long, value_enum, default_value_t = Controller::AsRecorded)]
+    controller: Controller,
+    /// Seed of the plant's dispersions instead of the recorded one.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Origin {
+    /// The simulated plant's, where the log has it.
+    Truth,
+    /// What the controller believed.
+    Estimate,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Controller {
+    /// The landing controller, or the upright law if an abort under thrust was latched.
+    AsRecorded,
+    /// The upright law alone.
+    Stabiliser,
+}
+
+impl FlownHow {
+    pub(super) fn options(&self, start: StartAt) -> Result<ReflyOptions> {
+        Ok(ReflyOptions {
+            start,
+            from: match self.from {
+                Origin::Truth => From::Truth,
+                Origin::Estimate => From::Estimate,
+            },
+            settings: self.settings.all()?,
+            plant_settings: self.plant.clone(),
+            law: match self.controller {
+                Controller::AsRecorded => Law::AsRecorded,
+                Controller::Stabiliser => Law::Stabiliser,
+            },
+            seed: self.seed,
+        })
+    }
+}
+
+impl Ask {
+    pub(super) fn run(self) -> Result<Answer> {
+        let start = match (self.tick, self.at, self.phase) {
+            (Some(tick), ..) => StartAt::Tick(tick),
+            (_, Some(time_s), _) => StartAt::Time(time_s),
+            (.., Some(phase)) => StartAt::Phase(phase),
+            _ => StartAt::Landing,
+        };
+        let recording = Recording::open(&self.file)?;
+        let options = self.how.options(start)?;
+        let (report, flight) = refly_flight(&recording, &options)?;
+        if let Some(path) = &self.log {
+            write_log(path, &recording, &options, &report, &flight)?;
+        }
+        answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
+        warn_of_damage(&recording.name, recording.damage.as_deref());
+        Ok(Answer::Given)
+    }
+}
+
+fn phase_named(given: &str) -> Result<Phase> {
+    let known = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given));
+    known.ok_or_else(|| {
+        let names: Vec<&str> = Phase::ALL.iter().map(|phase| phase.name()).collect();
+        anyhow!("no phase `{given}`; there are {}", names.join(", "))
+    })
+}

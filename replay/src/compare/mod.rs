@@ -1,0 +1,120 @@
+//! Two flights, signal by signal.
+//!
+//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`controller_tick.output.…`). The
+//! second flight is shifted so that an event falls together with the first's, and read at the first's times: linearly
+//! between its samples, whole numbers held. Measured solve times are no signals.
+
+mod align;
+mod difference;
+mod series;
+mod tolerance;
+
+pub use align::{Align, Anchors};
+pub use difference::SignalDifference;
+pub use series::{Flown, Series};
+pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+
+use serde::Serialize;
+
+use crate::info::VerdictFacts;
+use crate::log::RecordingError;
+
+/// Why flights cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// A log cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Nothing to align on.
+    #[error("{name}: has no {event} to align on; --align time needs none")]
+    NoAnchor {
+        /// The log.
+        name: String,
+        /// What is missing.
+        event: &'static str,
+    },
+    /// The tolerances are wrong.
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
+}
+
+/// One flight against another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The flight compared with.
+    pub baseline: String,
+    /// The other flight.
+    pub other: String,
+    /// What falls together.
+    pub align: Align,
+    /// What was added to the other's times, s.
+    pub shift_s: f64,
+    /// The two verdicts.
+    pub verdicts: (Option<VerdictFacts>, Option<VerdictFacts>),
+    /// Signals of both, those that exceed their tolerance first, then by name.
+    pub signals: Vec<SignalDifference>,
+    /// Signals that only the baseline has.
+    pub missing: Vec<String>,
+    /// Signals that only the other has.
+    pub added: Vec<String>,
+    /// What is not as the tolerances demand, in words.
+    pub failures: Vec<String>,
+}
+
+impl Comparison {
+    /// Signals equal in every bit.
+    pub fn identical(&self) -> usize {
+        self.signals.iter().filter(|signal| signal.max == 0.0 && !signal.not_comparable).count()
+    }
+}
+
+/// Compares a flight with a baseline.
+///
+/// # Errors
+/// There is nothing to align on, or a tolerance names a signal that neither flight has.
+pub fn compare(
+    baseline: &Flown,
+    other: &Flown,
+    align: Align,
+    tolerances: &Tolerances,
+) -> Result<Comparison, CompareError> {
+    let shift_s = align.shift_s(baseline, other)?;
+    let names = |flown: &Flown| flown.signals.keys().cloned().collect::<Vec<String>>();
+    let (ours, theirs) = (names(baseline), names(other));
+    tolerances.check_names(&ours.iter().chain(&theirs))?;
+    let missing: Vec<String> =
+        ours.iter().filter(|name| !other.signals.contains_key(*name)).cloned().collect();
+    let added: Vec<String> =
+        theirs.iter().filter(|name| !baseline.signals.contains_key(*name)).cloned().collect();
+    let mut signals = Vec::new();
+    for (name, a) in &baseline.signals {
+        if let Some(b) = other.signals.get(name) {
+            signals.push(SignalDifference::of(name, a, b, shift_s, tolerances.of(name)));
+        }
+    }
+    let mut failures: Vec<String> = signals.iter().filter_map(SignalDifference::failure).collect();
+    signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
+    failures.extend(tolerances.count_failures(missing.len(), added.len()));
+    let verdicts = (baseline.verdict.clone(), other.verdict.clone());
+    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+    if tolerances.verdict_must_agree() && landed(&verdicts.0) != landed(&verdicts.1) {
+        let word = |landed: Option<bool>| match landed {
+            Some(true) => "landed",
+            Some(false) => "not landed",
+            None => "no verdict",
+        };
+        let (then, now) = (word(landed(&verdicts.0)), word(landed(&verdicts.1)));
+        failures.push(format!("the verdicts differ: {then} and {now}"));
+    }
+    Ok(Comparison {
+        baseline: baseline.name.clone(),
+        other: other.name.clone(),
+        align,
+        shift_s,
+        verdicts,
+        signals,
+        missing,
+        added,
+        failures,
+    })
+}

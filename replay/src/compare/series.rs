@@ -1,0 +1,156 @@
+//! A log's numbers as signals over vehicle time.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::Anchors;
+use crate::info::VerdictFacts;
+use crate::log::{Entry, FlightLog, LogError, RecordingError};
+use crate::table::{Cell, Kind, TableReader, TableShape};
+
+/// Numbers held of one log: some minutes of a flight are a few hundred thousand.
+const VALUES_MAX: usize = 20_000_000;
+
+/// Columns that are times or numbers of records, and those that were measured rather than decided.
+const NO_SIGNALS: [&str; 8] = [
+    "log_time_ns",
+    "time_s",
+    "input.time_s",
+    "input.tick",
+    "output.tick",
+    "solve_time_s",
+    "deadline_s",
+    "state_digest",
+];
+
+/// One signal.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Series {
+    /// Vehicle times, s, not falling.
+    pub times_s: Vec<f64>,
+    /// The value at each.
+    pub values: Vec<f64>,
+    /// Whole numbers, which are held between their samples.
+    pub whole: bool,
+}
+
+impl Series {
+    /// The value at a time, within half a microsecond of the series' ends; `None` outside.
+    pub fn at(&self, time_s: f64) -> Option<f64> {
+        const SAME_S: f64 = 5e-7;
+        let behind = self.times_s.partition_point(|t| *t <= time_s + SAME_S);
+        let before = behind.checked_sub(1)?;
+        let (t0, v0) = (*self.times_s.get(before)?, *self.values.get(before)?);
+        if self.whole || (time_s - t0).abs() <= SAME_S {
+            let ended = behind == self.times_s.len() && time_s > t0 + SAME_S;
+            return (!ended).then_some(v0);
+        }
+        let (t1, v1) = (*self.times_s.get(behind)?, *self.values.get(behind)?);
+        let share = (time_s - t0) / (t1 - t0);
+        Some(v0 + share * (v1 - v0))
+    }
+}
+
+/// A flight as signals.
+#[derive(Debug, Clone, Default)]
+pub struct Flown {
+    /// The log.
+    pub name: String,
+    /// The signals, by name.
+    pub signals: BTreeMap<String, Series>,
+    /// Events to align on.
+    pub anchors: Anchors,
+    /// The landing verdict.
+    pub verdict: Option<VerdictFacts>,
+    /// What ended the reading early.
+    pub damage: Option<String>,
+}
+
+impl Flown {
+    /// Reads a log file.
+    ///
+    /// # Errors
+    /// The file is not a flight log, cannot be read or is longer than any flight.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let mut anchors = Anchors::default();
+        let mut verdict = None;
+        let mut log = FlightLog::open(path)?;
+        while let Some(stamped) = log.next_entry()? {
+            match &stamped.entry {
+                Entry::Verdict(found) => verdict = Some(VerdictFacts::of(found)),
+                entry => anchors.note(entry),
+            }
+        }
+        let name = log.name().to_owned();
+        let damage = log.damage().map(ToString::to_string);
+        anchors.touchdown_s = verdict.as_ref().map(|verdict: &VerdictFacts| verdict.time_s);
+
+        let mut signals: BTreeMap<String, Series> = BTreeMap::new();
+        let mut held = 0_usize;
+        let mut first_ns = None;
+        let mut reader = TableReader::new();
+        reader
+            .read::<_, Stopped>(&mut FlightLog::open(path)?, |shape, row| {
+                let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
+                let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
+                let time_s = time_of(shape, &row.cells).unwrap_or(since_s);
+                for (column, cell) in shape.columns.iter().zip(&row.cells) {
+                    let Some(value) = cell.number().filter(|_| !NO_SIGNALS.contains(&column.name.as_str()))
+                    else {
+                        continue;
+                    };
+                    let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
+                    // Records that come late would make the times fall; what is out of order is left out.
+                    if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
+                        series.whole = column.kind == Kind::Integer;
+                        series.times_s.push(time_s);
+                        series.values.push(value);
+                        held += 1;
+                    }
+                }
+                if held > VALUES_MAX { Err(Stopped::TooLong) } else { Ok(()) }
+            })
+            .map_err(|stopped| match stopped {
+                Stopped::Log(error) => RecordingError::Log(error),
+                Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
+            })?;
+        // Rows of several kinds in one table, and texts, are no signals over time.
+        signals.retain(|name, _| !name.starts_with("verdict") && !name.starts_with("events."));
+        Ok(Self { name, signals, anchors, verdict, damage })
+    }
+}
+
+enum Stopped {
+    Log(LogError),
+    TooLong,
+}
+
+impl From<LogError> for Stopped {
+    fn from(error: LogError) -> Self {
+        Self::Log(error)
+    }
+}
+
+/// The record's own vehicle time, s.
+fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
+    let place =
+        shape.columns.iter().position(|column| column.name == "time_s" || column.name == "input.time_s")?;
+    cells.get(place)?.number().filter(|time_s| time_s.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_between_samples_and_whole_numbers_are_held() {
+        let mut series = Series { times_s: vec![0.0, 1.0, 2.0], values: vec![0.0, 10.0, 0.0], whole: false };
+        assert_eq!(series.at(0.5), Some(5.0));
+        assert_eq!(series.at(2.0), Some(0.0));
+        assert_eq!(series.at(2.1), None);
+        assert_eq!(series.at(-0.1), None);
+        series.whole = true;
+        assert_eq!(series.at(1.9), Some(10.0));
+        assert_eq!(series.at(2.1), None);
+    }
+}

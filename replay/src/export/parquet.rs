@@ -1,0 +1,126 @@
+//! A table as Apache Parquet, written column by column without Arrow.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::schema::types::Type;
+
+use super::ExportError;
+use crate::table::{Cell, Column, Kind, Row, TableShape};
+
+/// Rows that are held before they are written as a group.
+const GROUP_ROWS: usize = 16_384;
+
+pub(super) struct ParquetTable {
+    path: PathBuf,
+    columns: Vec<Column>,
+    writer: SerializedFileWriter<File>,
+    held: Vec<Vec<Cell>>,
+}
+
+impl ParquetTable {
+    pub(super) fn create(path: &Path, shape: &TableShape) -> Result<Self, ExportError> {
+        let file =
+            File::create(path).map_err(|source| ExportError::Write { path: path.to_owned(), source })?;
+        let failed = |source| ExportError::Parquet { path: path.to_owned(), source };
+        let schema = schema_of(shape).map_err(failed)?;
+        let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+        let writer =
+            SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), columns: shape.columns.clone(), writer, held: Vec::new() })
+    }
+
+    pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+        self.held.push(row.cells.clone());
+        if self.held.len() >= GROUP_ROWS { self.write_group() } else { Ok(()) }
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), ExportError> {
+        self.write_group()?;
+        let path = self.path.clone();
+        self.writer.close().map(|_| ()).map_err(|source| ExportError::Parquet { path, source })
+    }
+
+    fn write_group(&mut self) -> Result<(), ExportError> {
+        let rows = std::mem::take(&mut self.held);
+        if rows.is_empty() {
+            return Ok(());
+        }
+        group(&mut self.writer, &self.columns, &rows)
+            .map_err(|source| ExportError::Parquet { path: self.path.clone(), source })
+    }
+}
+
+fn group(
+    writer: &mut SerializedFileWriter<File>,
+    columns: &[Column],
+    rows: &[Vec<Cell>],
+) -> Result<(), ParquetError> {
+    let mut group = writer.next_row_group()?;
+    for (place, column) in columns.iter().enumerate() {
+        let cells = || rows.iter().map(move |cells| cells.get(place).unwrap_or(&Cell::Absent));
+        let Some(mut writer) = group.next_column()? else {
+            return Err(ParquetError::General(format!("no column for {}", column.name)));
+        };
+        write_column(&mut writer, column.kind, cells)?;
+        writer.close()?;
+    }
+    group.close().map(|_| ())
+}
+
+/// Definition levels say which cells are there: 1 present, 0 absent.
+fn write_column<'a, I: Iterator<Item = &'a Cell>>(
+    writer: &mut SerializedColumnWriter<'_>,
+    kind: Kind,
+    cells: impl Fn() -> I,
+) -> Result<(), ParquetError> {
+    match kind {
+        Kind::Float => {
+            let values: Vec<f64> = cells().filter_map(Cell::number).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(cell.number().is_some())).collect();
+            writer.typed::<DoubleType>().write_batch(&values, Some(&levels), None)?;
+        }
+        Kind::Integer => {
+            let whole = |cell: &Cell| match cell {
+                Cell::Integer(number) => Some(*number),
+                _ => None,
+            };
+            let values: Vec<i64> = cells().filter_map(whole).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(whole(cell).is_some())).collect();
+            writer.typed::<Int64Type>().write_batch(&values, Some(&levels), None)?;
+        }
+        Kind::Text => {
+            let text = |cell: &Cell| match cell {
+                Cell::Text(text) => Some(ByteArray::from(text.as_str())),
+                _ => None,
+            };
+            let values: Vec<ByteArray> = cells().filter_map(text).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(text(cell).is_some())).collect();
+            writer.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
+        }
+    }
+    Ok(())
+}
+
+fn schema_of(shape: &TableShape) -> Result<Type, ParquetError> {
+    let field = |column: &Column| {
+        let (physical, logical) = match column.kind {
+            Kind::Float => (Physical::DOUBLE, None),
+            Kind::Integer => (Physical::INT64, None),
+            Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        };
+        Type::primitive_type_builder(&column.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()
+            .map(Arc::new)
+    };
+    let fields = shape.columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
+    Type::group_type_builder(&shape.name).with_fields(fields).build()
+}

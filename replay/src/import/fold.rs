@@ -1,0 +1,168 @@
+//! What a ground station knows after each frame.
+
+use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA};
+use protocol::frame::Frame;
+use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::v1;
+use protocol::text::Reassembler;
+use std::time::Duration;
+
+/// Telemetry is written at most this often, s.
+const PERIOD_S: f64 = 0.1;
+
+/// A verdict's value whose limit no message has told.
+const NOT_TOLD: f64 = f64::NAN;
+
+#[derive(Default)]
+pub(super) struct Fold {
+    known: v1::Telemetry,
+    changed: bool,
+    written_at_s: Option<f64>,
+    limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
+    judged: bool,
+    texts: Reassembler,
+}
+
+impl Fold {
+    /// Takes a frame of the vehicle `time_s` after the first; returns what is worth a record.
+    pub(super) fn take(&mut self, frame: &Frame, time_s: f64) -> Vec<Record> {
+        let Ok(message) = frame.decode() else {
+            return Vec::new();
+        };
+        let mut records = Vec::new();
+        match &message {
+            MavMessage::STATUSTEXT(chunk) => {
+                let now = Duration::from_secs_f64(time_s.max(0.0));
+                records.extend(self.texts.push(frame.source(), chunk, now).into_iter().map(|text| {
+                    let level = match text.severity {
+                        0..=2 => EventLevel::Fatal,
+                        3 => EventLevel::Error,
+                        4 => EventLevel::Warning,
+                        _ => EventLevel::Info,
+                    };
+                    Record::Event(Event { level, name: "vehicle".to_owned(), message: text.text })
+                }));
+            }
+            MavMessage::TD_TOUCHDOWN_LIMITS(limits) => self.limits = Some(limits.clone()),
+            MavMessage::TD_LANDING_VERDICT(verdict) if !self.judged => {
+                self.judged = true;
+                let record = verdict_record(verdict, self.limits.as_ref());
+                records.push(Record::LandingVerdict(Box::new(record)));
+            }
+            message => self.changed |= self.note(message),
+        }
+        let due = self.written_at_s.is_none_or(|at_s| time_s - at_s >= PERIOD_S);
+        if self.changed && due {
+            self.changed = false;
+            self.written_at_s = Some(time_s);
+            self.known.time_s = time_s;
+            records.push(Record::Telemetry(Box::new(self.known.clone())));
+        }
+        records
+    }
+
+    /// Whether the message told anything.
+    fn note(&mut self, message: &MavMessage) -> bool {
+        let known = &mut self.known;
+        let centidegrees = |angle: &i16| (f64::from(*angle) / 100.0).to_radians();
+        match message {
+            MavMessage::TD_FLIGHT_STATUS(data) => {
+                known.phase = Some(data.phase as u32);
+                known.interlocks = Some(u32::from(data.interlocks.bits()));
+                known.countdown_ms = (data.countdown_ms != i32::MAX).then_some(data.countdown_ms);
+            }
+            MavMessage::LOCAL_POSITION_NED(data) => {
+                known.x_m = Some(f64::from(data.x));
+                known.altitude_m = Some(-f64::from(data.z));
+                if let Some(pitch_rad) = known.pitch_rad {
+                    let (sin, cos) = libm::sincos(pitch_rad);
+                    let (forward, up) = (f64::from(data.vx), -f64::from(data.vz));
+                    known.u_m_s = Some(forward * cos + up * sin);
+                    known.w_m_s = Some(forward * sin - up * cos);
+                }
+            }
+            MavMessage::ATTITUDE_QUATERNION(data) => {
+                // A rotation about the east axis; twice its half-angle is the pitch.
+                known.pitch_rad = Some(2.0 * libm::atan2(f64::from(data.q3), f64::from(data.q1)));
+                known.q_rad_s = Some(f64::from(data.pitchspeed));
+            }
+            MavMessage::TD_FINS(data) => {
+                known.fin_commanded_rad = data.commanded.iter().map(centidegrees).collect();
+                known.fin_measured_rad = data.measured.iter().map(centidegrees).collect();
+            }
+            MavMessage::TD_GIMBAL(data) => {
+                known.gimbal_commanded_rad = Some(centidegrees(&data.pitch_commanded));
+                known.gimbal_measured_rad = Some(centidegrees(&data.pitch_measured));
+            }
+            MavMessage::TD_CONTROLLER(data) => {
+                known.control_level = Some(data.level as u32);
+                known.solver_status = Some(data.solver_status as u32);
+                known.iterations = Some(u32::from(data.iterations));
+                known.solve_time_s = Some(f64::from(data.solve_time_us) / 1e6);
+            }
+            _ => return false,
+        }
+        true
+    }
+}
+
+fn verdict_record(
+    verdict: &TD_LANDING_VERDICT_DATA,
+    limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>,
+) -> v1::LandingVerdict {
+    let broken = verdict.limits_violated.bits();
+    let told =
+        |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| limits.map_or(NOT_TOLD, |all| f64::from(limit(all)));
+    let degrees = |angle_rad: f64| angle_rad.to_degrees();
+    let upright_rad = f64::from(verdict.pitch_rad) - core::f64::consts::FRAC_PI_2;
+    // In the order of the verdict's bits.
+    let rows: [(&str, &str, f64, f64, f64); 6] = [
+        ("x", "m", f64::from(verdict.x_m), -told(|l| l.x_m), told(|l| l.x_m)),
+        (
+            "altitude",
+            "m",
+            f64::from(verdict.altitude_m),
+            told(|l| l.altitude_min_m),
+            told(|l| l.altitude_max_m),
+        ),
+        (
+            "pitch error",
+            "deg",
+            degrees(upright_rad),
+            -degrees(told(|l| l.pitch_error_rad)),
+            degrees(told(|l| l.pitch_error_rad)),
+        ),
+        ("u", "m/s", f64::from(verdict.u_m_s), -told(|l| l.u_m_s), told(|l| l.u_m_s)),
+        ("w", "m/s", f64::from(verdict.w_m_s), -told(|l| l.w_m_s), told(|l| l.w_m_s)),
+        (
+            "pitch rate",
+            "deg/s",
+            degrees(f64::from(verdict.q_rad_s)),
+            -degrees(told(|l| l.q_rad_s)),
+            degrees(told(|l| l.q_rad_s)),
+        ),
+    ];
+    let limit = |(place, (name, unit, value, minimum, maximum)): (usize, (&str, &str, f64, f64, f64))| {
+        v1::LimitResult {
+            name: name.to_owned(),
+            value,
+            minimum,
+            maximum,
+            unit: unit.to_owned(),
+            passed: broken & (1 << place) == 0,
+        }
+    };
+    v1::LandingVerdict {
+        time_s: f64::from(verdict.time_boot_ms) / 1e3,
+        state: v1::PlanarState {
+            x_m: f64::from(verdict.x_m),
+            z_m: f64::from(verdict.altitude_m),
+            theta_rad: f64::from(verdict.pitch_rad),
+            u_m_s: f64::from(verdict.u_m_s),
+            w_m_s: f64::from(verdict.w_m_s),
+            q_rad_s: f64::from(verdict.q_rad_s),
+        },
+        limits: rows.into_iter().enumerate().map(limit).collect(),
+        landed: verdict.landed != 0,
+    }
+}

@@ -1,0 +1,183 @@
+//! A whole flight in memory, for questions that need more than one pass over it.
+//!
+//! Plans and raw frames are left out, so a flight of minutes takes some megabytes; a log that is longer than any
+//! flight is refused rather than held.
+
+use std::path::Path;
+
+use flight::profile::Profile;
+use foxglove::messages::Log as EventRecord;
+use protocol::log::v1;
+
+use super::{Entry, FlightLog, Head, LogError};
+
+/// Most records of one kind that are held: five hours of ticks at 10 Hz.
+const RECORDS_MAX: usize = 200_000;
+
+/// Why a log cannot be flown from.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// Not a flight log, or not readable.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// Longer than any flight.
+    #[error(
+        "{name}: has more than {RECORDS_MAX} {kind}, more than this question holds in memory; no flight is that long"
+    )]
+    TooLong {
+        /// The file.
+        name: String,
+        /// What there are too many of.
+        kind: &'static str,
+    },
+    /// Nothing to re-execute.
+    #[error(
+        "{name}: has no controller ticks from tick 0 on: {}",
+        unreadable.as_deref().unwrap_or("this question needs the log of the vehicle or of the demonstration")
+    )]
+    NoTicks {
+        /// The file.
+        name: String,
+        /// Why some record could not be read, if that is the reason.
+        unreadable: Option<String>,
+    },
+    /// Nothing to build the controller from.
+    #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
+    NoProfile {
+        /// The file.
+        name: String,
+    },
+    /// The profile is not one of this build.
+    #[error("{name}: its profile cannot be used by this build: {reason}")]
+    ProfileUnusable {
+        /// The file.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// A flight, read from its log.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    /// The file.
+    pub name: String,
+    /// What the log says about itself.
+    pub head: Head,
+    /// Every tick, by number, without its plan.
+    pub ticks: Vec<v1::ControllerTick>,
+    /// How many of them follow each other from tick 0 without a gap or a repetition.
+    pub ticks_unbroken: usize,
+    /// The simulated plant, in file order.
+    pub truth: Vec<v1::PlantTruth>,
+    /// What a ground station knew, in file order.
+    pub telemetry: Vec<v1::Telemetry>,
+    /// What happened, with the log's time, s after its first record.
+    pub events: Vec<(f64, EventRecord)>,
+    /// The last landing verdict.
+    pub verdict: Option<v1::LandingVerdict>,
+    /// What ended the reading early.
+    pub damage: Option<String>,
+    /// Why the first record that this build cannot read could not be read.
+    pub unreadable: Option<String>,
+}
+
+impl Recording {
+    /// Reads a log file.
+    ///
+    /// # Errors
+    /// The file is not a flight log, cannot be read, or is longer than any flight. Damage is not an error.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        Self::read(&mut FlightLog::open(path)?)
+    }
+
+    /// Reads a log to its end.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
+        let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
+        let mut first_ns = None;
+        while let Some(stamped) = log.next_entry()? {
+            let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
+            match stamped.entry {
+                Entry::Tick(mut tick) => {
+                    tick.output.plan.states = Vec::new();
+                    tick.output.plan.gimbal_rad = Vec::new();
+                    recording.ticks.push(*tick);
+                }
+                Entry::Truth(truth) => recording.truth.push(*truth),
+                Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
+                Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
+                Entry::Verdict(verdict) => recording.verdict = Some(*verdict),
+                Entry::Unreadable { reason } => {
+                    recording.unreadable.get_or_insert(reason);
+                }
+                Entry::RawFrame | Entry::Operator | Entry::Other => {}
+            }
+            recording.check_length()?;
+        }
+        recording.head = log.head().clone();
+        recording.damage = log.damage().map(ToString::to_string);
+        recording.ticks.sort_by_key(|tick| tick.input.tick);
+        recording.ticks_unbroken =
+            (0..).zip(&recording.ticks).take_while(|(number, tick)| tick.input.tick == *number).count();
+        Ok(recording)
+    }
+
+    fn check_length(&self) -> Result<(), RecordingError> {
+        // The plant is recorded several times a tick.
+        let kinds = [
+            ("controller ticks", self.ticks.len()),
+            ("records of the plant", self.truth.len() / 10),
+            ("records of telemetry", self.telemetry.len()),
+            ("events", self.events.len()),
+        ];
+        match kinds.into_iter().find(|(_, count)| *count > RECORDS_MAX) {
+            Some((kind, _)) => Err(RecordingError::TooLong { name: self.name.clone(), kind }),
+            None => Ok(()),
+        }
+    }
+
+    /// The ticks that can be re-executed.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn replayable_ticks(&self) -> Result<&[v1::ControllerTick], RecordingError> {
+        match self.ticks.get(..self.ticks_unbroken) {
+            Some(ticks) if !ticks.is_empty() => Ok(ticks),
+            _ => {
+                Err(RecordingError::NoTicks { name: self.name.clone(), unreadable: self.unreadable.clone() })
+            }
+        }
+    }
+
+    /// The text of the profile that was flown.
+    ///
+    /// # Errors
+    /// There is none, or it is no text.
+    pub fn profile_toml(&self) -> Result<&str, RecordingError> {
+        match &self.head.profile_toml {
+            None => Err(RecordingError::NoProfile { name: self.name.clone() }),
+            Some(Ok(text)) => Ok(text),
+            Some(Err(error)) => {
+                Err(RecordingError::ProfileUnusable { name: self.name.clone(), reason: error.to_string() })
+            }
+        }
+    }
+
+    /// The profile that was flown.
+    ///
+    /// # Errors
+    /// There is none, or it is not one of this build.
+    pub fn profile(&self) -> Result<Profile, RecordingError> {
+        Profile::from_toml(self.profile_toml()?, "profile.toml").map_err(|error| {
+            RecordingError::ProfileUnusable { name: self.name.clone(), reason: error.to_string() }
+        })
+    }
+
+    /// The seed of the flight's dispersions, if the log says it.
+    pub fn seed(&self) -> Option<u64> {
+        self.head.run.get("seed")?.parse().ok()
+    }
+}

@@ -1,0 +1,169 @@
+//! Flights compared: Markdown for people, cases for build servers.
+
+use std::io::{self, Write};
+
+use super::{JunitCase, JunitOutcome, counted, shown};
+use crate::compare::{Align, Comparison};
+use crate::info::VerdictFacts;
+
+/// Signals listed of those that differ within their tolerance or without one.
+const SIGNALS_SHOWN: usize = 60;
+/// Names listed of added and missing signals.
+const NAMES_SHOWN: usize = 20;
+
+/// Writes comparisons as Markdown.
+///
+/// # Errors
+/// The output failed.
+pub fn print_compare(comparisons: &[Comparison], output: &mut impl Write) -> io::Result<()> {
+    for comparison in comparisons {
+        print_one(comparison, output)?;
+    }
+    Ok(())
+}
+
+fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
+    let (a, b) = (cell(&comparison.baseline), cell(&comparison.other));
+    writeln!(output, "# {b} against {a}\n")?;
+    let aligned = match comparison.align {
+        Align::Ignition => "ignition",
+        Align::Touchdown => "touchdown",
+        Align::Time => "vehicle time",
+    };
+    writeln!(output, "Aligned on {aligned}: {:+.6} s added to the second's times.\n", comparison.shift_s)?;
+    print_verdicts(comparison, output)?;
+    let identical = comparison.identical();
+    writeln!(
+        output,
+        "{} of both flights, {identical} of them identical; {} missing, {} added.\n",
+        counted(comparison.signals.len() as u64, "signal"),
+        comparison.missing.len(),
+        comparison.added.len()
+    )?;
+    print_signals(comparison, output)?;
+    for (what, names) in [("Missing", &comparison.missing), ("Added", &comparison.added)] {
+        if !names.is_empty() {
+            let listed: Vec<String> = names.iter().take(NAMES_SHOWN).map(|name| cell(name)).collect();
+            let more = names.len().saturating_sub(NAMES_SHOWN);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            writeln!(output, "{what}: {}{more}.\n", listed.join(", "))?;
+        }
+    }
+    if comparison.failures.is_empty() {
+        return writeln!(output, "**Within tolerance.**\n");
+    }
+    writeln!(output, "**NOT within tolerance:**\n")?;
+    for failure in &comparison.failures {
+        writeln!(output, "- {}", shown(failure))?;
+    }
+    writeln!(output)
+}
+
+fn print_verdicts(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
+    let (a, b) = (comparison.verdicts.0.as_ref(), comparison.verdicts.1.as_ref());
+    let words = |verdict: Option<&VerdictFacts>| match verdict {
+        None => "none".to_owned(),
+        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
+        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
+    };
+    writeln!(output, "| | first | second | limit |\n|---|---|---|---|")?;
+    writeln!(output, "| verdict | {} | {} | |", words(a), words(b))?;
+    for limit in a.or(b).map(|verdict| verdict.limits.as_slice()).unwrap_or_default() {
+        let value = |verdict: Option<&VerdictFacts>| {
+            let found =
+                verdict.and_then(|verdict| verdict.limits.iter().find(|other| other.name == limit.name));
+            found.map_or_else(
+                || "-".to_owned(),
+                |found| {
+                    format!(
+                        "{:.4} {}{}",
+                        found.value,
+                        cell(&found.unit),
+                        if found.passed { "" } else { " **outside**" }
+                    )
+                },
+            )
+        };
+        let name = cell(&limit.name);
+        writeln!(
+            output,
+            "| {name} | {} | {} | {:.4} to {:.4} |",
+            value(a),
+            value(b),
+            limit.minimum,
+            limit.maximum
+        )?;
+    }
+    writeln!(output)
+}
+
+fn print_signals(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
+    let differing: Vec<_> = comparison
+        .signals
+        .iter()
+        .filter(|signal| signal.max > 0.0 || signal.not_comparable || !signal.passed)
+        .collect();
+    if differing.is_empty() {
+        return Ok(());
+    }
+    writeln!(output, "| signal | samples | rms | max | at s | tolerance |\n|---|---:|---:|---:|---:|---|")?;
+    let failed = differing.iter().filter(|signal| !signal.passed).count();
+    for signal in differing.iter().take(SIGNALS_SHOWN.max(failed)) {
+        let tolerance = match (signal.tolerance, signal.passed) {
+            (None, _) => String::new(),
+            (Some(_), true) => "within".to_owned(),
+            (Some(_), false) => "**EXCEEDED**".to_owned(),
+        };
+        let at = signal.max_at_s.map(|at_s| format!("{at_s:.3}")).unwrap_or_default();
+        writeln!(
+            output,
+            "| {} | {} | {:.4e} | {:.4e} | {at} | {tolerance} |",
+            cell(&signal.signal),
+            signal.samples,
+            signal.rms,
+            signal.max
+        )?;
+    }
+    if differing.len() > SIGNALS_SHOWN.max(failed) {
+        writeln!(output, "\nand {} more that differ", differing.len() - SIGNALS_SHOWN.max(failed))?;
+    }
+    writeln!(output)
+}
+
+/// Text that does not end a cell of a table.
+fn cell(text: &str) -> String {
+    shown(text).replace('|', "\\|")
+}
+
+/// Comparisons as cases for a build server: one for the verdict and the counts, one a signal with a tolerance.
+pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
+    let mut cases = Vec::new();
+    for comparison in comparisons {
+        let flights = format!("{} against {}", shown(&comparison.other), shown(&comparison.baseline));
+        let mut of_signals = Vec::new();
+        for signal in comparison.signals.iter().filter(|signal| signal.tolerance.is_some()) {
+            let message = comparison
+                .failures
+                .iter()
+                .find(|failure| failure.starts_with(&format!("{}: ", signal.signal)))
+                .cloned()
+                .unwrap_or_default();
+            of_signals.push(message.clone());
+            let outcome = if signal.passed {
+                JunitOutcome::Passed
+            } else {
+                JunitOutcome::Failed { details: message.clone(), message }
+            };
+            cases.push(JunitCase { name: format!("{flights}: {}", signal.signal), outcome });
+        }
+        let others: Vec<String> =
+            comparison.failures.iter().filter(|failure| !of_signals.contains(failure)).cloned().collect();
+        let outcome = if others.is_empty() {
+            JunitOutcome::Passed
+        } else {
+            JunitOutcome::Failed { message: others.join("; "), details: others.join("\n") }
+        };
+        cases.push(JunitCase { name: format!("{flights}: verdict and signals"), outcome });
+    }
+    cases
+}

@@ -1,0 +1,61 @@
+//! Answers as JUnit XML, for the servers that collect test results.
+
+use std::io::{self, Write};
+
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+
+/// One question and how it was answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JunitCase {
+    /// What was asked.
+    pub name: String,
+    /// How it was answered.
+    pub outcome: JunitOutcome,
+}
+
+/// How a question was answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum JunitOutcome {
+    /// Yes.
+    Passed,
+    /// No, and why in a line and in full.
+    Failed {
+        /// One line.
+        message: String,
+        /// All that is known.
+        details: String,
+    },
+    /// There is no answer.
+    Error {
+        /// Why.
+        message: String,
+    },
+}
+
+/// Writes cases as JUnit XML: one suite.
+///
+/// # Errors
+/// The output failed.
+pub fn print_junit(suite: &str, cases: Vec<JunitCase>, output: &mut impl Write) -> io::Result<()> {
+    let mut report = Report::new("replay");
+    let mut test_suite = TestSuite::new(suite);
+    for case in cases {
+        let status = match case.outcome {
+            JunitOutcome::Passed => TestCaseStatus::success(),
+            JunitOutcome::Failed { message, details } => {
+                let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+                status.set_message(message).set_description(details);
+                status
+            }
+            JunitOutcome::Error { message } => {
+                let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+                status.set_message(message);
+                status
+            }
+        };
+        test_suite.add_test_case(TestCase::new(case.name, status));
+    }
+    report.add_test_suite(test_suite);
+    let text = report.to_string().map_err(io::Error::other)?;
+    output.write_all(text.as_bytes())
+}

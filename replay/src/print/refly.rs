@@ -1,0 +1,96 @@
+//! A flight flown again, for people.
+
+use std::io::{self, Write};
+
+use super::{counted, shown};
+use crate::info::VerdictFacts;
+use crate::refly::{Law, ReflyReport};
+
+/// Writes what came of flying a flight again.
+///
+/// # Errors
+/// The output failed.
+pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
+    let start = &report.start;
+    writeln!(
+        output,
+        "from tick {} ({:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
+        start.tick,
+        start.time_s,
+        start.phase,
+        match start.from {
+            crate::refly::From::Truth => "truth",
+            crate::refly::From::Estimate => "estimate",
+        },
+        start.x_m,
+        start.z_m,
+        report.thrust_scale
+    )?;
+    for (what, settings) in [("with", &report.settings), ("plant alone with", &report.plant_settings)] {
+        if !settings.is_empty() {
+            writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
+        }
+    }
+    if report.law == Law::Stabiliser {
+        writeln!(output, "with the upright law instead of the landing controller")?;
+    }
+    print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
+    let answer = match report.verdict_changed {
+        Some(true) => "the verdict CHANGES",
+        Some(false) => "the verdict does not change",
+        None => "the log has no verdict to compare with",
+    };
+    let margin = report.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
+    writeln!(output, "{answer}; margin to the nearest limit {margin}")?;
+    writeln!(
+        output,
+        "{}, {} with the recorded gimbal command bit for bit; largest difference {:.3e} rad",
+        counted(report.ticks as u64, "tick"),
+        report.commands_identical,
+        report.gimbal_difference_max_rad
+    )
+}
+
+/// Two verdicts, limit by limit.
+pub(super) fn print_verdicts(
+    recorded: Option<&VerdictFacts>,
+    now: Option<&VerdictFacts>,
+    output: &mut impl Write,
+) -> io::Result<()> {
+    let words = |verdict: Option<&VerdictFacts>| match verdict {
+        None => "no verdict".to_owned(),
+        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
+        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
+    };
+    writeln!(output, "{:<12} {:>22} {:>22}", "", "recorded", "flown again")?;
+    writeln!(output, "{:<12} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
+    let limits = now.or(recorded).map(|verdict| verdict.limits.as_slice()).unwrap_or_default();
+    for limit in limits {
+        let value = |verdict: Option<&VerdictFacts>| {
+            let found =
+                verdict.and_then(|verdict| verdict.limits.iter().find(|other| other.name == limit.name));
+            found.map_or_else(
+                || "-".to_owned(),
+                |found| {
+                    format!(
+                        "{:.4} {}{}",
+                        found.value,
+                        shown(&found.unit),
+                        if found.passed { "" } else { " OUTSIDE" }
+                    )
+                },
+            )
+        };
+        writeln!(
+            output,
+            "{:<12} {:>22} {:>22}   limit {:.4} to {:.4}",
+            shown(&limit.name),
+            value(recorded),
+            value(now),
+            limit.minimum,
+            limit.maximum
+        )?;
+    }
+    Ok(())
+}

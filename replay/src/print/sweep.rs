@@ -1,0 +1,113 @@
+//! Sweeps and bisections, for people and as a table.
+
+use std::io::{self, Write};
+
+use super::{counted, shown};
+use crate::sweep::{BisectReport, FlightOutcome, Flip, PointOutcome, SweepReport};
+
+/// Writes the best points of a sweep as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) -> io::Result<()> {
+    let flights = report.flights.len();
+    writeln!(
+        output,
+        "{}: {} on {}, ranked by the worst flight's margin",
+        report.kind,
+        counted(report.points.len() as u64, "point"),
+        counted(flights as u64, "flight")
+    )?;
+    writeln!(output, "{:>4} {:>9} {:>9}  settings; worst flight", "rank", "margin", "landed")?;
+    for (rank, point) in report.points.iter().enumerate().take(top) {
+        let PointOutcome { settings, landed, worst_flight, .. } = point;
+        writeln!(
+            output,
+            "{:>4} {:>9} {:>9}  {}; {}",
+            rank + 1,
+            margin(point.worst_margin),
+            format!("{landed}/{flights}"),
+            shown(&settings.join(" ")),
+            shown(worst_flight)
+        )?;
+    }
+    if report.points.len() > top {
+        writeln!(output, "and {} more; --top shows more, --csv all", report.points.len() - top)?;
+    }
+    Ok(())
+}
+
+/// Writes every point of a sweep on every flight as CSV, the best point first.
+///
+/// # Errors
+/// The output failed.
+pub fn print_sweep_csv(report: &SweepReport, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "rank,point,settings,flight,landed,margin,worst_margin")?;
+    for (rank, point) in report.points.iter().enumerate() {
+        for (name, flight) in report.flights.iter().zip(&point.flights) {
+            let number = |margin: Option<f64>| margin.map(|margin| format!("{margin:?}")).unwrap_or_default();
+            writeln!(
+                output,
+                "{},{},{},{},{},{},{}",
+                rank + 1,
+                point.point,
+                quoted(&point.settings.join(" ")),
+                quoted(name),
+                flight.landed,
+                number(flight.margin),
+                number(point.worst_margin)
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes a bisection as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Result<()> {
+    let who = if report.plant_alone { " (of the plant alone)" } else { "" };
+    writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
+    writeln!(
+        output,
+        "{}{who} = {}: {}, margin {}",
+        shown(&report.path),
+        report.value,
+        word(report.outcome),
+        margin(report.outcome.margin)
+    )?;
+    for (side, flip, step) in
+        [("below", &report.below, report.steps.0), ("above", &report.above, report.steps.1)]
+    {
+        match flip {
+            None => writeln!(output, "{side}: no change of the verdict in steps of {step:.4e}")?,
+            Some(Flip { same_at, other_at, change, outcome }) => writeln!(
+                output,
+                "{side}: {} from {other_at:.9} on ({change:+.6e}), still {} at {same_at:.9}",
+                word(*outcome),
+                word(report.outcome)
+            )?,
+        }
+    }
+    match report.smallest() {
+        None => writeln!(output, "no change within the range turns the verdict; {} flown", report.flown),
+        Some(flip) => writeln!(
+            output,
+            "the smallest change that turns the verdict: {:+.6e}, to {:.9}; {} flown",
+            flip.change, flip.other_at, report.flown
+        ),
+    }
+}
+
+fn word(outcome: FlightOutcome) -> &'static str {
+    if outcome.landed { "LANDED" } else { "NOT LANDED" }
+}
+
+fn margin(margin: Option<f64>) -> String {
+    margin.map_or_else(|| "not down".to_owned(), |margin| format!("{margin:.4}"))
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}

@@ -1,0 +1,169 @@
+//! What was kept, as a whole log.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use mcap::records::{MessageHeader, Metadata, Record};
+
+use super::{RecoverError, Recovery};
+
+/// Name of the metadata record that says that a log was recovered.
+const METADATA_RECOVERY: &str = "recovery";
+/// Small chunks, as in the recorder's own logs.
+const CHUNK_BYTES: u64 = 64 * 1024;
+
+type Writer = mcap::Writer<BufWriter<File>>;
+
+pub(super) struct Rescue {
+    path: PathBuf,
+    /// Made once the library's name is known, which stands at a file's very beginning.
+    state: State,
+    /// The file's schemas and channels by their numbers there.
+    schemas: BTreeMap<u16, u16>,
+    channels: BTreeMap<u16, u16>,
+    span_ns: Option<(u64, u64)>,
+    messages: u64,
+    chunks: u64,
+    records_about: u64,
+}
+
+enum State {
+    Waiting(File),
+    Writing(Box<Writer>),
+    Gone,
+}
+
+impl Rescue {
+    pub(super) fn create(path: &Path) -> Result<Self, RecoverError> {
+        let file = File::options()
+            .write(true)
+            .create_new(true)
+            .open(path)
+            .map_err(|source| RecoverError::Create { path: path.to_owned(), source })?;
+        Ok(Self {
+            path: path.to_owned(),
+            state: State::Waiting(file),
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            span_ns: None,
+            messages: 0,
+            chunks: 0,
+            records_about: 0,
+        })
+    }
+
+    pub(super) fn first_ns(&self) -> Option<u64> {
+        self.span_ns.map(|(first, _)| first)
+    }
+
+    pub(super) fn keep(&mut self, records: Vec<Record<'static>>, chunk: bool) -> Result<(), RecoverError> {
+        self.chunks += u64::from(chunk);
+        for record in records {
+            self.keep_record(record).map_err(|source| self.failed(source))?;
+        }
+        Ok(())
+    }
+
+    fn keep_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
+        match record {
+            Record::Header(header) => {
+                self.writer(&header.library)?;
+            }
+            Record::Schema { header, data } => {
+                let id = self.writer("")?.add_schema(&header.name, &header.encoding, &data)?;
+                self.schemas.insert(header.id, id);
+            }
+            Record::Channel(channel) => {
+                // Schema 0 is none.
+                let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or(0);
+                let id = self.writer("")?.add_channel(
+                    schema,
+                    &channel.topic,
+                    &channel.message_encoding,
+                    &channel.metadata,
+                )?;
+                self.channels.insert(channel.id, id);
+            }
+            Record::Message { header, data } => self.message(header, &data)?,
+            Record::Metadata(metadata) => {
+                self.records_about += 1;
+                self.writer("")?.write_metadata(&metadata)?;
+            }
+            Record::Attachment { header, data, .. } => {
+                self.records_about += 1;
+                self.writer("")?.attach(&mcap::Attachment {
+                    log_time: header.log_time,
+                    create_time: header.create_time,
+                    name: header.name,
+                    media_type: header.media_type,
+                    data,
+                })?;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn message(&mut self, header: MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
+        // Without its channel a message means nothing.
+        let Some(channel_id) = self.channels.get(&header.channel_id).copied() else {
+            return Ok(());
+        };
+        self.writer("")?.write_to_known_channel(&MessageHeader { channel_id, ..header }, data)?;
+        self.messages += 1;
+        let (first, last) = self.span_ns.unwrap_or((header.log_time, header.log_time));
+        self.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
+        Ok(())
+    }
+
+    /// The writer, made with this library's name if there is none yet.
+    fn writer(&mut self, library: &str) -> mcap::McapResult<&mut Writer> {
+        self.state = match std::mem::replace(&mut self.state, State::Gone) {
+            State::Waiting(file) => State::Writing(Box::new(
+                mcap::WriteOptions::new()
+                    .compression(Some(mcap::Compression::Lz4))
+                    .chunk_size(Some(CHUNK_BYTES))
+                    .library(library)
+                    .create(BufWriter::new(file))?,
+            )),
+            other => other,
+        };
+        match &mut self.state {
+            State::Writing(writer) => Ok(writer),
+            // Only a failed creation leaves nothing, and its error ended the recovery.
+            State::Waiting(_) | State::Gone => Err(mcap::McapError::UnexpectedEof),
+        }
+    }
+
+    pub(super) fn finish(mut self, recovery: &mut Recovery) -> Result<(), RecoverError> {
+        recovery.messages = self.messages;
+        recovery.chunks = self.chunks;
+        recovery.records_about = self.records_about;
+        recovery.kept_s = self.span_ns.map(|(first, last)| last.saturating_sub(first) as f64 / 1e9);
+        self.close(recovery).map_err(|source| self.failed(source))
+    }
+
+    fn close(&mut self, recovery: &Recovery) -> mcap::McapResult<()> {
+        let lost = recovery.lost.iter().map(|lost| {
+            format!("bytes {} to {}: {}", lost.from_byte, lost.from_byte + lost.bytes, lost.reason)
+        });
+        let facts = BTreeMap::from([
+            ("from".to_owned(), recovery.input.clone()),
+            ("ended".to_owned(), recovery.ended.to_string()),
+            ("lost".to_owned(), lost.collect::<Vec<_>>().join("; ")),
+        ]);
+        let writer = self.writer("")?;
+        writer.write_metadata(&Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts })?;
+        writer.finish()?;
+        if let State::Writing(writer) = std::mem::replace(&mut self.state, State::Gone) {
+            writer.into_inner().flush()?;
+        }
+        Ok(())
+    }
+
+    fn failed(&self, source: mcap::McapError) -> RecoverError {
+        RecoverError::Write { path: self.path.clone(), source }
+    }
+}

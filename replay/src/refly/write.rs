@@ -1,0 +1,96 @@
+//! A flight flown again, as a log of its own.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+
+use super::{RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
+use crate::log::Recording;
+use crate::settings::{Setting, profile_toml_with};
+
+/// Why a log could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReflyLogError {
+    /// The file exists or cannot be made.
+    #[error("cannot create the log {}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Writing failed.
+    #[error("cannot write the log {}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the writer said.
+        source: LogWriteError,
+    },
+}
+
+/// Writes a flight flown again as a log that every question about logs can be asked of. An existing file is not
+/// overwritten.
+///
+/// # Errors
+/// The file exists, or cannot be made or written.
+pub fn write_log(
+    path: &Path,
+    recording: &Recording,
+    options: &ReflyOptions,
+    report: &ReflyReport,
+    flight: &ReflownFlight,
+) -> Result<(), ReflyLogError> {
+    let create = |source| ReflyLogError::Create { path: path.to_owned(), source };
+    let write = |source| ReflyLogError::Write { path: path.to_owned(), source };
+    let file = File::options().write(true).create_new(true).open(path).map_err(create)?;
+    let mut writer =
+        LogWriter::new(BufWriter::new(file), &header(recording, options, report)).map_err(write)?;
+    for (time_s, record) in records(report, flight) {
+        writer.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(write)?;
+    }
+    let mut output = writer.finish().map_err(write)?;
+    output.flush().map_err(|error| write(mcap::McapError::from(error).into()))
+}
+
+fn header(recording: &Recording, options: &ReflyOptions, report: &ReflyReport) -> LogHeader {
+    let mut run: BTreeMap<String, String> = recording.head.run.clone();
+    run.insert("reflown_from".to_owned(), report.file.clone());
+    run.insert("reflown_at_tick".to_owned(), report.start.tick.to_string());
+    run.insert("reflown_with".to_owned(), report.settings.join(" "));
+    let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
+    let plant = before.split_whitespace().chain(report.plant_settings.iter().map(String::as_str));
+    run.insert(RUN_PLANT_SETTINGS.to_owned(), plant.collect::<Vec<_>>().join(" "));
+    run.retain(|_, fact| !fact.is_empty());
+    if let Some(seed) = options.seed {
+        run.insert("seed".to_owned(), seed.to_string());
+    }
+    let lasting: Vec<Setting> =
+        options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
+    let profile = recording.profile_toml().ok().and_then(|toml| profile_toml_with(toml, &lasting).ok());
+    let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
+    LogHeader { writer: "replay".to_owned(), start_unix_ns: start.unwrap_or(0), run, profile_toml: profile }
+}
+
+/// Every record with its vehicle time, s, in order.
+fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
+    let ticks = flight.before.iter().chain(flight.ticks.iter().map(|tick| &tick.record));
+    let mut records: Vec<(f64, Record)> =
+        ticks.map(|tick| (tick.input.time_s, Record::from(tick.clone()))).collect();
+    records
+        .extend(flight.truth.iter().map(|truth| (truth.time_s, Record::PlantTruth(Box::new(truth.clone())))));
+    let began = Event {
+        level: EventLevel::Info,
+        name: "replay".to_owned(),
+        message: format!("flown again in simulation from tick {}", report.start.tick),
+    };
+    records.push((report.start.time_s, Record::Event(began)));
+    let end_s = flight.truth.last().map_or(0.0, |truth| truth.time_s);
+    records.extend(flight.verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict)))));
+    records.sort_by(|a, b| a.0.total_cmp(&b.0));
+    records
+}

@@ -1,0 +1,292 @@
+//! A line chart as SVG.
+
+use super::page::{escaped, put};
+
+const WIDTH: f64 = 520.0;
+const HEIGHT: f64 = 260.0;
+const LEFT: f64 = 56.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 52.0;
+const BOTTOM: f64 = 36.0;
+/// Points drawn of one line; more than there are pixels nobody sees.
+const POINTS_MAX: usize = 1200;
+
+/// A line of a chart.
+pub(super) struct Line {
+    /// Its name in the legend; empty for none.
+    pub(super) name: &'static str,
+    /// `a` to `d`, or `thin`.
+    pub(super) class: &'static str,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// A chart.
+#[derive(Default)]
+pub(super) struct Chart {
+    pub(super) title: String,
+    pub(super) x_label: &'static str,
+    pub(super) y_label: &'static str,
+    pub(super) lines: Vec<Line>,
+    /// Horizontal limits.
+    pub(super) limits: Vec<f64>,
+    /// Vertical marks and their words.
+    pub(super) marks: Vec<(f64, &'static str)>,
+    /// Both axes in the same scale.
+    pub(super) equal_scales: bool,
+    /// Over the whole width of the page.
+    pub(super) full: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Axis {
+    from: f64,
+    to: f64,
+    /// Pixels at both ends.
+    at: (f64, f64),
+}
+
+impl Axis {
+    fn place(&self, value: f64) -> f64 {
+        self.at.0 + (value - self.from) / (self.to - self.from) * (self.at.1 - self.at.0)
+    }
+
+    /// Round numbers in the axis, five or so, and their decimals.
+    fn ticks(&self) -> (Vec<f64>, usize) {
+        let step = round_step((self.to - self.from) / 5.0);
+        let first = (self.from / step).ceil();
+        let count = ((self.to - first * step) / step).floor().clamp(0.0, 20.0) as usize;
+        let decimals = (-libm::log10(step) + 1e-9).ceil().clamp(0.0, 9.0) as usize;
+        ((0..=count).map(|k| (first + k as f64) * step).collect(), decimals)
+    }
+}
+
+/// 1, 2 or 5 times a power of ten.
+fn round_step(rough: f64) -> f64 {
+    if !(rough > 0.0 && rough.is_finite()) {
+        return 1.0;
+    }
+    let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
+    let mantissa = rough / power;
+    let nice = [1.0, 2.0, 5.0].into_iter().find(|nice| mantissa <= *nice).unwrap_or(10.0);
+    nice * power
+}
+
+impl Chart {
+    /// The chart, or nothing without a point to draw.
+    pub(super) fn svg(&self) -> String {
+        let finite = || {
+            let all = self.lines.iter().flat_map(|line| line.points.iter());
+            all.filter(|(x, y)| x.is_finite() && y.is_finite())
+        };
+        let Some((x_from, x_to)) = extent(finite().map(|point| point.0)) else {
+            return String::new();
+        };
+        let values = finite().map(|point| point.1).chain(self.limits.iter().copied());
+        let Some((y_from, y_to)) = extent(values) else {
+            return String::new();
+        };
+        let width = if self.full { 2.0 * WIDTH } else { WIDTH };
+        let height = if self.equal_scales { 2.0 * HEIGHT } else { HEIGHT };
+        let mut x = Axis { from: x_from, to: x_to, at: (LEFT, width - RIGHT) };
+        let mut y = padded(Axis { from: y_from, to: y_to, at: (height - BOTTOM, TOP) });
+        if self.equal_scales {
+            x = padded(x);
+            equalise(&mut x, &mut y);
+        }
+        let class = if self.full { " class=\"full\"" } else { "" };
+        let mut svg = format!(
+            "<figure{class}><svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
+             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
+            escaped(&self.title)
+        );
+        self.draw_axes(x, y, &mut svg);
+        self.draw_lines(x, y, &mut svg);
+        self.draw_legend(&mut svg);
+        svg.push_str("</svg></figure>\n");
+        svg
+    }
+
+    fn draw_axes(&self, x: Axis, y: Axis, svg: &mut String) {
+        let (left, right) = x.at;
+        let (bottom, top) = y.at;
+        let (ticks, decimals) = y.ticks();
+        for value in ticks {
+            let at = y.place(value);
+            put(
+                svg,
+                format_args!(
+                    "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/><text x=\"{:.1}\" y=\"{:.1}\" \
+                 text-anchor=\"end\">{}</text>\n",
+                    left - 5.0,
+                    at + 4.0,
+                    number(value, decimals)
+                ),
+            );
+        }
+        let (ticks, decimals) = x.ticks();
+        for value in ticks {
+            let at = x.place(value);
+            put(
+                svg,
+                format_args!(
+                    "<path class=\"grid\" d=\"M{at:.1} {top}V{bottom}\"/><text x=\"{at:.1}\" y=\"{:.1}\" \
+                 text-anchor=\"middle\">{}</text>\n",
+                    bottom + 14.0,
+                    number(value, decimals)
+                ),
+            );
+        }
+        for limit in &self.limits {
+            let at = y.place(*limit);
+            put(svg, format_args!("<path class=\"limit\" d=\"M{left} {at:.1}H{right}\"/>\n"));
+        }
+        for (value, word) in self.marks.iter().filter(|(value, _)| (x.from..=x.to).contains(value)) {
+            let at = x.place(*value);
+            let (anchor, shift) = if at > 0.8 * right { ("end", -3.0) } else { ("start", 3.0) };
+            put(
+                svg,
+                format_args!(
+                    "<path class=\"mark\" d=\"M{at:.1} {top}V{bottom}\"/><text x=\"{:.1}\" y=\"{:.1}\" \
+                 text-anchor=\"{anchor}\">{}</text>\n",
+                    at + shift,
+                    top - 5.0,
+                    escaped(word)
+                ),
+            );
+        }
+        put(
+            svg,
+            format_args!(
+                "<path class=\"frame\" d=\"M{left} {top}V{bottom}H{right}\"/>\
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\
+             <text x=\"{left}\" y=\"32\">{}</text>\n",
+                right,
+                bottom + 30.0,
+                escaped(self.x_label),
+                escaped(self.y_label)
+            ),
+        );
+    }
+
+    fn draw_lines(&self, x: Axis, y: Axis, svg: &mut String) {
+        for line in &self.lines {
+            let mut path = String::new();
+            let mut pen_down = false;
+            for (px, py) in thinned(&line.points) {
+                if !(px.is_finite() && py.is_finite()) {
+                    pen_down = false;
+                    continue;
+                }
+                let step = if pen_down { 'L' } else { 'M' };
+                put(&mut path, format_args!("{step}{:.1} {:.1}", x.place(px), y.place(py)));
+                pen_down = true;
+            }
+            let class = if line.class == "thin" { "thin".to_owned() } else { format!("l {}", line.class) };
+            put(svg, format_args!("<path class=\"{class}\" d=\"{path}\"/>\n"));
+        }
+    }
+
+    fn draw_legend(&self, svg: &mut String) {
+        let named: Vec<&Line> = self.lines.iter().filter(|line| !line.name.is_empty()).collect();
+        if named.len() < 2 {
+            return;
+        }
+        let mut at = if self.full { 2.0 * WIDTH } else { WIDTH } - RIGHT;
+        for line in named.into_iter().rev() {
+            let width = 6.2 * line.name.len() as f64;
+            at -= width;
+            put(svg, format_args!("<text x=\"{at:.1}\" y=\"32\">{}</text>", escaped(line.name)));
+            at -= 24.0;
+            let class = if line.class == "thin" { "thin".to_owned() } else { format!("l {}", line.class) };
+            put(svg, format_args!("<path class=\"{class}\" d=\"M{at:.1} 28h20\"/>\n"));
+            at -= 10.0;
+        }
+    }
+}
+
+/// At most [`POINTS_MAX`] points, with every stretch's highest and lowest among them.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    if points.len() <= POINTS_MAX {
+        return points.to_vec();
+    }
+    let mut kept = Vec::new();
+    for stretch in points.chunks(points.len().div_ceil(POINTS_MAX / 2)) {
+        let lowest = (0..stretch.len()).min_by(|a, b| stretch[*a].1.total_cmp(&stretch[*b].1));
+        let highest = (0..stretch.len()).max_by(|a, b| stretch[*a].1.total_cmp(&stretch[*b].1));
+        if let (Some(a), Some(b)) = (lowest, highest) {
+            kept.push(stretch[a.min(b)]);
+            kept.push(stretch[a.max(b)]);
+        }
+    }
+    kept
+}
+
+/// The lowest and the highest; a single value is widened.
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let bounds = values.fold(None, |bounds: Option<(f64, f64)>, value| {
+        Some(bounds.map_or((value, value), |(from, to)| (from.min(value), to.max(value))))
+    });
+    // Numbers so far apart that their difference is no number cannot be drawn.
+    let bounds = bounds.filter(|(from, to)| (to - from).is_finite());
+    bounds.map(|(from, to)| if to - from > 1e-12 { (from, to) } else { (from - 0.5, to + 0.5) })
+}
+
+fn padded(axis: Axis) -> Axis {
+    let room = 0.06 * (axis.to - axis.from);
+    Axis { from: axis.from - room, to: axis.to + room, ..axis }
+}
+
+/// Widens the axis that has more pixels a unit until both have the same.
+fn equalise(x: &mut Axis, y: &mut Axis) {
+    let scale = |axis: &Axis| (axis.at.1 - axis.at.0).abs() / (axis.to - axis.from);
+    let wanted = scale(x).min(scale(y));
+    for axis in [x, y] {
+        let middle = 0.5 * (axis.from + axis.to);
+        let half = 0.5 * (axis.at.1 - axis.at.0).abs() / wanted;
+        (axis.from, axis.to) = (middle - half, middle + half);
+    }
+}
+
+fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    // A rounded negative nought.
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+        format!("{:.decimals$}", 0.0)
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(from: f64, to: f64) -> Axis {
+        Axis { from, to, at: (0.0, 100.0) }
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        for (from, to) in [(0.0, 10.0), (-0.37, 0.41), (1e-6, 3e-6), (-250.0, 1e4)] {
+            let (ticks, _) = axis(from, to).ticks();
+            assert!((3..=11).contains(&ticks.len()), "{from} to {to}: {ticks:?}");
+            assert!(ticks.iter().all(|tick| (from - 1e-9..=to + 1e-9).contains(tick)));
+        }
+        assert_eq!(round_step(0.03).to_bits(), 0.05_f64.to_bits());
+        assert_eq!(number(-0.0, 1), "0.0");
+    }
+
+    #[test]
+    fn peaks_survive_the_thinning_and_gaps_stay_gaps() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        points[77_777].1 = 9.0;
+        let kept = thinned(&points);
+        assert!(kept.len() <= POINTS_MAX && kept.contains(&(77_777.0, 9.0)));
+        let points = vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 2.0)];
+        let chart = Chart { lines: vec![Line { name: "", class: "a", points }], ..Chart::default() };
+        let svg = chart.svg();
+        assert_eq!(svg.matches("class=\"l a\"").count(), 1);
+        assert!(!svg.contains("NaN"), "{svg}");
+        assert_eq!(Chart::default().svg(), "");
+    }
+}

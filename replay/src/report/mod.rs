@@ -1,0 +1,27 @@
+//! A flight as one page: HTML with its pictures inside, no script and nothing from the network.
+//!
+//! The verdict stands first, each value against its limit; then what led to it: phases, path, states, input, tracking,
+//! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. A log that lacks something
+//! has the section say so.
+
+mod chart;
+mod page;
+mod section;
+mod track;
+
+use std::path::Path;
+
+use crate::info::{Info, info};
+use crate::log::{Recording, RecordingError};
+use track::{Flight, plans_of};
+
+/// Builds the page of a log file.
+///
+/// # Errors
+/// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
+pub fn report(path: &Path) -> Result<String, RecordingError> {
+    let recording = Recording::open(path)?;
+    let info: Info = info(path)?;
+    let flight = Flight::new(recording, plans_of(path)?);
+    Ok(page::page(&flight, &info, &section::all(&flight, &info)))
+}

@@ -1,0 +1,63 @@
+//! The sections of a report, in the order they are read.
+
+mod completeness;
+mod estimator;
+mod link;
+mod motion;
+mod phases;
+mod prediction;
+mod saturation;
+mod solver;
+mod thrust;
+mod tracking;
+mod verdict;
+
+use super::track::Flight;
+use crate::info::Info;
+
+/// A section: its heading and its HTML.
+pub(super) struct Section {
+    pub(super) title: &'static str,
+    pub(super) html: String,
+}
+
+/// Every section.
+pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
+    let section = |title, html| Section { title, html };
+    vec![
+        section("", verdict::html(flight, info)),
+        section("Phases", phases::html(flight, info)),
+        section("Path, states and input", motion::html(flight)),
+        section("Tracking error by phase", tracking::html(flight)),
+        section("Gimbal and fin saturation", saturation::html(flight)),
+        section("Solver", solver::html(flight, info)),
+        section("Predicted against actual touchdown", prediction::html(flight)),
+        section("Thrust expected against inferred", thrust::html(flight)),
+        section("Estimator error", estimator::html(flight)),
+        section("Link", link::html(flight, info)),
+        section("Log", completeness::html(info)),
+    ]
+}
+
+/// Root mean square and largest magnitude of some numbers; `None` without any.
+fn rms_and_max(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (mut count, mut squares, mut largest) = (0_u32, 0.0, 0.0_f64);
+    for value in values.filter(|value| value.is_finite()) {
+        count += 1;
+        squares += value * value;
+        largest = largest.max(value.abs());
+    }
+    (count > 0).then(|| (libm::sqrt(squares / f64::from(count)), largest))
+}
+
+/// A column of the six state components: name, unit, and what their numbers are multiplied with to be in it.
+const COMPONENTS: [(&str, &str, f64); 6] = [
+    ("x", "m", 1.0),
+    ("altitude", "m", 1.0),
+    ("pitch", "deg", DEGREES),
+    ("u", "m/s", 1.0),
+    ("w", "m/s", 1.0),
+    ("pitch rate", "deg/s", DEGREES),
+];
+
+const DEGREES: f64 = 180.0 / core::f64::consts::PI;

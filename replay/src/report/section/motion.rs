@@ -1,0 +1,107 @@
+//! The landing as the paper draws it (its Figs. 6 to 9): path in the pitch plane, states, input.
+
+use super::{COMPONENTS, DEGREES};
+use crate::report::chart::{Chart, Line};
+use crate::report::page::{charts, paragraph};
+use crate::report::track::{Flight, Teller};
+
+pub(super) fn html(flight: &Flight) -> String {
+    let who = match flight.teller {
+        Teller::Plant => "From the simulated plant.",
+        Teller::Estimate => "From the controller's state estimate; the log has no plant.",
+        Teller::Telemetry => "From what a ground station heard; the log has neither plant nor ticks.",
+        Teller::Nobody => return paragraph("The log does not tell where the vehicle was."),
+    };
+    let mut pictures = vec![path(flight)];
+    pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));
+    pictures.push(input(flight));
+    paragraph(who) + &charts(&pictures)
+}
+
+fn path(flight: &Flight) -> String {
+    let shown = flight.track.iter().filter(|sample| flight.is_shown(sample.time_s));
+    let flown = shown.map(|sample| (sample.state[0], sample.state[1])).collect();
+    let mut lines: Vec<Line> = flight
+        .plans
+        .iter()
+        .filter(|plan| !plan.path.is_empty())
+        .enumerate()
+        .map(|(place, plan)| Line {
+            name: if place == 0 { "planned" } else { "" },
+            class: "thin",
+            points: plan.path.clone(),
+        })
+        .collect();
+    lines.push(Line { name: "flown", class: "a", points: flown });
+    Chart {
+        title: "Path in the pitch plane".to_owned(),
+        x_label: "x, m",
+        y_label: "altitude, m",
+        lines,
+        equal_scales: true,
+        full: true,
+        ..Chart::default()
+    }
+    .svg()
+}
+
+fn state(flight: &Flight, component: usize) -> String {
+    let Some((name, unit, factor)) = COMPONENTS.get(component).copied() else {
+        return String::new();
+    };
+    let shown = flight.track.iter().filter(|sample| flight.is_shown(sample.time_s));
+    let points: Vec<(f64, f64)> =
+        shown.map(|sample| (flight.axis_s(sample.time_s), factor * sample.state[component])).collect();
+    let estimate = flight.recording.ticks.iter().filter(|tick| flight.is_shown(tick.input.time_s));
+    let estimate: Vec<(f64, f64)> = estimate
+        .map(|tick| {
+            let state = crate::report::track::state_of(&tick.input.state);
+            (flight.axis_s(tick.input.time_s), factor * state[component])
+        })
+        .collect();
+    let mut lines = vec![Line { name: "flown", class: "a", points }];
+    if flight.teller == Teller::Plant {
+        lines.push(Line { name: "estimate", class: "b", points: estimate });
+    }
+    Chart {
+        title: format!("{name}, {unit}"),
+        x_label: flight.axis_name(),
+        lines,
+        marks: flight.marks(),
+        ..Chart::default()
+    }
+    .svg()
+}
+
+fn input(flight: &Flight) -> String {
+    let recording = &flight.recording;
+    let shown = |time_s: &f64| flight.is_shown(*time_s);
+    let mut lines = Vec::new();
+    let truth = recording.truth.iter().filter(|truth| shown(&truth.time_s));
+    let (mut commanded, mut actual): (Vec<_>, Vec<_>) = truth
+        .map(|truth| {
+            let at_s = flight.axis_s(truth.time_s);
+            ((at_s, DEGREES * truth.gimbal_commanded_rad), (at_s, DEGREES * truth.gimbal_actual_rad))
+        })
+        .unzip();
+    if commanded.is_empty() {
+        let heard = recording.telemetry.iter().filter(|told| shown(&told.time_s));
+        for told in heard {
+            let at_s = flight.axis_s(told.time_s);
+            commanded.extend(told.gimbal_commanded_rad.map(|rad| (at_s, DEGREES * rad)));
+            actual.extend(told.gimbal_measured_rad.map(|rad| (at_s, DEGREES * rad)));
+        }
+    }
+    lines.push(Line { name: "actual", class: "a", points: actual });
+    lines.push(Line { name: "commanded", class: "b", points: commanded });
+    let limit = flight.profile.as_ref().map(|profile| profile.gimbal.limit_deg);
+    Chart {
+        title: "Gimbal angle, deg".to_owned(),
+        x_label: flight.axis_name(),
+        lines,
+        limits: limit.into_iter().flat_map(|limit| [-limit, limit]).collect(),
+        marks: flight.marks(),
+        ..Chart::default()
+    }
+    .svg()
+}

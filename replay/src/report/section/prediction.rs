@@ -1,0 +1,55 @@
+//! Where each tick thought that the vehicle would touch down, against where it did.
+
+use flight::controller::ControlLevel;
+use flight::phase::Phase;
+use protocol::log::v1::ControllerTick;
+
+use super::COMPONENTS;
+use crate::report::chart::{Chart, Line};
+use crate::report::page::{charts, paragraph};
+use crate::report::track::{Flight, phase_of, state_of};
+
+pub(super) fn html(flight: &Flight) -> String {
+    let planned: Vec<&ControllerTick> = flight
+        .recording
+        .ticks
+        .iter()
+        .filter(|tick| phase_of(tick.input.phase).is_some_and(Phase::is_landing))
+        .filter(|tick| tick.output.level != u32::from(ControlLevel::Idle.index()))
+        .collect();
+    if planned.is_empty() {
+        return paragraph("The log has no predictions.");
+    }
+    let verdict = flight.recording.verdict.as_ref();
+    let chart = |title: String, values: Vec<(f64, f64)>, actual: Option<f64>| {
+        let mut lines = vec![Line { name: "predicted", class: "a", points: values.clone() }];
+        if let (Some(actual), Some(first), Some(last)) = (actual, values.first(), values.last()) {
+            lines.push(Line {
+                name: "actual",
+                class: "b",
+                points: vec![(first.0, actual), (last.0, actual)],
+            });
+        }
+        Chart { title, x_label: flight.axis_name(), lines, marks: flight.marks(), ..Chart::default() }.svg()
+    };
+    let over = |value: &dyn Fn(&ControllerTick) -> f64| -> Vec<(f64, f64)> {
+        planned.iter().map(|tick| (flight.axis_s(tick.input.time_s), value(tick))).collect()
+    };
+    let mut pictures = vec![chart(
+        format!("Touchdown, {}", flight.axis_name()),
+        over(&|tick| flight.axis_s(tick.input.time_s + tick.output.predicted_touchdown.time_from_now_s)),
+        flight.touchdown_s.map(|at_s| flight.axis_s(at_s)),
+    )];
+    for (component, (name, unit, factor)) in COMPONENTS.iter().enumerate() {
+        if *name == "altitude" {
+            continue;
+        }
+        pictures.push(chart(
+            format!("{name} at touchdown, {unit}"),
+            over(&|tick| factor * state_of(&tick.output.predicted_touchdown.state)[component]),
+            verdict.map(|verdict| factor * state_of(&verdict.state)[component]),
+        ));
+    }
+    paragraph("A plan ends with its horizon; a vehicle that comes down earlier ends its burn on the ground.")
+        + &charts(&pictures)
+}

@@ -1,0 +1,43 @@
+//! How long the ticks took and how their solves went.
+
+use crate::info::Info;
+use crate::report::chart::{Chart, Line};
+use crate::report::page::{charts, paragraph, table};
+use crate::report::track::Flight;
+
+pub(super) fn html(flight: &Flight, info: &Info) -> String {
+    let Some(ticks) = &info.ticks else {
+        return paragraph("The log has no controller ticks.");
+    };
+    let time = &ticks.solve_time;
+    let milliseconds = |s: f64| format!("{:.3} ms", 1e3 * s);
+    let mut rows = vec![
+        vec!["ticks".to_owned(), ticks.count.to_string()],
+        vec!["solve time, median".to_owned(), milliseconds(time.median_s)],
+        vec!["solve time, 99 of 100 within".to_owned(), milliseconds(time.p99_s)],
+        vec!["solve time, longest".to_owned(), milliseconds(time.max_s)],
+        vec!["deadline".to_owned(), milliseconds(time.deadline_s)],
+        vec!["ticks over their deadline".to_owned(), time.over_deadline.to_string()],
+        vec!["outputs dropped as too late".to_owned(), time.recorded_misses.to_string()],
+    ];
+    for named in &ticks.levels {
+        rows.push(vec![format!("decided by {}", named.name), named.ticks.to_string()]);
+    }
+    for named in &ticks.solver_statuses {
+        rows.push(vec![format!("solver: {}", named.name), named.ticks.to_string()]);
+    }
+    let recorded = &flight.recording.ticks;
+    let over = |value: &dyn Fn(&protocol::log::v1::ControllerTick) -> f64| -> Vec<(f64, f64)> {
+        recorded.iter().map(|tick| (flight.axis_s(tick.input.time_s), value(tick))).collect()
+    };
+    let chart = |title: &str, points| {
+        let lines = vec![Line { name: "", class: "a", points }];
+        let title = title.to_owned();
+        Chart { title, x_label: flight.axis_name(), lines, marks: flight.marks(), ..Chart::default() }.svg()
+    };
+    table(&["", "#"], &rows)
+        + &charts(&[
+            chart("Solve time of each tick, ms", over(&|tick| 1e3 * tick.solve_time_s)),
+            chart("Newton iterations of each tick", over(&|tick| f64::from(tick.output.solver.iterations))),
+        ])
+}

@@ -1,0 +1,72 @@
+//! How far the vehicle came from where the plan wanted it.
+
+use std::collections::BTreeMap;
+
+use super::{COMPONENTS, rms_and_max};
+use crate::report::chart::{Chart, Line};
+use crate::report::page::{charts, paragraph, table};
+use crate::report::track::{AHEAD_S, Flight};
+
+pub(super) fn html(flight: &Flight) -> String {
+    // By phase, in the order flown: phase index, then what came less what was planned, for each distance ahead.
+    let mut errors: BTreeMap<u8, [Vec<[f64; 6]>; 2]> = BTreeMap::new();
+    let mut names = BTreeMap::new();
+    let mut distance: [Vec<(f64, f64)>; 2] = Default::default();
+    for plan in &flight.plans {
+        for (k, (ahead_s, planned)) in AHEAD_S.iter().zip(plan.ahead).enumerate() {
+            let then_s = plan.time_s + ahead_s;
+            // Behind the contact the ground decides.
+            let in_air = flight.touchdown_s.is_none_or(|touchdown_s| then_s <= touchdown_s);
+            let (Some(planned), Some(came)) = (planned, flight.state_at(then_s).filter(|_| in_air)) else {
+                continue;
+            };
+            let phase = flight.track.iter().rev().find(|sample| sample.time_s <= then_s);
+            let Some(phase) = phase.and_then(|sample| sample.phase) else {
+                continue;
+            };
+            let error: [f64; 6] = core::array::from_fn(|i| came[i] - planned[i]);
+            names.insert(phase.index(), phase.name());
+            errors.entry(phase.index()).or_default()[k].push(error);
+            distance[k].push((flight.axis_s(then_s), libm::hypot(error[0], error[1])));
+        }
+    }
+    if errors.is_empty() {
+        return paragraph("The log has no plans to compare the flight with.");
+    }
+    let mut rows = Vec::new();
+    for (phase, by_distance) in &errors {
+        for (ahead_s, errors) in AHEAD_S.iter().zip(by_distance) {
+            if errors.is_empty() {
+                continue;
+            }
+            let mut row = vec![
+                names.get(phase).copied().unwrap_or_default().to_owned(),
+                format!("{ahead_s} s"),
+                errors.len().to_string(),
+            ];
+            for (component, (_, _, factor)) in COMPONENTS.iter().enumerate() {
+                let found = rms_and_max(errors.iter().map(|error| factor * error[component]));
+                row.push(found.map_or_else(String::new, |(rms, max)| format!("{rms:.4} / {max:.4}")));
+            }
+            rows.push(row);
+        }
+    }
+    let heads: Vec<String> = COMPONENTS.iter().map(|(name, unit, _)| format!("#{name}, {unit}")).collect();
+    let mut all = vec!["phase", "predicted ahead", "#ticks"];
+    all.extend(heads.iter().map(String::as_str));
+    let [near, far] = distance;
+    let chart = Chart {
+        title: "Distance between where a plan put the vehicle and where it was, m".to_owned(),
+        x_label: flight.axis_name(),
+        lines: vec![
+            Line { name: "0.5 s ahead", class: "b", points: far },
+            Line { name: "0.1 s ahead", class: "a", points: near },
+        ],
+        marks: flight.marks(),
+        full: true,
+        ..Chart::default()
+    };
+    paragraph("What came less what each tick's plan had said, root mean square / largest.")
+        + &table(&all, &rows)
+        + &charts(&[chart.svg()])
+}

@@ -1,0 +1,205 @@
+//! A recorded flight as the report looks at it.
+
+use std::path::Path;
+
+use flight::phase::Phase;
+use flight::profile::Profile;
+use protocol::log::v1;
+
+use crate::log::{Entry, FlightLog, LogError, Recording};
+
+/// How far ahead predictions are compared with what came, s.
+pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
+
+/// Plans that are drawn.
+const PLANS_DRAWN: usize = 8;
+
+/// Where the flight was at one time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    /// Vehicle time, s.
+    pub(super) time_s: f64,
+    pub(super) phase: Option<Phase>,
+    /// x, z, theta, u, w, q.
+    pub(super) state: [f64; 6],
+}
+
+/// One tick's plan, in short.
+#[derive(Debug, Clone)]
+pub(super) struct PlanSample {
+    /// Vehicle time of the tick, s.
+    pub(super) time_s: f64,
+    /// The state predicted for each of [`AHEAD_S`].
+    pub(super) ahead: [Option<[f64; 6]>; 2],
+    /// The plan in the pitch plane, for those that are drawn.
+    pub(super) path: Vec<(f64, f64)>,
+}
+
+/// Who tells where the vehicle was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Teller {
+    Plant,
+    Estimate,
+    Telemetry,
+    Nobody,
+}
+
+/// A recorded flight and what the report derives from it.
+pub(super) struct Flight {
+    pub(super) recording: Recording,
+    pub(super) profile: Option<Profile>,
+    pub(super) plans: Vec<PlanSample>,
+    pub(super) teller: Teller,
+    pub(super) track: Vec<Sample>,
+    /// Command to the landing motor, vehicle time, s.
+    pub(super) ignition_s: Option<f64>,
+    /// Contact, vehicle time, s.
+    pub(super) touchdown_s: Option<f64>,
+}
+
+impl Flight {
+    pub(super) fn new(recording: Recording, plans: Vec<PlanSample>) -> Self {
+        let (teller, track) = track_of(&recording);
+        let lit = |tick: &&v1::ControllerTick| phase_of(tick.input.phase).is_some_and(Phase::in_landing_burn);
+        let ignition_s = recording
+            .ticks
+            .iter()
+            .find(lit)
+            .map(|tick| tick.input.time_s - tick.input.time_since_ignition_s)
+            .or_else(|| {
+                let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
+                track.iter().find(burning).map(|sample| sample.time_s)
+            });
+        Self {
+            profile: recording.profile().ok(),
+            touchdown_s: recording.verdict.as_ref().map(|verdict| verdict.time_s),
+            ignition_s,
+            plans,
+            teller,
+            track,
+            recording,
+        }
+    }
+
+    /// Time on the report's axes, s: since ignition, or vehicle time without one.
+    pub(super) fn axis_s(&self, time_s: f64) -> f64 {
+        time_s - self.ignition_s.unwrap_or(0.0)
+    }
+
+    /// The name of the time axis.
+    pub(super) fn axis_name(&self) -> &'static str {
+        if self.ignition_s.is_some() { "s since ignition" } else { "s of vehicle time" }
+    }
+
+    /// Whether a time belongs to the pictures: from a second before the landing begins to a second after its end.
+    pub(super) fn is_shown(&self, time_s: f64) -> bool {
+        let from_s = self.ignition_s.unwrap_or(f64::NEG_INFINITY) - 1.0;
+        let until_s = self.touchdown_s.unwrap_or(f64::INFINITY) + 1.0;
+        (from_s..=until_s).contains(&time_s)
+    }
+
+    /// Ignition and touchdown, for the pictures.
+    pub(super) fn marks(&self) -> Vec<(f64, &'static str)> {
+        let ignition = self.ignition_s.map(|at_s| (self.axis_s(at_s), "ignition"));
+        let touchdown = self.touchdown_s.map(|at_s| (self.axis_s(at_s), "touchdown"));
+        ignition.into_iter().chain(touchdown).collect()
+    }
+
+    /// The state at a time, between samples; `None` outside.
+    pub(super) fn state_at(&self, time_s: f64) -> Option<[f64; 6]> {
+        const SAME_S: f64 = 1e-6;
+        let behind = self.track.partition_point(|sample| sample.time_s < time_s - SAME_S);
+        let after = self.track.get(behind)?;
+        if (after.time_s - time_s).abs() <= SAME_S {
+            return Some(after.state);
+        }
+        let before = self.track.get(behind.checked_sub(1)?)?;
+        let share = (time_s - before.time_s) / (after.time_s - before.time_s);
+        Some(core::array::from_fn(|i| before.state[i] + share * (after.state[i] - before.state[i])))
+    }
+}
+
+pub(super) fn phase_of(number: u32) -> Option<Phase> {
+    u8::try_from(number).ok().and_then(Phase::from_index)
+}
+
+pub(super) fn state_of(state: &v1::PlanarState) -> [f64; 6] {
+    [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s]
+}
+
+/// The best that the log has: the plant, else the controller's estimate, else what a ground station heard.
+fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
+    let sample = |time_s, phase, state| Sample { time_s, phase, state };
+    let plant = recording.truth.iter();
+    let mut best: (Teller, Vec<Sample>) = (
+        Teller::Plant,
+        plant.map(|truth| sample(truth.time_s, phase_of(truth.phase), state_of(&truth.state))).collect(),
+    );
+    if best.1.is_empty() {
+        let ticks = recording.ticks.iter();
+        best = (
+            Teller::Estimate,
+            ticks
+                .map(|tick| {
+                    sample(tick.input.time_s, phase_of(tick.input.phase), state_of(&tick.input.state))
+                })
+                .collect(),
+        );
+    }
+    if best.1.is_empty() {
+        let heard = recording.telemetry.iter();
+        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        best = (
+            Teller::Telemetry,
+            heard
+                .map(|told| {
+                    let numbers =
+                        [told.x_m, told.altitude_m, told.pitch_rad, told.u_m_s, told.w_m_s, told.q_rad_s];
+                    sample(told.time_s, told.phase.and_then(phase_of), numbers.map(or_nan))
+                })
+                .collect(),
+        );
+    }
+    if best.1.is_empty() {
+        return (Teller::Nobody, Vec::new());
+    }
+    best.1.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    best
+}
+
+/// What the report needs of every tick's plan, without holding the plans.
+pub(super) fn plans_of(path: &Path) -> Result<Vec<PlanSample>, LogError> {
+    let mut log = FlightLog::open(path)?;
+    let mut plans = Vec::new();
+    while let Some(stamped) = log.next_entry()? {
+        if let Entry::Tick(tick) = stamped.entry
+            && phase_of(tick.input.phase).is_some_and(Phase::is_landing)
+            && !tick.output.plan.states.is_empty()
+        {
+            plans.push(plan_sample(&tick));
+        }
+    }
+    plans.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let stride = plans.len().div_ceil(PLANS_DRAWN).max(1);
+    for (place, plan) in plans.iter_mut().enumerate() {
+        if place % stride != 0 {
+            plan.path = Vec::new();
+        }
+    }
+    Ok(plans)
+}
+
+fn plan_sample(tick: &v1::ControllerTick) -> PlanSample {
+    let plan = &tick.output.plan;
+    let node_at = |ahead_s: f64| {
+        let node = (ahead_s - plan.starts_in_s) / plan.step_s;
+        let whole = node.round();
+        let on_node = (node - whole).abs() < 1e-6 && whole >= 0.0;
+        on_node.then(|| plan.states.get(whole as usize).map(state_of))?
+    };
+    PlanSample {
+        time_s: tick.input.time_s,
+        ahead: AHEAD_S.map(node_at),
+        path: plan.states.iter().map(|state| (state.x_m, state.z_m)).collect(),
+    }
+}

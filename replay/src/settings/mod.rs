@@ -1,0 +1,263 @@
+//! Other settings for a recorded flight: named as in its profile, checked against the names there are.
+//!
+//! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A file of settings is a
+//! TOML file of the profile's shape with only the keys to change. A name that no profile has is refused with the
+//! nearest that one has.
+
+mod names;
+mod schedule;
+
+pub use names::known_paths;
+pub use schedule::Schedule;
+
+use std::fmt;
+use std::str::FromStr;
+
+use flight::profile::{Profile, ProfileError};
+
+/// A value for one key of the profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// The key, as in `nmpc.weights.w`.
+    pub path: String,
+    /// Its value.
+    pub value: toml::Value,
+    /// Vehicle time from which on it holds, s; `None`: from the beginning.
+    pub at_s: Option<f64>,
+}
+
+/// Why a setting cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SettingError {
+    /// Not of the form `path=value`.
+    #[error("setting `{given}`: must be path=value or path=value@seconds, as in nmpc.weights.w=90@6.5")]
+    Form {
+        /// What was given.
+        given: String,
+    },
+    /// No such key.
+    #[error("no setting `{given}`: did you mean `{nearest}`?")]
+    Unknown {
+        /// What was given.
+        given: String,
+        /// The known name most like it.
+        nearest: String,
+    },
+    /// A section, not a key.
+    #[error("`{given}` is a section; its settings are {}", keys.join(", "))]
+    Section {
+        /// What was given.
+        given: String,
+        /// The keys in it.
+        keys: Vec<String>,
+    },
+    /// The log's profile or a settings file is not TOML.
+    #[error("{origin}: {reason}")]
+    Toml {
+        /// Which text.
+        origin: String,
+        /// The parser's words.
+        reason: String,
+    },
+    /// The profile with the settings is not a profile.
+    #[error("with {settings}: {source}")]
+    Profile {
+        /// The settings.
+        settings: String,
+        /// What is wrong.
+        source: ProfileError,
+    },
+}
+
+impl FromStr for Setting {
+    type Err = SettingError;
+
+    fn from_str(given: &str) -> Result<Self, SettingError> {
+        let form = || SettingError::Form { given: given.to_owned() };
+        let (path, text) = given.split_once('=').ok_or_else(form)?;
+        let (path, text) = (path.trim(), text.trim());
+        if path.is_empty() || text.is_empty() {
+            return Err(form());
+        }
+        let timed = text.rsplit_once('@').and_then(|(value, at)| {
+            let at_s = at.trim_end_matches('s').trim().parse::<f64>().ok()?;
+            Some((value.trim(), at_s))
+        });
+        let (text, at_s) = match timed {
+            Some((value, at_s)) if at_s.is_finite() && !value.is_empty() => (value, Some(at_s)),
+            Some(_) => return Err(form()),
+            None => (text, None),
+        };
+        Ok(Self { path: path.to_owned(), value: parsed_value(text), at_s })
+    }
+}
+
+/// A TOML value, or else text: `consistent` needs no quotes on a command line.
+fn parsed_value(text: &str) -> toml::Value {
+    let table = format!("value = {text}").parse::<toml::Table>();
+    let value = table.ok().filter(|table| table.len() == 1).and_then(|mut table| table.remove("value"));
+    value.unwrap_or_else(|| toml::Value::String(text.to_owned()))
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}={}", self.path, self.value)?;
+        self.at_s.map_or(Ok(()), |at_s| write!(formatter, "@{at_s}"))
+    }
+}
+
+/// Every key of a settings file, as settings. `origin` is used in messages only.
+///
+/// # Errors
+/// The text is not TOML.
+pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
+    let table = parsed_table(text, origin)?;
+    let mut settings = Vec::new();
+    collect_leaves("", &table, &mut |path, value| {
+        settings.push(Setting { path, value: value.clone(), at_s: None });
+    });
+    Ok(settings)
+}
+
+/// The profile of this text with other settings, whenever they begin to hold.
+///
+/// # Errors
+/// A name is unknown, or the result is no profile.
+pub fn profile_with(profile_toml: &str, settings: &[Setting]) -> Result<Profile, SettingError> {
+    let text = profile_toml_with(profile_toml, settings)?;
+    Profile::from_toml(&text, "profile.toml").map_err(|source| SettingError::Profile {
+        settings: settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "),
+        source,
+    })
+}
+
+/// The text of a profile with other settings.
+///
+/// # Errors
+/// A name is unknown, or the text is not TOML.
+pub fn profile_toml_with(profile_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
+    if settings.is_empty() {
+        // Untouched, byte for byte.
+        return Ok(profile_toml.to_owned());
+    }
+    let mut table = parsed_table(profile_toml, "profile.toml")?;
+    let mut known = known_paths();
+    collect_leaves("", &table, &mut |path, _| {
+        known.insert(path);
+    });
+    for setting in settings {
+        names::check(&setting.path, &known)?;
+        insert(&mut table, &setting.path, setting.value.clone());
+    }
+    toml::to_string(&table)
+        .map_err(|error| SettingError::Toml { origin: "profile.toml".to_owned(), reason: error.to_string() })
+}
+
+/// The value of a key in a profile's text, if it stands there.
+pub fn value_of(profile_toml: &str, path: &str) -> Option<toml::Value> {
+    let table = profile_toml.parse::<toml::Table>().ok()?;
+    let mut value = toml::Value::Table(table);
+    for key in path.split('.') {
+        value = value.as_table_mut()?.remove(key)?;
+    }
+    Some(value)
+}
+
+fn parsed_table(text: &str, origin: &str) -> Result<toml::Table, SettingError> {
+    text.parse::<toml::Table>()
+        .map_err(|error| SettingError::Toml { origin: origin.to_owned(), reason: error.to_string() })
+}
+
+fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(String, &toml::Value)) {
+    for (key, value) in table {
+        let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        match value {
+            toml::Value::Table(inner) => collect_leaves(&path, inner, take),
+            value => take(path, value),
+        }
+    }
+}
+
+/// Puts a value at a path, making the sections on the way.
+fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
+    match path.split_once('.') {
+        None => {
+            table.insert(path.to_owned(), value);
+        }
+        Some((section, rest)) => {
+            let inner = table.entry(section).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+            if let toml::Value::Table(inner) = inner {
+                insert(inner, rest, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CALIBRATED: &str = "paper-calibrated";
+
+    fn calibrated() -> &'static str {
+        Profile::builtin_toml(CALIBRATED).unwrap()
+    }
+
+    fn with(given: &[&str]) -> Result<Profile, SettingError> {
+        let settings: Vec<Setting> = given.iter().map(|text| text.parse().unwrap()).collect();
+        profile_with(calibrated(), &settings)
+    }
+
+    #[test]
+    fn a_setting_is_a_path_a_value_and_perhaps_a_time() {
+        let setting: Setting = "nmpc.weights.w=90".parse().unwrap();
+        assert_eq!((setting.path.as_str(), setting.at_s), ("nmpc.weights.w", None));
+        assert_eq!(setting.value, toml::Value::Integer(90));
+        let timed: Setting = "nmpc.weights.w = 9.5e1 @ 6.5s".parse().unwrap();
+        assert_eq!((timed.value, timed.at_s), (toml::Value::Float(95.0), Some(6.5)));
+        let word: Setting = "nmpc.model=as-printed".parse().unwrap();
+        assert_eq!(word.value, toml::Value::String("as-printed".to_owned()));
+        for bad in ["nmpc.weights.w", "=3", "a=", "a=3@nan", "a=@3"] {
+            assert!(bad.parse::<Setting>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_set_value_reaches_the_profile_and_nothing_else_changes() {
+        let changed = with(&["nmpc.weights.w=90", "nmpc.model=as-printed"]).unwrap();
+        let mut expected = Profile::builtin(CALIBRATED).unwrap();
+        expected.nmpc.weights.w = 90.0;
+        expected.nmpc.model = flight::profile::ModelKind::AsPrinted;
+        assert_eq!(changed, expected);
+        assert_eq!(with(&[]).unwrap(), Profile::builtin(CALIBRATED).unwrap());
+    }
+
+    #[test]
+    fn a_key_that_the_profile_leaves_out_can_be_set() {
+        assert_eq!(with(&["gimbal.rate_limit_deg_s=400"]).unwrap().gimbal.rate_limit_deg_s, Some(400.0));
+        assert_eq!(
+            with(&["plant.thrust_scale=0.97"]).unwrap().plant.thrust_scale.to_bits(),
+            0.97_f64.to_bits()
+        );
+    }
+
+    #[test]
+    fn an_unknown_name_is_refused_with_the_nearest() {
+        let refusal = |given| with(&[given]).unwrap_err().to_string();
+        assert_eq!(refusal("nmpc.weight.w=1"), "no setting `nmpc.weight.w`: did you mean `nmpc.weights.w`?");
+        assert_eq!(
+            refusal("gimbal.rate_limit_deg=1"),
+            "no setting `gimbal.rate_limit_deg`: did you mean `gimbal.rate_limit_deg_s`?"
+        );
+        assert!(refusal("nmpc.weights=1").starts_with("`nmpc.weights` is a section; its settings are"));
+        assert!(refusal("motor.thrust_n=-3").contains("motor.thrust_n"), "{}", refusal("motor.thrust_n=-3"));
+    }
+
+    #[test]
+    fn a_file_of_settings_has_the_profiles_shape() {
+        let settings = settings_of_file("nmpc.weights.w = 90\n[motor]\nthrust_n = 34.0\n", "x.toml").unwrap();
+        let shown: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        assert_eq!(shown, ["motor.thrust_n=34.0", "nmpc.weights.w=90"]);
+        assert!(settings_of_file("= 3", "x.toml").unwrap_err().to_string().starts_with("x.toml: "));
+    }
+}

@@ -1,0 +1,214 @@
+//! The names that a profile's settings can have, from the profile's own types.
+//!
+//! The types are asked rather than a list kept: every struct tells a deserializer its field names, so one that
+//! supplies placeholder values walks the whole profile and notes each path on its way.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
+use flight::profile::Profile;
+use serde::Deserialize as _;
+use serde::de::value::{Error, StrDeserializer};
+use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
+
+use super::SettingError;
+
+/// Every key that a profile may have, as in `nmpc.weights.w`.
+pub fn known_paths() -> BTreeSet<String> {
+    let paths = RefCell::default();
+    // Placeholders may not make a value of every type; what was noted until then stays.
+    let _ = Profile::deserialize(Walker { path: String::new(), paths: &paths });
+    paths.into_inner()
+}
+
+/// Refuses a name that is none of the known, with the nearest.
+pub(super) fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
+    if known.contains(given) {
+        return Ok(());
+    }
+    let section = format!("{given}.");
+    let keys: Vec<String> = known.iter().filter(|path| path.starts_with(&section)).cloned().collect();
+    if !keys.is_empty() {
+        return Err(SettingError::Section { given: given.to_owned(), keys });
+    }
+    let nearest = known.iter().max_by(|a, b| {
+        strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)).then_with(|| b.cmp(a))
+    });
+    Err(SettingError::Unknown { given: given.to_owned(), nearest: nearest.cloned().unwrap_or_default() })
+}
+
+/// Answers every request with a placeholder and notes where it was asked.
+struct Walker<'a> {
+    path: String,
+    paths: &'a RefCell<BTreeSet<String>>,
+}
+
+impl Walker<'_> {
+    fn note(&self) {
+        self.paths.borrow_mut().insert(self.path.clone());
+    }
+}
+
+/// Number methods: note the place, give nought.
+macro_rules! numbers {
+    ($($method:ident $visit:ident $nought:expr),* $(,)?) => {
+        $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+            self.note();
+            visitor.$visit($nought)
+        })*
+    };
+}
+
+impl<'de> Deserializer<'de> for Walker<'_> {
+    type Error = Error;
+
+    numbers! {
+        deserialize_bool visit_bool false,
+        deserialize_i8 visit_i8 0,
+        deserialize_i16 visit_i16 0,
+        deserialize_i32 visit_i32 0,
+        deserialize_i64 visit_i64 0,
+        deserialize_u8 visit_u8 0,
+        deserialize_u16 visit_u16 0,
+        deserialize_u32 visit_u32 0,
+        deserialize_u64 visit_u64 0,
+        deserialize_f32 visit_f32 0.0,
+        deserialize_f64 visit_f64 0.0,
+        deserialize_char visit_char ' ',
+        deserialize_str visit_str "",
+        deserialize_string visit_str "",
+        deserialize_bytes visit_bytes &[],
+        deserialize_byte_buf visit_bytes &[],
+    }
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_unit()
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_unit<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+
+    fn deserialize_unit_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_seq(serde::de::value::SeqDeserializer::new(std::iter::empty::<f64>()))
+    }
+
+    fn deserialize_tuple<V: Visitor<'de>>(self, len: usize, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_seq(serde::de::value::SeqDeserializer::new(std::iter::repeat_n(0.0_f64, len)))
+    }
+
+    fn deserialize_tuple_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        len: usize,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        self.deserialize_tuple(len, visitor)
+    }
+
+    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_map(Fields { names: [].iter(), next: None, walker: self })
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_map(Fields { names: fields.iter(), next: None, walker: self })
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        self.note();
+        let first: StrDeserializer<'_, Error> =
+            variants.first().copied().unwrap_or_default().into_deserializer();
+        visitor.visit_enum(first)
+    }
+
+    fn deserialize_identifier<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_str("")
+    }
+
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+}
+
+/// The fields of a struct, one after the other.
+struct Fields<'a> {
+    names: std::slice::Iter<'static, &'static str>,
+    next: Option<&'static str>,
+    walker: Walker<'a>,
+}
+
+impl<'de> MapAccess<'de> for Fields<'_> {
+    type Error = Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Error> {
+        self.next = self.names.next().copied();
+        self.next
+            .map(|name| {
+                let name: StrDeserializer<'_, Error> = name.into_deserializer();
+                seed.deserialize(name)
+            })
+            .transpose()
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Error> {
+        let name = self.next.unwrap_or_default();
+        let above = &self.walker.path;
+        let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
+        seed.deserialize(Walker { path, paths: self.walker.paths })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every key of every built-in profile, and those that all of them leave out.
+    #[test]
+    fn every_key_of_the_built_in_profiles_is_known() {
+        let known = known_paths();
+        for (name, text) in flight::profile::BUILTIN {
+            let table = text.parse::<toml::Table>().unwrap();
+            super::super::collect_leaves("", &table, &mut |path, _| {
+                assert!(known.contains(&path), "{name}: {path}");
+            });
+        }
+        for optional in ["gimbal.rate_limit_deg_s", "nmpc.limits.final.w_m_s", "stabiliser.decay_rate_per_s"]
+        {
+            assert!(known.contains(optional), "{optional}");
+        }
+        assert!(!known.contains("nmpc.weights"), "a section is no key");
+    }
+}

@@ -1,0 +1,203 @@
+//! The smallest change of one setting that turns a landing into none, or the other way round.
+
+use serde::Serialize;
+
+use super::FlightOutcome;
+use crate::log::Recording;
+use crate::refly::{ReflyError, ReflyOptions, refly};
+use crate::settings::{Setting, value_of};
+
+/// Halvings of the interval in which the verdict changes.
+const HALVINGS: u32 = 40;
+
+/// Why a setting cannot be bisected.
+#[derive(Debug, thiserror::Error)]
+pub enum BisectError {
+    /// The flight cannot be flown again.
+    #[error(transparent)]
+    Refly(#[from] ReflyError),
+    /// No number to begin from.
+    #[error("{path} has no number in the flight's profile; say where to begin with --value")]
+    NoValue {
+        /// The setting.
+        path: String,
+    },
+    /// The value lies outside the range.
+    #[error("{path} = {value} does not lie between {from} and {to}")]
+    Outside {
+        /// The setting.
+        path: String,
+        /// Its value.
+        value: f64,
+        /// Lowest value.
+        from: f64,
+        /// Highest value.
+        to: f64,
+    },
+}
+
+/// What to change and how far.
+#[derive(Debug, Clone)]
+pub struct BisectOptions {
+    /// The setting.
+    pub path: String,
+    /// Change the plant alone.
+    pub plant_alone: bool,
+    /// Where to begin; the profile's own value if left out.
+    pub value: Option<f64>,
+    /// Lowest value tried.
+    pub from: f64,
+    /// Highest value tried.
+    pub to: f64,
+    /// Values tried on either side before the change is narrowed down.
+    pub steps: u32,
+    /// How the flight is flown besides.
+    pub refly: ReflyOptions,
+}
+
+/// Where the verdict changes on one side.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Flip {
+    /// The value farthest from the beginning with the same verdict.
+    pub same_at: f64,
+    /// The value nearest to it with the other.
+    pub other_at: f64,
+    /// The change from the beginning.
+    pub change: f64,
+    /// Flight with that change.
+    pub outcome: FlightOutcome,
+}
+
+/// What a bisection found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BisectReport {
+    /// Says that this is the closed loop.
+    pub kind: &'static str,
+    /// The flight.
+    pub file: String,
+    /// The setting.
+    pub path: String,
+    /// Whether it is changed for the plant alone.
+    pub plant_alone: bool,
+    /// Where it began.
+    pub value: f64,
+    /// How the flight comes out there.
+    pub outcome: FlightOutcome,
+    /// The first change of the verdict below, found by steps of this much and then narrowed down.
+    pub below: Option<Flip>,
+    /// The first above.
+    pub above: Option<Flip>,
+    /// The size of the steps below and above: what changes and changes back within one is not seen.
+    pub steps: (f64, f64),
+    /// Flights flown.
+    pub flown: usize,
+}
+
+impl BisectReport {
+    /// The smaller of the two changes.
+    pub fn smallest(&self) -> Option<Flip> {
+        let flips = self.below.into_iter().chain(self.above);
+        flips.min_by(|a, b| a.change.abs().total_cmp(&b.change.abs()))
+    }
+}
+
+/// Looks for the smallest change of one setting that changes the verdict.
+///
+/// # Errors
+/// See [`BisectError`].
+pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectReport, BisectError> {
+    let path = &options.path;
+    let value = match options.value {
+        Some(value) => value,
+        None => number_of(flight, path).ok_or_else(|| BisectError::NoValue { path: path.clone() })?,
+    };
+    let (from, to) = (options.from, options.to);
+    if !(from..=to).contains(&value) {
+        return Err(BisectError::Outside { path: path.clone(), value, from, to });
+    }
+    let mut search = Search { flight, options, flown: 0 };
+    let outcome = search.fly(value)?;
+    let below = search.first_flip(value, from, outcome)?;
+    let above = search.first_flip(value, to, outcome)?;
+    let step = |end: f64| (end - value).abs() / f64::from(options.steps.max(1));
+    Ok(BisectReport {
+        kind: "closed loop: flown again in simulation",
+        file: flight.name.clone(),
+        path: path.clone(),
+        plant_alone: options.plant_alone,
+        value,
+        outcome,
+        below,
+        above,
+        steps: (step(from), step(to)),
+        flown: search.flown,
+    })
+}
+
+fn number_of(flight: &Recording, path: &str) -> Option<f64> {
+    let value = value_of(flight.profile_toml().ok()?, path)?;
+    value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
+}
+
+struct Search<'a> {
+    flight: &'a Recording,
+    options: &'a BisectOptions,
+    flown: usize,
+}
+
+impl Search<'_> {
+    fn fly(&mut self, value: f64) -> Result<FlightOutcome, BisectError> {
+        let setting =
+            Setting { path: self.options.path.clone(), value: toml::Value::Float(value), at_s: None };
+        let mut refly_options = self.options.refly.clone();
+        let settings = if self.options.plant_alone {
+            &mut refly_options.plant_settings
+        } else {
+            &mut refly_options.settings
+        };
+        settings.push(setting);
+        self.flown += 1;
+        let report = refly(self.flight, &refly_options)?;
+        Ok(FlightOutcome {
+            landed: report.reflown.is_some_and(|verdict| verdict.landed),
+            margin: report.margin,
+        })
+    }
+
+    /// Steps from `value` towards `end` until the verdict is another, then halves the last step.
+    fn first_flip(
+        &mut self,
+        value: f64,
+        end: f64,
+        outcome: FlightOutcome,
+    ) -> Result<Option<Flip>, BisectError> {
+        let steps = self.options.steps.max(1);
+        let mut same_at = value;
+        for step in 1..=steps {
+            let tried = value + (end - value) * f64::from(step) / f64::from(steps);
+            if tried.to_bits() == value.to_bits() {
+                return Ok(None);
+            }
+            let found = self.fly(tried)?;
+            if found.landed == outcome.landed {
+                same_at = tried;
+                continue;
+            }
+            let (mut other_at, mut other) = (tried, found);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (same_at + other_at);
+                if middle.to_bits() == same_at.to_bits() || middle.to_bits() == other_at.to_bits() {
+                    break;
+                }
+                let there = self.fly(middle)?;
+                if there.landed == outcome.landed {
+                    same_at = middle;
+                } else {
+                    (other_at, other) = (middle, there);
+                }
+            }
+            return Ok(Some(Flip { same_at, other_at, change: other_at - value, outcome: other }));
+        }
+        Ok(None)
+    }
+}

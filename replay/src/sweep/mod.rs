@@ -1,0 +1,84 @@
+//! Many settings over many flights, each flown again in closed loop, ranked by the worst flight's margin.
+//!
+//! A point is one choice of every varied setting; a job is one point on one flight. Jobs are independent and their
+//! results are put in the order of the points, so the answer does not depend on how many run at the same time. With a
+//! state file every finished job is kept, and a sweep that was stopped goes on where it was.
+
+mod bisect;
+mod run;
+mod state;
+mod vary;
+
+pub use bisect::{BisectError, BisectOptions, BisectReport, Flip, bisect};
+pub use run::{Progress, sweep};
+pub use state::{State, StateError};
+pub use vary::{Choice, Vary, VaryError, grid, random};
+
+use serde::Serialize;
+
+use crate::refly::ReflyError;
+
+/// Why a sweep could not be run to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// A flight cannot be flown again with some choice.
+    #[error("{settings}: {source}")]
+    Refly {
+        /// The choice.
+        settings: String,
+        /// What is wrong.
+        source: Box<ReflyError>,
+    },
+    /// The state file cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
+
+/// How one flight came out at one point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FlightOutcome {
+    /// Inside every touchdown limit.
+    pub landed: bool,
+    /// Distance to the nearest limit as a fraction of it; see [`ReflyReport::margin`](crate::refly::ReflyReport).
+    /// `None` if the vehicle did not come down.
+    pub margin: Option<f64>,
+}
+
+/// How a point came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointOutcome {
+    /// Its number among the points.
+    pub point: usize,
+    /// Its settings.
+    pub settings: Vec<String>,
+    /// Flights that landed.
+    pub landed: usize,
+    /// The worst flight's margin; `None` if one did not come down.
+    pub worst_margin: Option<f64>,
+    /// The worst flight.
+    pub worst_flight: String,
+    /// Every flight, in the order given.
+    pub flights: Vec<FlightOutcome>,
+}
+
+/// What a sweep found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SweepReport {
+    /// Says that this is the closed loop.
+    pub kind: &'static str,
+    /// The flights.
+    pub flights: Vec<String>,
+    /// The points, the best first.
+    pub points: Vec<PointOutcome>,
+}
+
+impl SweepReport {
+    /// Ranks the points: the largest worst-case margin first, then the more landings, then the order given.
+    fn ranked(flights: Vec<String>, mut points: Vec<PointOutcome>) -> Self {
+        let margin = |point: &PointOutcome| point.worst_margin.unwrap_or(f64::NEG_INFINITY);
+        points.sort_by(|a, b| {
+            margin(b).total_cmp(&margin(a)).then(b.landed.cmp(&a.landed)).then(a.point.cmp(&b.point))
+        });
+        Self { kind: "closed loop: flown again in simulation", flights, points }
+    }
+}

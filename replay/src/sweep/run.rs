@@ -1,0 +1,130 @@
+//! The jobs of a sweep, several at a time.
+
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::sync_channel;
+
+use super::{Choice, FlightOutcome, PointOutcome, State, SweepError, SweepReport};
+use crate::log::Recording;
+use crate::refly::{ReflyError, ReflyOptions, refly};
+
+/// Results that may wait to be noted.
+const QUEUE: usize = 256;
+
+/// How far a sweep is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Jobs finished, also those of an earlier run.
+    pub done: usize,
+    /// All jobs.
+    pub jobs: usize,
+}
+
+/// Flies every flight at every point, `jobs` at a time. `options` say how, besides the points' settings.
+///
+/// # Errors
+/// Some flight cannot be flown again, or the state cannot be written.
+pub fn sweep(
+    flights: &[Recording],
+    points: &[Choice],
+    options: &ReflyOptions,
+    jobs: NonZeroUsize,
+    state: &mut State,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<SweepReport, SweepError> {
+    let all = points.len() * flights.len();
+    let missing: Vec<usize> = (0..all).filter(|job| state.outcome(*job).is_none()).collect();
+    let mut done = all - missing.len();
+    progress(Progress { done, jobs: all });
+    let next = AtomicUsize::new(0);
+    let stop = AtomicBool::new(false);
+    let mut failed: Option<(usize, SweepError)> = None;
+    std::thread::scope(|scope| {
+        let (results, inbox) = sync_channel::<(usize, Result<FlightOutcome, ReflyError>)>(QUEUE);
+        for _ in 0..jobs.get().min(missing.len()) {
+            let (results, missing, next, stop) = (results.clone(), &missing, &next, &stop);
+            scope.spawn(move || {
+                while !stop.load(Ordering::Relaxed)
+                    && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
+                {
+                    let outcome = fly(flights, points, options, job);
+                    if results.send((job, outcome)).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(results);
+        while let Ok((job, outcome)) = inbox.recv() {
+            let noted = match outcome {
+                Ok(outcome) => state.note(job, outcome).map_err(SweepError::from),
+                Err(source) => Err(SweepError::Refly {
+                    settings: words(points, job / flights.len()),
+                    source: Box::new(source),
+                }),
+            };
+            match noted {
+                Ok(()) => {
+                    done += 1;
+                    progress(Progress { done, jobs: all });
+                }
+                Err(error) => {
+                    stop.store(true, Ordering::Relaxed);
+                    // Of several errors that of the first job, whichever came first.
+                    if failed.as_ref().is_none_or(|(earlier, _)| job < *earlier) {
+                        failed = Some((job, error));
+                    }
+                }
+            }
+        }
+    });
+    if let Some((_, error)) = failed {
+        return Err(error);
+    }
+    let outcomes = (0..points.len()).map(|point| point_outcome(flights, points, state, point));
+    Ok(SweepReport::ranked(flights.iter().map(|flight| flight.name.clone()).collect(), outcomes.collect()))
+}
+
+fn fly(
+    flights: &[Recording],
+    points: &[Choice],
+    options: &ReflyOptions,
+    job: usize,
+) -> Result<FlightOutcome, ReflyError> {
+    let mut options = options.clone();
+    if let Some(choice) = points.get(job / flights.len()) {
+        options.settings.extend(choice.settings.iter().cloned());
+        options.plant_settings.extend(choice.plant_settings.iter().cloned());
+    }
+    let report = refly(&flights[job % flights.len()], &options)?;
+    Ok(FlightOutcome { landed: report.reflown.is_some_and(|verdict| verdict.landed), margin: report.margin })
+}
+
+fn words(points: &[Choice], point: usize) -> String {
+    let settings = points.get(point).map(|choice| choice.settings.iter().chain(&choice.plant_settings));
+    settings.map(|all| all.map(ToString::to_string).collect::<Vec<_>>().join(" ")).unwrap_or_default()
+}
+
+fn point_outcome(flights: &[Recording], points: &[Choice], state: &State, point: usize) -> PointOutcome {
+    let outcomes: Vec<FlightOutcome> = (0..flights.len())
+        .map(|flight| {
+            let outcome = state.outcome(point * flights.len() + flight);
+            outcome.unwrap_or(FlightOutcome { landed: false, margin: None })
+        })
+        .collect();
+    let margin = |outcome: &FlightOutcome| outcome.margin.unwrap_or(f64::NEG_INFINITY);
+    let worst = outcomes.iter().zip(flights).min_by(|a, b| margin(a.0).total_cmp(&margin(b.0)));
+    PointOutcome {
+        point,
+        settings: points
+            .get(point)
+            .map(|choice| {
+                choice.settings.iter().chain(&choice.plant_settings).map(ToString::to_string).collect()
+            })
+            .unwrap_or_default(),
+        landed: outcomes.iter().filter(|outcome| outcome.landed).count(),
+        worst_margin: worst.and_then(|(outcome, _)| outcome.margin),
+        worst_flight: worst.map(|(_, flight)| flight.name.clone()).unwrap_or_default(),
+        flights: outcomes,
+    }
+}

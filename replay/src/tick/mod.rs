@@ -1,0 +1,244 @@
+//! One recorded tick, solved again alone.
+//!
+//! The controller is brought to the tick by running every one before it, so that its warm start is the one it had in
+//! flight. Then the same landing problem is solved once more from nothing, and the two are put side by side.
+
+use flight::controller::ControlLevel;
+use flight::nmpc::{Problem, Solution, SolveStatus, solve};
+use protocol::log::v1;
+use serde::Serialize;
+use tick_log::{TickLogError, input_from_log};
+
+use crate::controller::LoggedController;
+use crate::log::{Recording, RecordingError};
+
+/// A condition or limit closer than this to being broken is active, in its own unit (m, rad, m/s or rad/s).
+const ACTIVE: f64 = 1e-4;
+
+/// State components in order, with their units.
+const COMPONENTS: [&str; 6] = ["x_m", "z_m", "theta_rad", "u_m_s", "w_m_s", "q_rad_s"];
+
+/// Why a tick cannot be solved again.
+#[derive(Debug, thiserror::Error)]
+pub enum TickError {
+    /// The log has not what it takes.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A recorded input has no meaning in this build.
+    #[error(transparent)]
+    Input(#[from] TickLogError),
+    /// No such tick.
+    #[error("{name}: no tick {tick} that can be re-executed; there are 0 to {last}")]
+    NoTick {
+        /// The file.
+        name: String,
+        /// What was asked for.
+        tick: u64,
+        /// The last there is.
+        last: u64,
+    },
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Solved {
+    /// How it ended.
+    pub status: &'static str,
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Cost of the plan.
+    pub cost: f64,
+    /// Stationarity residual.
+    pub kkt_stationarity: f64,
+    /// Feasibility residual.
+    pub kkt_feasibility: f64,
+    /// How far the path misses its conditions at worst, m, rad, m/s or rad/s.
+    pub condition_miss: f64,
+    /// The first input, rad.
+    pub gimbal_rad: f64,
+}
+
+/// A limit or condition that the plan touches.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ActiveConstraint {
+    /// What it is about, as in `w_m_s <= 0.03`.
+    pub what: String,
+    /// Nodes or intervals of the plan at which it is active.
+    pub at: Vec<usize>,
+    /// The largest multiplier among them; what loosening by one unit would save.
+    pub multiplier: f64,
+}
+
+/// A tick, solved again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TickReport {
+    /// The log.
+    pub file: String,
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    /// Its phase.
+    pub phase: &'static str,
+    /// The recorded input.
+    pub input: InputFacts,
+    /// What decided.
+    pub level: &'static str,
+    /// The gimbal command as recorded and as decided now, rad.
+    pub gimbal_rad: (f64, f64),
+    /// Whether the whole output and the memory are the recorded ones, bit for bit, but for the recorded plan.
+    pub identical: bool,
+    /// The solve as in flight; `None` if this tick solved nothing.
+    pub warm: Option<Solved>,
+    /// The same problem from nothing.
+    pub cold: Option<Solved>,
+    /// Limits and conditions that the warm plan touches.
+    pub active: Vec<ActiveConstraint>,
+    /// The plan: time from the tick, s, and state at each node.
+    pub path: Vec<PathPoint>,
+}
+
+/// What the tick was given.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InputFacts {
+    /// State components in order: x, z, theta, u, w, q.
+    pub state: [f64; 6],
+    /// Time since ignition, s.
+    pub time_since_ignition_s: f64,
+    /// The gimbal angle held, rad.
+    pub gimbal_applied_rad: f64,
+    /// Estimated thrust over nominal thrust.
+    pub thrust_scale: f64,
+}
+
+/// A node of the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PathPoint {
+    /// Time from the tick, s.
+    pub time_s: f64,
+    /// State components in order: x, z, theta, u, w, q.
+    pub state: [f64; 6],
+    /// The input from here on, rad; `None` at the end.
+    pub gimbal_rad: Option<f64>,
+}
+
+/// Solves one recorded tick again.
+///
+/// # Errors
+/// See [`TickError`].
+pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
+    let ticks = recording.replayable_ticks()?;
+    let profile = recording.profile()?;
+    let place = usize::try_from(number).ok().filter(|place| *place < ticks.len()).ok_or_else(|| {
+        TickError::NoTick { name: recording.name.clone(), tick: number, last: ticks.len() as u64 - 1 }
+    })?;
+    let mut controller = LoggedController::new(&profile);
+    for before in ticks.iter().take(place) {
+        controller.run_again(before)?;
+    }
+    let recorded = &ticks[place];
+    let input = input_from_log(&recorded.input)?;
+    let again = controller.run_again(recorded)?;
+    let solved = again.output.solver.status != u32::from(SolveStatus::NotRun.index());
+    let problem = controller.state().last_problem();
+    let kept = controller.state().kept_solution().filter(|_| solved && is_kept(&again));
+    let cold = solved.then(|| solve(problem, None));
+    let level = u8::try_from(again.output.level).ok().and_then(ControlLevel::from_index);
+    Ok(TickReport {
+        file: recording.name.clone(),
+        tick: number,
+        time_s: input.time_s,
+        phase: input.phase.name(),
+        input: InputFacts {
+            state: input.state.to_array(),
+            time_since_ignition_s: input.time_since_ignition_s,
+            gimbal_applied_rad: input.gimbal_applied_rad,
+            thrust_scale: input.thrust_scale,
+        },
+        level: level.map_or("unknown", ControlLevel::name),
+        gimbal_rad: (recorded.output.gimbal_command_rad, again.output.gimbal_command_rad),
+        identical: identical(recorded, &again),
+        warm: kept.map(solved_facts),
+        cold: cold.as_ref().map(solved_facts),
+        active: kept.map(|solution| active_constraints(problem, solution)).unwrap_or_default(),
+        path: path(&again.output.plan),
+    })
+}
+
+/// The controller keeps what it flies or rehearses.
+fn is_kept(tick: &v1::ControllerTick) -> bool {
+    let level = u8::try_from(tick.output.level).ok().and_then(ControlLevel::from_index);
+    matches!(level, Some(ControlLevel::Rehearsal | ControlLevel::Converged | ControlLevel::BestFeasible))
+}
+
+/// Compares all but the plan, which is not held of a recording; the digest of the memory stands for it.
+fn identical(recorded: &v1::ControllerTick, again: &v1::ControllerTick) -> bool {
+    let mut again = again.clone();
+    again.output.plan.states = Vec::new();
+    again.output.plan.gimbal_rad = Vec::new();
+    prost::Message::encode_to_vec(recorded) == prost::Message::encode_to_vec(&again)
+}
+
+fn solved_facts(solution: &Solution) -> Solved {
+    Solved {
+        status: solution.status.name(),
+        iterations: solution.iterations,
+        cost: solution.cost,
+        kkt_stationarity: solution.kkt_stationarity,
+        kkt_feasibility: solution.kkt_feasibility,
+        condition_miss: solution.condition_miss,
+        gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(f64::NAN),
+    }
+}
+
+fn active_constraints(problem: &Problem, solution: &Solution) -> Vec<ActiveConstraint> {
+    let mut active: Vec<ActiveConstraint> = Vec::new();
+    let mut note = |what: String, at: usize, multiplier: f64| match active
+        .iter_mut()
+        .find(|constraint| constraint.what == what)
+    {
+        Some(known) => {
+            known.at.push(at);
+            if multiplier.abs() > known.multiplier.abs() {
+                known.multiplier = multiplier;
+            }
+        }
+        None => active.push(ActiveConstraint { what, at: vec![at], multiplier }),
+    };
+    let limit_rad = problem.gimbal_limit_rad;
+    for (interval, input_rad) in solution.inputs_rad.iter().enumerate() {
+        let [lower, upper] = solution.limit_multipliers.get(interval).copied().unwrap_or_default();
+        if limit_rad - input_rad.abs() < ACTIVE {
+            let multiplier = if *input_rad > 0.0 { upper } else { lower };
+            let sign = if *input_rad > 0.0 { "<= " } else { ">= -" };
+            note(format!("gimbal_rad {sign}{limit_rad:.4}"), interval, multiplier);
+        }
+    }
+    let states: Vec<[f64; 6]> = solution.states.iter().map(|state| state.to_array()).collect();
+    let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers);
+    for (condition, multiplier) in problem.conditions().iter().zip(multipliers) {
+        let name = COMPONENTS.get(condition.component).copied().unwrap_or("?");
+        let bound = condition.sign * condition.offset;
+        if condition.equality {
+            note(format!("{name} = {bound:.4}"), condition.node, *multiplier);
+        } else if condition.value(&states) < ACTIVE {
+            let sign = if condition.sign > 0.0 { ">=" } else { "<=" };
+            note(format!("{name} {sign} {bound:.4}"), condition.node, *multiplier);
+        }
+    }
+    active
+}
+
+fn path(plan: &v1::Plan) -> Vec<PathPoint> {
+    let inputs = plan.gimbal_rad.iter().copied().map(Some).chain(std::iter::repeat(None));
+    plan.states
+        .iter()
+        .zip(inputs)
+        .enumerate()
+        .map(|(node, (state, gimbal_rad))| PathPoint {
+            time_s: plan.starts_in_s + node as f64 * plan.step_s,
+            state: [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s],
+            gimbal_rad,
+        })
+        .collect()
+}

@@ -1,0 +1,21 @@
+"""Reads a log with the mcap library and its protobuf decoder; prints messages a topic and the last gimbal command."""
+import collections
+import sys
+
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+counts = collections.Counter()
+with open(sys.argv[1], "rb") as file:
+    reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+    assert reader.get_summary() is not None
+    for schema, channel, message, decoded in reader.iter_decoded_messages(
+        topics=["/controller/tick", "/vehicle/truth", "/verdict", "/events", "/tf"]
+    ):
+        assert message.log_time == message.publish_time
+        counts[channel.topic] += 1
+        if channel.topic == "/controller/tick":
+            command = decoded.output.gimbal_command_rad
+for topic in sorted(counts):
+    print(topic, counts[topic])
+print("gimbal", command.hex())

@@ -1,0 +1,153 @@
+//! Logs that are too long, hollow, or full of numbers that no flight has: an answer or a reason, in bounded memory.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::process::Command;
+
+use proptest::prelude::*;
+use protocol::log::record::Record;
+use protocol::log::v1::ControllerTick;
+use protocol::log::writer::{LogHeader, LogWriter};
+use replay::compare::{Align, Flown, Tolerances, compare};
+use replay::evaluate::evaluate;
+use replay::log::Recording;
+use replay::refly::{ReflyOptions, StartAt, refly};
+use replay::report::report;
+use replay::sweep::{State, grid, sweep};
+use replay::tick::tick;
+
+use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+
+/// Runs the command with so much memory and no more; the answer, and what it said.
+fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
+    let kilobytes = 1024 * megabytes;
+    let command = format!("ulimit -v {kilobytes}; exec \"$@\"");
+    let output = Command::new("sh")
+        .args(["-c", &command, "sh", env!("CARGO_BIN_EXE_replay")])
+        .args(arguments)
+        .arg(file)
+        .output()
+        .unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code().unwrap(), String::from_utf8(said).unwrap())
+}
+
+/// Ten gigabytes, nearly all of them a hole: what stands before it is used.
+#[test]
+fn a_hollow_log_is_used_up_to_its_hole() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("hollow.mcap");
+    let (at, ticks) = WHOLE.synced[4];
+    std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap()]).unwrap();
+    let file = std::fs::File::options().write(true).open(&path).unwrap();
+    file.set_len(10 << 30).unwrap();
+    for (arguments, expected) in [
+        (&["info"][..], "type 0, which does not exist".to_owned()),
+        (&["verify"], format!("{ticks} of {ticks} ticks identical of the readable part")),
+        (&["evaluate"], "open loop".to_owned()),
+        (&["refly"], "closed loop".to_owned()),
+        (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
+    ] {
+        let (code, said) = within(200, arguments, &path);
+        assert_eq!(code, 0, "{said}");
+        assert!(said.contains(&expected), "{arguments:?}: {said}");
+    }
+    let recovered = directory.path().join("recovered.mcap");
+    let recovery = replay::recover::recover(&path, &recovered).unwrap();
+    assert_eq!(recovery.lost[0].bytes, (10 << 30) - at);
+    assert_eq!(Recording::open(&recovered).unwrap().ticks.len(), ticks);
+
+    file.set_len(0).unwrap();
+    file.set_len(10 << 30).unwrap();
+    let (code, said) = within(200, &["info"], &path);
+    assert!(code == 2 && said.contains("is not a flight log"), "{said}");
+}
+
+/// Run by hand, since it writes a gigabyte.
+#[test]
+#[ignore = "writes a gigabyte"]
+fn a_gigabyte_is_described_within_200_megabytes() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("long.mcap");
+    let file = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
+    let mut writer = LogWriter::new(file, &LogHeader::default()).unwrap();
+    let mut number = 0_u64;
+    while std::fs::metadata(&path).unwrap().len() < 1 << 30 {
+        for tick in &FLIGHT.ticks {
+            let mut tick = tick.clone();
+            tick.input.tick = number;
+            // Numbers that do not compress, as in a flight.
+            let mut noise = number;
+            for state in &mut tick.output.plan.states {
+                noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                state.x_m += noise as f64 / 1e18;
+                state.q_rad_s += noise as f64 / 1e19;
+            }
+            writer.write(&Record::from(tick), number * 100_000_000).unwrap();
+            number += 1;
+        }
+    }
+    writer.finish().unwrap();
+    let (code, said) = within(200, &["info"], &path);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains(&format!("{number}, from 0")), "{said}");
+}
+
+/// Changes some number of a tick to any bits at all.
+fn spoil(tick: &mut ControllerTick, field: usize, bits: u64) {
+    let number = f64::from_bits(bits);
+    let input = &mut tick.input;
+    match field {
+        0 => input.time_s = number,
+        1 => input.time_since_ignition_s = number,
+        2 => input.state.x_m = number,
+        3 => input.state.theta_rad = number,
+        4 => input.state.u_m_s = number,
+        5 => input.gimbal_applied_rad = number,
+        6 => input.thrust_scale = number,
+        7 => input.phase = (bits % 13) as u32,
+        8 => tick.output.gimbal_command_rad = number,
+        9 => tick.output.level = bits as u32,
+        10 => tick.output.solver.cost = number,
+        11 => tick.solve_time_s = number,
+        12 => tick.output.predicted_touchdown.state.z_m = number,
+        13 => tick.output.plan.step_s = number,
+        _ => tick.output.fin_command_rad = vec![number; (bits % 6) as usize],
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// A log whose checksums hold and whose numbers are nonsense: every question has an answer or a reason.
+    #[test]
+    fn nonsense_is_answered(spoilt in prop::collection::vec((0_usize..30, 0_usize..15, any::<u64>()), 1..12)) {
+        let mut ticks = FLIGHT.ticks[..30].to_vec();
+        for (place, field, bits) in spoilt {
+            spoil(&mut ticks[place], field, bits);
+        }
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("nonsense.mcap");
+        std::fs::write(&path, write_log(&ticks, &Recipe::default()).bytes).unwrap();
+        let recording = Recording::open(&path).unwrap();
+        prop_assert_eq!(recording.ticks.len(), 30);
+        let evaluated = evaluate(&recording, &["nmpc.weights.w=90".parse().unwrap()]).unwrap();
+        prop_assert!(evaluated.ticks.iter().all(|tick| tick.evaluated.gimbal_rad.is_finite()));
+        prop_assert_eq!(tick(&recording, 20).unwrap().tick, 20);
+        for start in [StartAt::Landing, StartAt::Tick(12)] {
+            let options = ReflyOptions { start, ..ReflyOptions::default() };
+            if let Ok(report) = refly(&recording, &options) {
+                prop_assert!(report.ticks > 0);
+            }
+        }
+        prop_assert!(report(&path).unwrap().ends_with("</html>\n"));
+        let flown = Flown::open(&path).unwrap();
+        prop_assert!(compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap().failures.is_empty());
+        let points = grid(&["nmpc.weights.w=50:90:2".parse().unwrap()], &[]).unwrap();
+        let mut state = State::in_memory(2);
+        let options = ReflyOptions::default();
+        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut state, &mut |_| {}) {
+            prop_assert_eq!(swept.points.len(), 2);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Flights flown by the simulated vehicle, with the logs that it writes itself.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use onboard_sim::fly::{FlyOptions, Speed, fly, load_profile, log_header};
+use onboard_sim::vehicle::DeadlinePolicy;
+use protocol::log::recorder::Recorder;
+use protocol::transport::Endpoint;
+use replay::log::Recording;
+use tempfile::TempDir;
+use tokio::sync::watch;
+
+/// Start of every run, so that the logs do not depend on the day.
+const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
+
+/// A directory with the log of one flight in it.
+pub(crate) struct Simulated {
+    directory: TempDir,
+    pub(crate) log: PathBuf,
+}
+
+/// The nominal landing, without links.
+pub(crate) static NOMINAL: LazyLock<Simulated> = LazyLock::new(|| simulate("paper-calibrated", 1, &[]));
+
+/// A landing with a scattered start and motor.
+pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("paper-dispersed", 2, &[]));
+
+/// The nominal landing with its telemetry going nowhere, so that its log has raw frames.
+pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
+    let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
+    simulate("paper-calibrated", 1, &[link])
+});
+
+impl Simulated {
+    pub(crate) fn recording(&self) -> Recording {
+        Recording::open(&self.log).unwrap()
+    }
+
+    /// A new file's path beside the log.
+    pub(crate) fn beside(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+}
+
+/// Flies a profile to the ground and writes its log.
+pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulated {
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("flight.mcap");
+    let profile = load_profile(profile).unwrap();
+    let recorder = Recorder::create(&log, &log_header("onboard-sim", &profile, seed, START_UNIX_NS)).unwrap();
+    let options = FlyOptions {
+        profile,
+        links: links.to_vec(),
+        recorder: Some(recorder.clone()),
+        seed,
+        speed: Speed::Max,
+        auto_start: true,
+        exit_when_safed: true,
+        deadline_policy: DeadlinePolicy::Observe,
+        log_clock: None,
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let (_stop, stopped) = watch::channel(false);
+    runtime.block_on(fly(options, stopped)).unwrap();
+    recorder.finish().unwrap();
+    Simulated { directory, log }
+}

@@ -1,0 +1,230 @@
+//! Comparisons, exports and imports of simulated flights.
+
+use std::path::Path;
+
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use proptest::prelude::*;
+use replay::compare::{Align, CompareError, Flown, Tolerances, compare};
+use replay::export::{TableFormat, export_tables, export_tlog};
+use replay::import::{ImportError, import_tlog};
+use replay::info::{GradeLevel, info};
+use replay::log::{FlightLog, Recording};
+use replay::refly::{ReflyOptions, refly_flight, write_log};
+use replay::verify::{Outcome, verify};
+
+use crate::simulated::{DISPERSED, NOMINAL, Simulated, WITH_FRAMES};
+
+fn read_text(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap()
+}
+
+fn flown(flight: &Simulated) -> Flown {
+    Flown::open(&flight.log).unwrap()
+}
+
+#[test]
+fn a_flight_equals_itself_in_every_signal() {
+    for align in [Align::Ignition, Align::Touchdown, Align::Time] {
+        let a = flown(&NOMINAL);
+        let found = compare(&a, &a.clone(), align, &Tolerances::default()).unwrap();
+        assert!(found.failures.is_empty() && found.missing.is_empty() && found.added.is_empty());
+        assert_eq!(found.identical(), found.signals.len());
+        assert!(found.signals.len() > 50, "{}", found.signals.len());
+        assert!(found.signals.iter().all(|signal| signal.samples > 0 && signal.samples_outside == 0));
+    }
+}
+
+/// A flight shifted in time is the same flight, aligned on an event; on time alone it is not.
+#[test]
+fn a_shifted_flight_is_found_again_by_its_events() {
+    let a = flown(&NOMINAL);
+    let mut b = a.clone();
+    for series in b.signals.values_mut() {
+        series.times_s.iter_mut().for_each(|time_s| *time_s += 3.0);
+    }
+    b.anchors.ignition_s = b.anchors.ignition_s.map(|at_s| at_s + 3.0);
+    b.anchors.touchdown_s = b.anchors.touchdown_s.map(|at_s| at_s + 3.0);
+    for align in [Align::Ignition, Align::Touchdown] {
+        let found = compare(&a, &b, align, &Tolerances::default()).unwrap();
+        assert!((found.shift_s + 3.0).abs() < 1e-9);
+        assert!(found.signals.iter().all(|signal| signal.max < 1e-9), "{align:?}");
+    }
+    let found = compare(&a, &b, Align::Time, &Tolerances::default()).unwrap();
+    assert!(found.signals.iter().any(|signal| signal.max > 1.0));
+    b.anchors.ignition_s = None;
+    assert!(matches!(
+        compare(&a, &b, Align::Ignition, &Tolerances::default()),
+        Err(CompareError::NoAnchor { .. })
+    ));
+    assert_eq!(Align::best_for(&a, &b), Align::Time);
+}
+
+#[test]
+fn a_known_difference_has_its_rms_its_maximum_and_its_time() {
+    let a = flown(&NOMINAL);
+    let mut b = a.clone();
+    let name = "vehicle_truth.state.x_m";
+    let series = b.signals.get_mut(name).unwrap();
+    series.values.iter_mut().for_each(|value| *value += 0.5);
+    series.values[100] += 1.5;
+    let at_s = series.times_s[100];
+    b.signals.remove("vehicle_truth.mass_kg");
+    b.signals.insert("new.signal".to_owned(), replay::compare::Series::default());
+    let tolerances = |text| Tolerances::from_toml(text, "t.toml").unwrap();
+    let loose = tolerances("[signals.\"vehicle_truth.state.*\"]\nmax = 2.1\nrms = 1.0\n");
+    let found = compare(&a, &b, Align::Time, &loose).unwrap();
+    assert!(found.failures.is_empty(), "{:?}", found.failures);
+    assert_eq!(
+        (found.missing.as_slice(), found.added.as_slice()),
+        (&["vehicle_truth.mass_kg".to_owned()][..], &["new.signal".to_owned()][..])
+    );
+    let signal = found.signals.iter().find(|signal| signal.signal == name).unwrap();
+    let count = signal.samples as f64;
+    let rms = (((count - 1.0) * 0.25 + 4.0) / count).sqrt();
+    assert!((signal.rms - rms).abs() < 1e-12 && (signal.max - 2.0).abs() < 1e-12, "{signal:?}");
+    assert_eq!(signal.max_at_s, Some(at_s));
+    let tight = tolerances(&format!("missing = 0\nadded = 0\n[signals.\"{name}\"]\nmax = 1.9\n"));
+    let found = compare(&a, &b, Align::Time, &tight).unwrap();
+    assert_eq!(found.failures.len(), 3, "{:?}", found.failures);
+    assert!(!found.signals[0].passed && found.signals[0].signal == name);
+}
+
+#[test]
+fn other_verdicts_fail_unless_they_are_tolerated() {
+    let recording = NOMINAL.recording();
+    let options = ReflyOptions {
+        plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],
+        ..ReflyOptions::default()
+    };
+    let (report, flight) = refly_flight(&recording, &options).unwrap();
+    let path = NOMINAL.beside("weak.mcap");
+    write_log(&path, &recording, &options, &report, &flight).unwrap();
+    let (a, b) = (flown(&NOMINAL), Flown::open(&path).unwrap());
+    let found = compare(&a, &b, Align::Ignition, &Tolerances::default()).unwrap();
+    assert_eq!(found.failures, ["the verdicts differ: landed and not landed"]);
+    let tolerated = Tolerances::from_toml("verdict = false", "t.toml").unwrap();
+    assert!(compare(&a, &b, Align::Ignition, &tolerated).unwrap().failures.is_empty());
+}
+
+fn export(flight: &Simulated, format: TableFormat, name: &str) -> std::path::PathBuf {
+    let directory = flight.beside(name);
+    let mut log = FlightLog::open(&flight.log).unwrap();
+    export_tables(&mut log, format, &directory).unwrap();
+    directory
+}
+
+/// Every number of the CSV reads back as the recorded one.
+#[test]
+fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
+    let directory = export(&NOMINAL, TableFormat::Csv, "csv");
+    let text = read_text(&directory.join("controller_tick.csv"));
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| names.iter().position(|known| *known == name).unwrap();
+    let (gimbal, u, fin) = (
+        column("output.gimbal_command_rad"),
+        column("input.state.u_m_s"),
+        column("output.fin_4_command_rad"),
+    );
+    let recording = NOMINAL.recording();
+    let mut count = 0;
+    for (line, tick) in lines.zip(&recording.ticks) {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert_eq!(cells.len(), names.len());
+        let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
+        assert_eq!(number(gimbal), tick.output.gimbal_command_rad.to_bits());
+        assert_eq!(number(u), tick.input.state.u_m_s.to_bits());
+        assert_eq!(number(fin), tick.output.fin_command_rad[3].to_bits());
+        count += 1;
+    }
+    assert_eq!(count, recording.ticks.len());
+    assert!(read_text(&directory.join("events.csv")).contains("phase "));
+    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 7);
+}
+
+#[test]
+fn the_parquet_holds_the_recorded_numbers_bit_for_bit() {
+    let directory = export(&DISPERSED, TableFormat::Parquet, "parquet");
+    let file = std::fs::File::open(directory.join("vehicle_truth.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let recording = DISPERSED.recording();
+    let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), recording.truth.len());
+    for (row, truth) in rows.iter().zip(&recording.truth) {
+        let field = |name: &str| {
+            let found = row.get_column_iter().find(|(known, _)| *known == name).unwrap();
+            match found.1 {
+                parquet::record::Field::Double(number) => number.to_bits(),
+                other => panic!("{name}: {other:?}"),
+            }
+        };
+        assert_eq!(field("state.z_m"), truth.state.z_m.to_bits());
+        assert_eq!(field("thrust_n"), truth.thrust_n.to_bits());
+        assert_eq!(field("time_s"), truth.time_s.to_bits());
+    }
+}
+
+fn tlog(flight: &Simulated, name: &str) -> std::path::PathBuf {
+    let path = flight.beside(name);
+    export_tlog(&|| FlightLog::open(&flight.log), None, &path).unwrap();
+    path
+}
+
+/// Out as a `.tlog` and in again: the same frames, and what a ground station would have known.
+#[test]
+fn a_tlog_goes_out_and_comes_in_again() {
+    let path = tlog(&WITH_FRAMES, "out.tlog");
+    let imported_path = WITH_FRAMES.beside("imported.mcap");
+    let imported = import_tlog(&path, &imported_path).unwrap();
+    assert!(imported.frames > 100 && imported.telemetry > 20, "{imported:?}");
+    assert_eq!((imported.not_understood, imported.mavlink1, imported.garbage_bytes), (0, 0, 0));
+    let again = WITH_FRAMES.beside("again.tlog");
+    export_tlog(&|| FlightLog::open(&imported_path), None, &again).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&again).unwrap());
+
+    let facts = info(&imported_path).unwrap();
+    assert_eq!(facts.grade.level, GradeLevel::TelemetryOnly);
+    let (then, now) = (Recording::open(&WITH_FRAMES.log).unwrap(), Recording::open(&imported_path).unwrap());
+    let (then, now) = (then.verdict.unwrap(), now.verdict.unwrap());
+    assert_eq!((then.landed, then.limits.len()), (now.landed, now.limits.len()));
+    for (a, b) in then.limits.iter().zip(&now.limits) {
+        // Single precision over the air.
+        let near = |x: f64, y: f64| (x - y).abs() <= 1e-5 * (1.0 + x.abs());
+        assert!(a.name == b.name && near(a.value, b.value) && near(a.maximum, b.maximum), "{a:?} {b:?}");
+    }
+    assert_eq!(verify(&imported_path).unwrap().outcome, Outcome::NotReplayable);
+    // Into a file that is there it does not go.
+    assert!(matches!(import_tlog(&path, &imported_path), Err(ImportError::Create { .. })));
+}
+
+#[test]
+fn a_tlog_is_found_between_garbage() {
+    let clean = std::fs::read(tlog(&WITH_FRAMES, "clean.tlog")).unwrap();
+    let mut dirty = vec![0x00, 0xfd, 0x11];
+    dirty.extend(&clean);
+    dirty.extend([0xfd; 5]);
+    let path = WITH_FRAMES.beside("dirty.tlog");
+    std::fs::write(&path, dirty).unwrap();
+    let imported = import_tlog(&path, &WITH_FRAMES.beside("dirty.mcap")).unwrap();
+    assert_eq!((imported.not_understood, imported.garbage_bytes), (0, 8));
+    std::fs::write(&path, b"no frames here at all, only text").unwrap();
+    let refused = import_tlog(&path, &WITH_FRAMES.beside("none.mcap")).unwrap_err();
+    assert!(matches!(refused, ImportError::NoFrames { .. }));
+    let error = export_tlog(&|| FlightLog::open(&NOMINAL.log), None, &NOMINAL.beside("no.tlog")).unwrap_err();
+    assert!(error.to_string().contains("no raw MAVLink frames"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_bytes_are_no_tlog(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+        let directory = tempfile::tempdir().unwrap();
+        let (input, output) = (directory.path().join("in.tlog"), directory.path().join("out.mcap"));
+        std::fs::write(&input, &bytes).unwrap();
+        if let Ok(imported) = import_tlog(&input, &output) {
+            prop_assert!(imported.frames > 0);
+            prop_assert!(info(&output).is_ok());
+        }
+    }
+}

@@ -1,0 +1,62 @@
+"""MAVSDK 3.x with its server against a vehicle that speaks to 127.0.0.1:PORT.
+
+Usage: mavsdk_grpc.py PORT GRPC_PORT.
+"""
+
+import asyncio
+import sys
+
+from mavsdk import System
+from mavsdk.action import ActionError
+
+PATIENCE_S = 60
+
+
+def check(fact, holds):
+    assert holds, fact
+    print("ok", fact, flush=True)
+
+
+async def first(stream, wanted):
+    async for item in stream:
+        if wanted(item):
+            return item
+    raise AssertionError("the stream has ended")
+
+
+async def within(what, awaitable):
+    found = await asyncio.wait_for(awaitable, PATIENCE_S)
+    print("ok", what, flush=True)
+    return found
+
+
+async def refused(awaitable):
+    try:
+        await awaitable
+    except ActionError as error:
+        return str(error)
+    return None
+
+
+async def main():
+    port, grpc_port = sys.argv[1:3]
+    drone = System(port=int(grpc_port))
+    await within("connected", drone.connect(system_address=f"udpin://127.0.0.1:{port}"))
+    await within("found", first(drone.core.connection_state(), lambda state: state.is_connected))
+    attitude = drone.telemetry.attitude_quaternion()
+    await within("the attitude is upright", first(attitude, lambda a: abs(a.y - 0.7071) < 0.01))
+    check("a parameter is read", await drone.param.get_param_float("NMPC_W_THETA") == 150)
+    everything = await within("all parameters", drone.param.get_all_params())
+    check("all of them are floats", len(everything.float_params) > 20 and not everything.int_params)
+    check("a takeoff is refused", await refused(drone.action.takeoff()))
+    await asyncio.sleep(2)
+    await within("arm", drone.action.arm())
+    await within("armed, as HEARTBEAT says", first(drone.telemetry.armed(), lambda armed: armed))
+    await within("disarm", drone.action.disarm())
+    await within("disarmed, as HEARTBEAT says", first(drone.telemetry.armed(), lambda armed: not armed))
+    await within("terminate", drone.action.terminate())
+    check("arming is refused afterwards", await refused(drone.action.arm()))
+    print("ALL OK", flush=True)
+
+
+asyncio.run(main())

@@ -1,0 +1,95 @@
+// node-mavlink against a vehicle that speaks to 127.0.0.1:PORT.
+//
+// Usage: node node_client.mjs PORT, in the folder that node-mavlink is installed in.
+
+import { createRequire } from 'node:module'
+import { createSocket } from 'node:dgram'
+import { PassThrough } from 'node:stream'
+import { pathToFileURL } from 'node:url'
+
+const require = createRequire(pathToFileURL(process.cwd() + '/'))
+const { MavLinkPacketSplitter, MavLinkPacketParser, MavLinkProtocolV2, minimal, common } = require('node-mavlink')
+
+const PATIENCE_MS = 30_000
+const REGISTRY = { ...minimal.REGISTRY, ...common.REGISTRY }
+const port = Number(process.argv[2])
+const socket = createSocket('udp4')
+const bytes = new PassThrough()
+const packets = bytes.pipe(new MavLinkPacketSplitter()).pipe(new MavLinkPacketParser())
+const protocol = new MavLinkProtocolV2(255, 190)
+const waiting = []
+let vehicle
+let sequence = 0
+
+socket.on('message', (datagram, from) => {
+  vehicle = from
+  bytes.write(datagram)
+})
+packets.on('data', packet => {
+  const clazz = REGISTRY[packet.header.msgid]
+  if (!clazz) return
+  const data = packet.protocol.data(packet.payload, clazz)
+  for (const entry of [...waiting]) {
+    if (packet.header.sysid === 1 && entry.clazz === clazz && entry.wanted(data)) {
+      waiting.splice(waiting.indexOf(entry), 1)
+      entry.resolve(data)
+    }
+  }
+})
+
+function message(clazz, wanted = () => true) {
+  return new Promise((resolve, reject) => {
+    waiting.push({ clazz, wanted, resolve })
+    setTimeout(() => reject(new Error(`waited in vain for ${clazz.MSG_NAME}`)), PATIENCE_MS).unref()
+  })
+}
+
+function send(data) {
+  const packet = protocol.serialize(data, sequence++ & 255)
+  socket.send(packet, vehicle.port, vehicle.address)
+}
+
+async function command(number, param1) {
+  const request = new common.CommandLong()
+  request.command = number
+  request._param1 = param1
+  request.targetSystem = 1
+  request.targetComponent = 1
+  const answer = message(common.CommandAck, ack => ack.command === number)
+  send(request)
+  return (await answer).result
+}
+
+function check(fact, holds) {
+  if (!holds) throw new Error(fact)
+  console.log('ok', fact)
+}
+
+socket.bind(port, '127.0.0.1', async () => {
+  try {
+    const beat = await message(minimal.Heartbeat)
+    check('the vehicle is a rocket', beat.type === minimal.MavType.ROCKET)
+    const attitude = await message(common.AttitudeQuaternion)
+    check('upright', Math.abs(attitude.q1 - Math.SQRT1_2) < 0.02)
+    await message(minimal.Heartbeat, data => data.customMode === 1)
+    check('START before arming is denied', (await command(300, 0)) === 2)
+    check('an unknown command is unsupported', (await command(31000, 0)) === 3)
+    const list = new common.ParamRequestList()
+    list.targetSystem = 1
+    list.targetComponent = 1
+    const value = message(common.ParamValue)
+    send(list)
+    check('parameters are REAL32', (await value).paramType === 9)
+    await message(common.SysStatus, data => (Number(data.onboardControlSensorsHealth) & 0x10000000) !== 0)
+    check('arm is accepted', (await command(400, 1)) === 0)
+    await message(minimal.Heartbeat, data => (data.baseMode & 128) !== 0)
+    check('HEARTBEAT says armed', true)
+    check('termination is accepted', (await command(185, 1)) === 0)
+    check('arming is refused afterwards', (await command(400, 1)) !== 0)
+    console.log('ALL OK')
+    process.exit(0)
+  } catch (error) {
+    console.error(error.message)
+    process.exit(1)
+  }
+})

@@ -1,0 +1,146 @@
+//! From the plant's state to the screen's model: how old a value is when the ground knows it.
+//!
+//! `cargo bench -p e2e --bench latency`. A landing is flown in real time by the vehicle's own run loop; the ground's
+//! own links and model receive it. At each controller tick the vehicle's state is noted with the time; the message that
+//! carries that state is found in the ground by its time since boot. Both clocks are this process's one.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use e2e::SerialLine;
+use ground::app::clock::{Clock, LogTime};
+use ground::app::wire::Wire;
+use ground::model::{Model, Settings};
+use ground::update::{Action, Msg, update};
+use onboard_sim::fly::{FlyOptions, Speed, fly_observed, load_profile};
+use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::dialect::MavMessage;
+use protocol::transport::Endpoint;
+use tokio::sync::watch;
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+/// When each tick was, by milliseconds since boot.
+type Ticks = Arc<Mutex<BTreeMap<u32, Instant>>>;
+
+#[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// Flies in a thread of its own, as a vehicle would.
+fn start_vehicle(
+    link: Endpoint,
+    ticks: &Ticks,
+) -> Result<std::thread::JoinHandle<Result<(), Failure>>, Failure> {
+    let ticks = Arc::clone(ticks);
+    let options = FlyOptions {
+        profile: load_profile("paper-calibrated")?,
+        links: vec![link],
+        key_file: None,
+        recorder: None,
+        seed: 1,
+        speed: Speed::Factor(1.0),
+        auto_start: true,
+        exit_when_safed: true,
+        deadline_policy: DeadlinePolicy::Observe,
+        log_clock: None,
+    };
+    let fly = move || -> Result<(), Failure> {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let (_stop, stopped) = watch::channel(false);
+        let observe = move |time_s: f64, event: &VehicleEvent| {
+            if matches!(event, VehicleEvent::Tick(_)) {
+                let boot_ms = (1_000.0 * time_s).round() as u32;
+                ticks.lock().unwrap_or_else(PoisonError::into_inner).insert(boot_ms, now());
+            }
+        };
+        runtime.block_on(Box::pin(fly_observed(options, stopped, observe)))?;
+        Ok(())
+    };
+    Ok(std::thread::Builder::new().name("vehicle".to_owned()).spawn(fly)?)
+}
+
+/// Milliseconds since boot of the two messages that carry the state.
+fn boot_ms_of(message: &MavMessage) -> Option<u32> {
+    match message {
+        MavMessage::ATTITUDE_QUATERNION(data) => Some(data.time_boot_ms),
+        MavMessage::LOCAL_POSITION_NED(data) => Some(data.time_boot_ms),
+        _ => None,
+    }
+}
+
+/// Receives with the ground's own links and model until the vehicle is silent for a while; returns the latencies.
+async fn receive(listening: Endpoint, vehicle: Endpoint) -> Result<Vec<Duration>, Failure> {
+    let clock = Clock::start();
+    let mut wire = Wire::open(vec![listening], None, clock, None, LogTime::Run(clock)).await?;
+    let ticks = Ticks::default();
+    let vehicle = start_vehicle(vehicle, &ticks)?;
+    let mut model = Model::new(Settings {
+        link_name: String::new(),
+        link_capacity_bytes_s: None,
+        log_path: None,
+        auto: false,
+        interactive: true,
+        time_limit: None,
+    });
+    let mut latencies = Vec::new();
+    let mut beat = tokio::time::interval(Duration::from_millis(100));
+    while !vehicle.is_finished() {
+        let msgs = tokio::select! {
+            received = wire.receive() => wire.take(received),
+            _ = beat.tick() => vec![Msg::Tick],
+        };
+        for msg in msgs {
+            let boot_ms = match &msg {
+                Msg::Frame(frame) => frame.decode().ok().as_ref().and_then(boot_ms_of),
+                _ => None,
+            };
+            for action in update(&mut model, msg, clock.now()) {
+                if let Action::Send(message) = action {
+                    wire.send(&message);
+                }
+            }
+            let known_at = now();
+            let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(was_at) = boot_ms.and_then(|boot_ms| ticks.get(&boot_ms)) {
+                latencies.push(known_at.saturating_duration_since(*was_at));
+            }
+        }
+    }
+    vehicle.join().map_err(|_panic| "the vehicle's thread has panicked")??;
+    Ok(latencies)
+}
+
+fn report(name: &str, mut latencies: Vec<Duration>) -> std::io::Result<()> {
+    latencies.sort();
+    let at = |percent: usize| {
+        latencies.get((latencies.len().max(1) - 1) * percent / 100).copied().unwrap_or_default()
+    };
+    writeln!(
+        std::io::stdout(),
+        "{name:<14} {} values: median {:?}, 99 % within {:?}, worst {:?}",
+        latencies.len(),
+        at(50),
+        at(99),
+        at(100)
+    )
+}
+
+fn main() -> Result<(), Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let port = std::net::UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+    let udp = runtime.block_on(receive(
+        format!("udpin:127.0.0.1:{port}").parse()?,
+        format!("udpout:127.0.0.1:{port}").parse()?,
+    ))?;
+    report("udp", udp)?;
+    for baud in [57_600, 115_200] {
+        let line = SerialLine::new(baud);
+        let [near, far] = [&line.near, &line.far].map(|device| format!("serial:{}:{baud}", device.display()));
+        let serial = runtime.block_on(receive(far.parse()?, near.parse()?))?;
+        report(&format!("serial {baud}"), serial)?;
+    }
+    Ok(())
+}
