@@ -52,6 +52,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         _ => {}
     }
     let config = Config::load(cli.config.as_deref())?;
+    // Who names a link means that link, not the station that may run already.
+    let may_attach = cli.connect.is_empty() && !cli.demo;
     let mut cli = cli.clone();
     config.fill(&mut cli);
     let (cli, config) = (&cli, &config);
@@ -66,7 +68,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
             }
             (Some(Command::Daemon), _) => session(cli, config, false).await,
             (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
-            (_, None) if interactive && !cli.demo && station_runs(cli).await => {
+            (_, None) if interactive && may_attach && station_runs(cli).await => {
                 attached::session(&cli.socket_path(), false, config, interactive).await
             }
             (_, None) => session(cli, config, interactive).await,
