@@ -4,49 +4,90 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
+use protocol::dialect::TdPhase;
 use protocol::transport::Endpoint;
 
+use crate::attach::place;
 use crate::demo::Speed;
 use crate::exit;
+use crate::model::words;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
 /// Without --connect it flies a demonstration: a simulated vehicle in this process, on real MAVLink over a
 /// loopback UDP socket. On a terminal it shows the full screen (? lists the keys); without one, a line an
 /// event, the landing verdict at the end, and the exit code says how it went.
-#[derive(Debug, Parser)]
+#[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP)]
 pub struct Cli {
+    /// What to be instead of a station with its screen.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
     /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
-    #[arg(long, value_name = "LINK")]
+    #[arg(long, value_name = "LINK", global = true)]
     pub connect: Vec<Endpoint>,
 
     /// Sign every frame with this key, and believe nothing that is not signed with it. `onboard-sim keygen` makes one.
-    #[arg(long, value_name = "FILE", requires = "connect")]
+    #[arg(long, value_name = "FILE", global = true)]
     pub key: Option<PathBuf>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
-    #[arg(long, value_name = "FILE|none")]
+    #[arg(long, value_name = "FILE|none", global = true)]
     pub log: Option<LogChoice>,
 
     /// Demonstration: built-in profile or TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "paper-calibrated", conflicts_with = "connect")]
+    #[arg(
+        long,
+        value_name = "NAME|FILE",
+        default_value = "paper-calibrated",
+        conflicts_with = "connect",
+        global = true
+    )]
     pub profile: String,
 
     /// Demonstration: seed of the profile's dispersions.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect")]
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect", global = true)]
     pub seed: u64,
 
     /// Demonstration: speed of simulated time, a factor or `max`.
-    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect")]
+    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect", global = true)]
     pub speed: Speed,
 
+    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
+    ///
+    /// Default: with --connect the log's name with this ending; the demonstration writes none.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub tlog: Option<LogChoice>,
+
+    /// Settings file (TOML); `ground config example` prints one.
+    ///
+    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub config: Option<PathBuf>,
+
+    /// Fly the demonstration although the settings name a link.
+    #[arg(long, conflicts_with = "connect", global = true)]
+    pub demo: bool,
+
+    /// Show a recorded flight (MCAP, or .tlog by its name) on the same screens instead.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "seed", "speed"])]
+    pub replay: Option<PathBuf>,
+
+    /// Replay: where to begin, seconds since its first frame or a phase as in `POWERED`.
+    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
+    pub from: Option<ReplayFrom>,
+
+    /// Socket between a station and its screens; by default this user's own.
+    #[arg(long, value_name = "PATH", global = true)]
+    pub socket: Option<PathBuf>,
+
     /// Arm and start without a hand. The demonstration without a screen always does.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub auto: bool,
 
     /// Lines instead of the full screen, also on a terminal.
@@ -58,6 +99,43 @@ pub struct Cli {
     /// Default: 120 s where the flight is started automatically, otherwise never.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub timeout_s: Option<Seconds>,
+}
+
+/// What `ground` can be besides a station with its screen.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Command {
+    /// A station without a screen: holds the link, records, and serves screens until it is told to end (SIGTERM).
+    ///
+    /// It outlives every screen, and the session it was started from.
+    Daemon,
+    /// A screen for a station that runs elsewhere on this machine. Quitting leaves the station as it is.
+    Attach {
+        /// Show only; command nothing.
+        #[arg(long)]
+        watch: bool,
+    },
+    /// The settings file.
+    Config {
+        /// What to do with it.
+        #[command(subcommand)]
+        command: ConfigCommand,
+    },
+    /// Print a shell's completions.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    Man,
+}
+
+/// What can be done with the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+pub enum ConfigCommand {
+    /// Say whether they are understood, and what they are.
+    Check,
+    /// Print a file with every key, its meaning and its default.
+    Example,
 }
 
 /// Where the log goes.
@@ -81,6 +159,29 @@ impl FromStr for LogChoice {
     }
 }
 
+/// Where a replay begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReplayFrom {
+    /// Time since its first frame.
+    Time(Duration),
+    /// The begin of this phase.
+    Phase(TdPhase),
+}
+
+impl FromStr for ReplayFrom {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if let Some(phase) = words::phase_from_name(given) {
+            return Ok(Self::Phase(phase));
+        }
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(Self::Time(Duration::from_secs_f64(seconds))),
+            _ => Err(format!("`{given}` is neither seconds from 0 to 1000000 nor a phase as in POWERED")),
+        }
+    }
+}
+
 /// A time limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Seconds(pub Duration);
@@ -97,6 +198,11 @@ impl FromStr for Seconds {
 }
 
 impl Cli {
+    /// The socket of the station.
+    pub fn socket_path(&self) -> PathBuf {
+        self.socket.clone().unwrap_or_else(place::default_path)
+    }
+
     /// Whether the flight is started without a hand.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
         self.auto || (self.connect.is_empty() && !interactive)

@@ -15,6 +15,22 @@ pub enum Key {
     Backspace,
     /// F1.
     F1,
+    /// Arrow up.
+    Up,
+    /// Arrow down.
+    Down,
+    /// Arrow left.
+    Left,
+    /// Arrow right.
+    Right,
+    /// A page up.
+    PageUp,
+    /// A page down.
+    PageDown,
+    /// To the start.
+    Home,
+    /// To the end.
+    End,
     /// Ctrl-C.
     CtrlC,
     /// Ctrl-L.
@@ -30,8 +46,8 @@ impl Key {
             return None;
         }
         // A held key is one press, where the terminal tells repeats apart: neither an abort nor a
-        // confirmed question. Taking letters back may go on.
-        if event.kind == KeyEventKind::Repeat && event.code != KeyCode::Backspace {
+        // confirmed question. Taking letters back and scrolling may go on.
+        if event.kind == KeyEventKind::Repeat && !may_repeat(event.code) {
             return None;
         }
         if event.modifiers.contains(KeyModifiers::ALT) {
@@ -51,6 +67,14 @@ impl Key {
             KeyCode::Esc => Some(Self::Escape),
             KeyCode::Backspace => Some(Self::Backspace),
             KeyCode::F(1) => Some(Self::F1),
+            KeyCode::Up => Some(Self::Up),
+            KeyCode::Down => Some(Self::Down),
+            KeyCode::Left => Some(Self::Left),
+            KeyCode::Right => Some(Self::Right),
+            KeyCode::PageUp => Some(Self::PageUp),
+            KeyCode::PageDown => Some(Self::PageDown),
+            KeyCode::Home => Some(Self::Home),
+            KeyCode::End => Some(Self::End),
             _ => None,
         }
     }
@@ -64,11 +88,33 @@ impl Key {
             Self::Escape => "Esc".to_owned(),
             Self::Backspace => "Backspace".to_owned(),
             Self::F1 => "F1".to_owned(),
+            Self::Up => "Up".to_owned(),
+            Self::Down => "Down".to_owned(),
+            Self::Left => "Left".to_owned(),
+            Self::Right => "Right".to_owned(),
+            Self::PageUp => "PgUp".to_owned(),
+            Self::PageDown => "PgDn".to_owned(),
+            Self::Home => "Home".to_owned(),
+            Self::End => "End".to_owned(),
             Self::CtrlC => "Ctrl-C".to_owned(),
             Self::CtrlL => "Ctrl-L".to_owned(),
             Self::CtrlX => "Ctrl-X".to_owned(),
         }
     }
+}
+
+/// Keys that a person holds down on purpose.
+fn may_repeat(code: KeyCode) -> bool {
+    matches!(
+        code,
+        KeyCode::Backspace
+            | KeyCode::Up
+            | KeyCode::Down
+            | KeyCode::Left
+            | KeyCode::Right
+            | KeyCode::PageUp
+            | KeyCode::PageDown
+    )
 }
 
 #[cfg(test)]

@@ -25,6 +25,11 @@ impl Lines {
         Self::default()
     }
 
+    /// Nobody reads them.
+    pub fn closed() -> Self {
+        Self { seen: 0, closed: true }
+    }
+
     /// Prints the events that were not printed yet. A reader that has gone away ends the lines, not the flight.
     pub fn show(&mut self, model: &Model) {
         if self.closed || self.seen == model.events.total() {

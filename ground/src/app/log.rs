@@ -13,28 +13,51 @@ use crate::cli::LogChoice;
 /// Logs of the same second, at most.
 const SAME_SECOND_MAX: u32 = 100;
 
-/// Opens the log that was asked for; `Ok(None)` if none was wanted.
+/// Opens the log that was asked for, and the telemetry log beside it; `Ok(None)` if none was wanted.
 ///
 /// # Errors
-/// The file exists or cannot be made.
-pub fn open(choice: Option<&LogChoice>, header: &LogHeader) -> anyhow::Result<Option<Recorder>> {
+/// A file exists or cannot be made, or a telemetry log is wanted without a log.
+pub fn open(
+    choice: Option<&LogChoice>,
+    tlog: Option<&LogChoice>,
+    header: &LogHeader,
+) -> anyhow::Result<Option<Recorder>> {
     match choice {
-        Some(LogChoice::None) => Ok(None),
-        Some(LogChoice::File(path)) => Ok(Some(Recorder::create(path, header)?)),
-        None => open_named_by_time(Path::new(""), header).map(Some),
+        Some(LogChoice::None) => {
+            let alone = matches!(tlog, Some(LogChoice::File(_)));
+            anyhow::ensure!(!alone, "--tlog writes beside a log; leave --log none out");
+            Ok(None)
+        }
+        Some(LogChoice::File(path)) => {
+            Ok(Some(Recorder::create_with_tlog(path, tlog_path(tlog, path).as_deref(), header)?))
+        }
+        None => open_named_by_time(Path::new(""), tlog, header).map(Some),
     }
 }
 
-fn open_named_by_time(directory: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
+/// The telemetry log that was named, or the log's name with the other ending.
+fn tlog_path(tlog: Option<&LogChoice>, log: &Path) -> Option<PathBuf> {
+    match tlog {
+        None => Some(log.with_extension("tlog")),
+        Some(LogChoice::None) => None,
+        Some(LogChoice::File(path)) => Some(path.clone()),
+    }
+}
+
+fn open_named_by_time(
+    directory: &Path,
+    tlog: Option<&LogChoice>,
+    header: &LogHeader,
+) -> anyhow::Result<Recorder> {
     let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
         .context("the system's clock shows no date")?;
     let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
     for number in 1..=SAME_SECOND_MAX {
         let suffix = if number == 1 { String::new() } else { format!("-{number}") };
         let path = directory.join(format!("touchdown-{stamp}{suffix}.mcap"));
-        match Recorder::create(&path, header) {
-            Err(RecorderError::Create { source, .. })
-                if source.kind() == std::io::ErrorKind::AlreadyExists => {}
+        match Recorder::create_with_tlog(&path, tlog_path(tlog, &path).as_deref(), header) {
+            Err(RecorderError::Create { path: refused, source })
+                if refused == path && source.kind() == std::io::ErrorKind::AlreadyExists => {}
             other => return Ok(other?),
         }
     }
@@ -84,7 +107,8 @@ mod tests {
         let header = LogHeader { start_unix_ns: 1_800_000_000_000_000_000, ..LogHeader::default() };
         let names: Vec<String> = (0..3)
             .map(|_| {
-                let recorder = open_named_by_time(directory.path(), &header).unwrap();
+                let recorder = open_named_by_time(directory.path(), None, &header).unwrap();
+                assert!(recorder.tlog_path().unwrap().with_extension("mcap") == recorder.path());
                 recorder.finish().unwrap().file_name().unwrap().to_string_lossy().into_owned()
             })
             .collect();

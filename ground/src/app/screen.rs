@@ -1,6 +1,7 @@
 //! The full screen: the terminal's state, its keys, and when it is drawn.
 
 use std::io;
+use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -19,26 +20,35 @@ use ratatui::DefaultTerminal;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 
+use crate::config::{Characters, Colour, Config};
 use crate::key::Key;
 use crate::model::Model;
 use crate::update::Msg;
 use crate::view::theme::Theme;
 use crate::view::view;
 
-/// At most ten frames a second.
+/// At most ten frames a second, while it matters.
 const FRAME: Duration = Duration::from_millis(100);
+/// On the pad and after a flight, for what only the radio brings: a slow line has other things to carry.
+const CALM_FRAME: Duration = Duration::from_millis(500);
 /// Ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
+
+/// Why a screen ends without a signal.
+pub const GONE: &str = "the terminal is gone";
 
 /// What was pushed must be popped, by whichever way the screen ends.
 static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
 pub struct Screen {
-    terminal: DefaultTerminal,
+    /// Never dropped: its own clean-up prints when the terminal is gone, and printing to a terminal that is
+    /// gone panics. [`restore`] does what it would do.
+    terminal: ManuallyDrop<DefaultTerminal>,
     events: EventStream,
     theme: Theme,
-    changed: bool,
+    bell: bool,
+    wait: Duration,
     drawn_at: Option<Duration>,
     input_ended: bool,
 }
@@ -48,29 +58,47 @@ impl Screen {
     ///
     /// # Errors
     /// It is none, or refuses.
-    pub fn open() -> anyhow::Result<Self> {
-        let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    pub fn open(config: &Config) -> anyhow::Result<Self> {
         restore_before_panic_message();
         let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
-            terminal,
+            terminal: ManuallyDrop::new(terminal),
             events: EventStream::new(),
-            theme: Theme { colour: !no_colour },
-            changed: true,
+            theme: theme(config),
+            bell: config.bell.unwrap_or(true),
+            wait: Duration::ZERO,
             drawn_at: None,
             input_ended: false,
         })
     }
 
-    /// Something to see has changed.
+    /// Something to see has changed, and a person waits for it.
     pub fn mark_changed(&mut self) {
-        self.changed = true;
+        self.wait = self.wait.min(FRAME);
+    }
+
+    /// Something to see has changed that can wait a moment.
+    pub fn mark_changed_calmly(&mut self) {
+        self.wait = self.wait.min(CALM_FRAME);
+    }
+
+    /// A message was taken into the model: how soon it must be seen.
+    pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
+        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
+        match msg {
+            // Time and what was sent change nothing that must be seen before the next second.
+            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
+            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
+                self.mark_changed();
+            }
+            Msg::Frame(_) | Msg::Received { .. } => self.mark_changed_calmly(),
+            _ => self.mark_changed(),
+        }
     }
 
     /// When the next frame is due.
     pub fn redraw_at(&self) -> Duration {
-        let wait = if self.changed { FRAME } else { IDLE_FRAME };
-        self.drawn_at.map_or(Duration::ZERO, |at| at + wait)
+        self.drawn_at.map_or(Duration::ZERO, |at| at + self.wait)
     }
 
     /// Draws if a frame is due.
@@ -78,11 +106,19 @@ impl Screen {
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration) -> io::Result<()> {
+        self.show_at(model, now, now)
+    }
+
+    /// Draws if a frame is due, as it was at another time: ages count from there.
+    ///
+    /// # Errors
+    /// The terminal cannot be written.
+    pub fn show_at(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
         if now < self.redraw_at() {
             return Ok(());
         }
-        self.terminal.draw(|frame| view(model, self.theme, now, frame))?;
-        self.changed = false;
+        self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
+        self.wait = IDLE_FRAME;
         self.drawn_at = Some(now);
         Ok(())
     }
@@ -91,7 +127,22 @@ impl Screen {
     pub fn clear(&mut self) {
         // If the terminal cannot be cleared, drawing fails next and says why.
         let _ = self.terminal.clear();
-        self.changed = true;
+        self.mark_changed();
+    }
+
+    /// Whether the terminal tells a held key's repeats from presses.
+    pub fn tells_repeats(&self) -> bool {
+        KEYBOARD_ENHANCED.load(Ordering::Relaxed)
+    }
+
+    /// Rings the terminal's bell.
+    pub fn bell(&self) {
+        if !self.bell {
+            return;
+        }
+        let mut out = io::stdout();
+        // A terminal that is gone shows by the next frame.
+        let _ = io::Write::write_all(&mut out, b"\x07").and_then(|()| io::Write::flush(&mut out));
     }
 
     /// The next thing done at the terminal.
@@ -106,11 +157,11 @@ impl Screen {
                         return Msg::Key(key);
                     }
                 }
-                Some(Ok(Event::Resize(..))) => self.changed = true,
+                Some(Ok(Event::Resize(..))) => self.mark_changed(),
                 Some(Ok(_)) => {}
                 Some(Err(_)) | None => {
                     self.input_ended = true;
-                    return Msg::Terminate("the terminal is gone");
+                    return Msg::Terminate(GONE);
                 }
             }
         }
@@ -121,6 +172,22 @@ impl Drop for Screen {
     fn drop(&mut self) {
         restore();
     }
+}
+
+/// What the settings say; else the environment.
+fn theme(config: &Config) -> Theme {
+    let found = Theme::of_environment(|name| std::env::var(name).ok());
+    let colour = match config.colour {
+        Colour::Auto => found.colour,
+        Colour::Always => true,
+        Colour::Never => false,
+    };
+    let ascii = match config.characters {
+        Characters::Auto => found.ascii,
+        Characters::Unicode => false,
+        Characters::Ascii => true,
+    };
+    Theme { colour, ascii }
 }
 
 fn take_terminal() -> io::Result<DefaultTerminal> {

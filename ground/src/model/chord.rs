@@ -3,7 +3,8 @@
 //! Many terminals send a held key as the same bytes over and over: once at the press, again after the
 //! keyboard's delay (a quarter of a second and more), then every few hundredths of a second. The first
 //! repeat looks exactly like a second press; what follows it does not. So the second press counts only
-//! once nothing has followed it for [`REPEATS_WITHIN`], and a hold, however long, is one press.
+//! once nothing has followed it for [`REPEATS_WITHIN`], and a hold, however long, is one press. A terminal that
+//! tells repeats apart lets the second press count at once.
 
 use std::time::Duration;
 

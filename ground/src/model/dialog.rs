@@ -16,8 +16,6 @@ pub const QUIT_TIME_LIMIT: Duration = Duration::from_secs(3);
 pub enum Dialog {
     /// None.
     Closed,
-    /// The keys, explained.
-    Help,
     /// Second step of arming: the word is typed.
     Arm {
         /// What was typed so far.
@@ -46,7 +44,7 @@ impl Dialog {
     /// When the dialog closes by itself.
     pub fn until(&self) -> Option<Duration> {
         match self {
-            Self::Closed | Self::Help => None,
+            Self::Closed => None,
             Self::Arm { until, .. }
             | Self::Start { until }
             | Self::Disarm { until }

@@ -1,12 +1,18 @@
 //! Everything the ground knows, as plain data.
 
+pub mod alarm;
 pub mod chord;
 pub mod command;
 pub mod dialog;
 pub mod events;
+pub mod history;
 pub mod link;
 pub mod outcome;
+pub mod page;
+pub mod parameters;
+pub mod reckoning;
 pub mod telemetry;
+pub mod too_late;
 pub mod vehicle;
 pub mod words;
 
@@ -16,12 +22,16 @@ use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
 use crate::update::Action;
+use alarm::Alarms;
 use chord::AbortChord;
 use command::Commands;
 use dialog::Dialog;
 use events::{Events, Speaker};
+use history::History;
 use link::Link;
 use outcome::Outcome;
+use page::{Page, Pages};
+use parameters::Parameters;
 use vehicle::Vehicle;
 
 /// What the run was asked to be; never changes during it.
@@ -33,12 +43,54 @@ pub struct Settings {
     pub link_capacity_bytes_s: Option<u32>,
     /// The log's path; `None` without a log.
     pub log_path: Option<String>,
+    /// The telemetry log's path (`.tlog`); `None` without one.
+    pub tlog_path: Option<String>,
+    /// What this screen may do.
+    pub role: Role,
     /// Arm and start without a hand.
     pub auto: bool,
     /// Someone watches a screen: the end of a flight does not end the program.
     pub interactive: bool,
     /// Give up after this long without the end of a flight; without a screen only.
     pub time_limit: Option<Duration>,
+}
+
+/// What this screen may do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Role {
+    /// Holds the link: commands go out here.
+    #[default]
+    Station,
+    /// Shows a station that runs elsewhere, and hands it the crew's commands.
+    Attached,
+    /// Shows a station that runs elsewhere; commands nothing.
+    Watching,
+    /// Shows a recorded flight; there is nothing to command.
+    Replaying,
+}
+
+impl Role {
+    /// Why this screen commands nothing; `None` if it may.
+    pub fn why_not_command(self) -> Option<&'static str> {
+        match self {
+            Self::Station | Self::Attached => None,
+            Self::Watching => Some("this screen only watches (--watch)"),
+            Self::Replaying => Some("a replay commands nothing"),
+        }
+    }
+}
+
+/// Where a replay is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Playing {
+    /// Time since the first frame.
+    pub position: Duration,
+    /// Time of the last frame.
+    pub length: Duration,
+    /// Flight time per real time.
+    pub speed: f64,
+    /// Time stands still.
+    pub paused: bool,
 }
 
 /// How the log does.
@@ -90,12 +142,25 @@ pub struct Model {
     pub dialog: Dialog,
     /// How far the abort chord is.
     pub abort_chord: AbortChord,
+    /// The terminal tells a held key's repeats from presses, so that none of them arrives here.
+    pub repeats_told: bool,
     /// What happened.
     pub events: Events,
     /// What became of the flight.
     pub outcome: Outcome,
     /// How the log does.
     pub log: LogHealth,
+    /// What must be seen, and whether it was.
+    pub alarms: Alarms,
+    /// Which screen is shown.
+    pub pages: Pages,
+    /// Timeline and greatest values.
+    pub history: History,
+    /// The vehicle's parameters.
+    pub parameters: Parameters,
+    /// Where a replay is; `None` for a live flight.
+    pub playing: Option<Playing>,
+    pub(crate) rebooted_at: Option<Duration>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
@@ -112,14 +177,26 @@ impl Model {
             commands: Commands::default(),
             dialog: Dialog::Closed,
             abort_chord: AbortChord::default(),
+            repeats_told: false,
             events: Events::default(),
             outcome: Outcome::default(),
             log: LogHealth::default(),
+            alarms: Alarms::default(),
+            pages: Pages::default(),
+            history: History::default(),
+            parameters: Parameters::default(),
+            playing: None,
+            rebooted_at: None,
             texts: Reassembler::new(),
             due: Due::default(),
             auto_step: AutoStep::default(),
             outbox: Vec::new(),
         }
+    }
+
+    /// The screen to show.
+    pub fn page(&self) -> Page {
+        self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
     }
 
     /// Notes an event for the list, the lines and the log.

@@ -53,6 +53,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             };
             vehicle.gimbal = Some(Sample::new(gimbal, now));
         }
+        MavMessage::TD_DESCENT(data) => vehicle.descent = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_CONTROLLER(data) => vehicle.controller = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
             vehicle.prediction = Some(Sample::new(prediction(data), now));

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    TD_CONTROLLER_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase,
+    TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock,
+    TdPhase,
 };
 
 use crate::limits::Touchdown;
@@ -138,6 +139,8 @@ pub struct Vehicle {
     pub fins: Option<Sample<[Deflection; 4]>>,
     /// `TD_GIMBAL`.
     pub gimbal: Option<Sample<Gimbal>>,
+    /// `TD_DESCENT`.
+    pub descent: Option<Sample<TD_DESCENT_DATA>>,
     /// `TD_CONTROLLER`.
     pub controller: Option<Sample<TD_CONTROLLER_DATA>>,
     /// `TD_TOUCHDOWN_PREDICTION`.

@@ -2,11 +2,19 @@
 
 use std::fmt::Debug;
 
+use super::telemetry::phase_from_number;
 use protocol::dialect::{TdAbortEffect, TdCheck, TdPhase};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
+}
+
+/// The phase of a name, in any case.
+pub fn phase_from_name(name: &str) -> Option<TdPhase> {
+    (0..=u32::from(u8::MAX))
+        .map_while(phase_from_number)
+        .find(|known| phase(*known).eq_ignore_ascii_case(name))
 }
 
 /// A dialect's enum value as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not run`.
@@ -27,7 +35,7 @@ pub fn abort_effect(effect: TdAbortEffect) -> &'static str {
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "inhibit landing motor, chute at apogee",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "inhibit motor, fins open, chute NOW",
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
-        TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "NO CUT-OFF EXISTS: only holds upright at full thrust",
+        TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
     }
 }
 

@@ -74,6 +74,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             }
             return;
         }
+        MavMessage::PARAM_VALUE(data) => return model.parameters.take(data),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
             model.link.first_heartbeat_at.get_or_insert(now);

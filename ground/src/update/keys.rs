@@ -5,23 +5,39 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdPhase};
+use protocol::identity::VEHICLE;
 use protocol::log::record::Record;
 use protocol::log::v1::OperatorAction;
 
 use super::{Action, commands};
+use crate::attach::codec::Asked;
 use crate::key::Key;
-use crate::model::Model;
 use crate::model::command::CommandKind;
 use crate::model::dialog::{ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT};
+use crate::model::page::Page;
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
+use crate::model::{Model, Role};
+
+/// Lines that a page key scrolls.
+const SCROLL_PAGE: i32 = 10;
+/// No list is longer.
+const SCROLL_MAX: i32 = 4_000;
 
 pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     record_operator(model, "key", &key.name(), now);
     expire(model, now);
+    let why_not = model.settings.role.why_not_command();
+    if let (Some(why), Key::CtrlX | Key::Char('A' | 'S' | 'D')) = (why_not, key) {
+        return model.info(now, why);
+    }
     if key == Key::CtrlX {
         model.abort_chord.press(now);
+        // A terminal that tells repeats apart has shown that this was a press: nothing is waited for.
+        if model.repeats_told && model.abort_chord.acts_at().is_some() && model.abort_chord.end() {
+            abort(model, now);
+        }
         return;
     }
     // The chord is twice the same key with nothing between; once complete, nothing takes it back.
@@ -35,15 +51,14 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => on_free_key(model, key, now),
-        Dialog::Help => {}
         Dialog::Arm { typed, until } => on_arm_key(model, key, typed, until, now),
         Dialog::Start { until } => match key {
-            Key::Enter => start(model, now),
+            Key::Enter => ask(model, CommandKind::Start, now),
             Key::Escape => model.info(now, "start: cancelled"),
             _ => model.dialog = Dialog::Start { until },
         },
         Dialog::Disarm { until } => match key {
-            Key::Enter => commands::submit(model, CommandKind::Disarm, now),
+            Key::Enter => ask(model, CommandKind::Disarm, now),
             Key::Escape => model.info(now, "disarm: cancelled"),
             _ => model.dialog = Dialog::Disarm { until },
         },
@@ -59,7 +74,7 @@ pub(super) fn expire(model: &mut Model, now: Duration) {
             Dialog::Arm { .. } => "arming: time is up, nothing was sent",
             Dialog::Start { .. } => "start: time is up, nothing was sent",
             Dialog::Disarm { .. } => "disarm: time is up, nothing was sent",
-            Dialog::Quit { .. } | Dialog::Closed | Dialog::Help => return,
+            Dialog::Quit { .. } | Dialog::Closed => return,
         };
         model.info(now, words);
     }
@@ -86,21 +101,67 @@ fn on_free_key(model: &mut Model, key: Key, now: Duration) {
         Key::Char('D') => model.dialog = Dialog::Disarm { until: now + CONFIRM_TIME_LIMIT },
         Key::Char('a' | 's' | 'd') => model.info(now, "capital letters: A arms, S starts, D disarms"),
         Key::Char('q' | 'Q') => quit(model, now),
-        Key::Char('?') | Key::F1 => model.dialog = Dialog::Help,
+        _ => on_page_key(model, key, now),
+    }
+}
+
+/// Which screen, how far its list is scrolled, and that the alarms were seen.
+fn on_page_key(model: &mut Model, key: Key, now: Duration) {
+    let shown = model.page();
+    match key {
+        Key::Char('?') | Key::F1 if shown == Page::Help => model.pages.hold(None),
+        Key::Char('?') | Key::F1 => model.pages.hold(Some(Page::Help)),
+        Key::Escape | Key::Char('0') => model.pages.hold(None),
+        Key::Char('h' | 'H') if model.pages.held.is_some() => model.pages.hold(None),
+        Key::Char('h' | 'H') => model.pages.hold(Some(shown)),
+        Key::Char(' ') if model.settings.role == Role::Attached => {
+            model.outbox.push(Action::Request(Asked::Acknowledge));
+        }
+        Key::Char(' ') => acknowledge(model, now),
+        Key::Char('r') if shown == Page::Parameters => ask_parameters(model),
+        Key::Up => scroll(model, 1),
+        Key::Down => scroll(model, -1),
+        Key::PageUp => scroll(model, SCROLL_PAGE),
+        Key::PageDown => scroll(model, -SCROLL_PAGE),
+        Key::Home => scroll(model, SCROLL_MAX),
+        Key::End => scroll(model, -SCROLL_MAX),
+        Key::Char(digit) => {
+            if let Some(page) = Page::from_digit(digit) {
+                model.pages.hold(Some(page));
+                if page == Page::Parameters && !model.parameters.asked {
+                    ask_parameters(model);
+                }
+            }
+        }
         _ => {}
     }
+}
+
+/// Scrolls up by this many lines; down when negative. What happened is read from its newest line, a list of
+/// names from its first.
+fn scroll(model: &mut Model, up: i32) {
+    let away = if model.page() == Page::Parameters { -up } else { up };
+    let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
+    let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
+    model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
+}
+
+pub(super) fn ask_parameters(model: &mut Model) {
+    model.parameters.asked = true;
+    if model.settings.role == Role::Attached {
+        return model.outbox.push(Action::Request(Asked::Parameters));
+    }
+    model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+        target_system: VEHICLE.system_id,
+        target_component: VEHICLE.component_id,
+    })));
 }
 
 fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, now: Duration) {
     match key {
         Key::Escape => return model.info(now, "arming: cancelled"),
         Key::Enter if typed.eq_ignore_ascii_case(ARM_WORD) => {
-            // The vehicle may have changed while the word was typed.
-            match why_not_arm(model, now) {
-                None => commands::submit(model, CommandKind::Arm, now),
-                Some(why) => model.warn(now, format!("cannot arm: {why}")),
-            }
-            return;
+            return ask(model, CommandKind::Arm, now);
         }
         Key::Backspace => {
             typed.pop();
@@ -115,10 +176,32 @@ fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, n
     model.dialog = Dialog::Arm { typed, until };
 }
 
-fn start(model: &mut Model, now: Duration) {
-    match why_not_start(model, now) {
-        None => commands::submit(model, CommandKind::Start, now),
-        Some(why) => model.warn(now, format!("cannot start: {why}")),
+/// The ladder is complete: commands here, or asks the station that this screen shows.
+fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
+    match model.settings.role {
+        Role::Attached => model.outbox.push(Action::Request(Asked::Command(kind))),
+        Role::Station => command(model, kind, now),
+        Role::Watching | Role::Replaying => {}
+    }
+}
+
+/// Commands, unless the vehicle has changed since the ladder was begun.
+pub(super) fn command(model: &mut Model, kind: CommandKind, now: Duration) {
+    let why_not = match kind {
+        CommandKind::Arm => why_not_arm(model, now),
+        CommandKind::Start => why_not_start(model, now),
+        CommandKind::Disarm | CommandKind::Abort => None,
+    };
+    match why_not {
+        None => commands::submit(model, kind, now),
+        Some(why) => model.warn(now, format!("cannot {}: {why}", kind.name().to_lowercase())),
+    }
+}
+
+pub(super) fn acknowledge(model: &mut Model, now: Duration) {
+    let seen = model.alarms.acknowledge();
+    if seen > 0 {
+        model.info(now, format!("alarms acknowledged: {seen}"));
     }
 }
 
@@ -159,12 +242,14 @@ pub(super) fn pass_abort_chord(model: &mut Model, now: Duration) {
 
 fn abort(model: &mut Model, now: Duration) {
     model.dialog = Dialog::Closed;
-    commands::submit(model, CommandKind::Abort, now);
+    ask(model, CommandKind::Abort, now);
 }
 
 fn quit(model: &mut Model, now: Duration) {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
-    let risky = armed || model.vehicle.in_flight();
+    // A screen that ends leaves its station as it is.
+    let is_station = model.settings.role == Role::Station;
+    let risky = is_station && (armed || model.vehicle.in_flight());
     let confirmed = matches!(model.dialog, Dialog::Quit { .. });
     if confirmed || !risky {
         model.dialog = Dialog::Closed;

@@ -2,6 +2,7 @@
 //!
 //! Nothing here reads a clock, a socket or a file; whatever arrives in whatever order is data.
 
+pub mod alarms;
 pub mod auto;
 pub mod commands;
 pub mod frames;
@@ -16,7 +17,9 @@ use protocol::frame::{Frame, FramerCounters};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::signing::SigningCounters;
 
+use crate::attach::codec::Asked;
 use crate::key::Key;
+use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
 use crate::model::{LogHealth, Model};
@@ -28,6 +31,18 @@ pub enum Msg {
     Key(Key),
     /// A frame arrived.
     Frame(Frame),
+    /// The crew commanded this then: in a replay.
+    Commanded(CommandKind),
+    /// The crew has climbed the whole ladder of this on a screen elsewhere.
+    Requested(CommandKind),
+    /// The crew has seen the alarms, on a screen elsewhere.
+    Acknowledged,
+    /// A screen elsewhere wants the parameters.
+    ParametersWanted,
+    /// Time passes on a screen whose station runs elsewhere: its dialogs and chord expire.
+    ScreenTick,
+    /// The terminal is gone; the station goes on without it.
+    ScreenGone,
     /// The frame that follows came over this link; told where there are several.
     HeardOver(usize),
     /// How each link does, several times a second.
@@ -78,6 +93,12 @@ pub enum Action {
     SyncLog,
     /// Draw the whole screen again.
     Redraw,
+    /// Ask the station that runs elsewhere.
+    Request(Asked),
+    /// Ring the terminal's bell.
+    Bell,
+    /// An alarm was raised: tell whoever is not at the screen.
+    Alarm(String),
     /// End the program.
     Quit,
 }
@@ -97,6 +118,17 @@ impl Action {
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
         Msg::Key(key) => keys::on_key(model, key, now),
+        Msg::Commanded(kind) => commands::submit(model, kind, now),
+        Msg::Requested(kind) => keys::command(model, kind, now),
+        Msg::Acknowledged => keys::acknowledge(model, now),
+        Msg::ParametersWanted => keys::ask_parameters(model),
+        Msg::ScreenTick => {
+            keys::expire(model, now);
+            keys::pass_abort_chord(model, now);
+        }
+        Msg::ScreenGone => {
+            model.warn(now, "the terminal is gone: link and log go on; `ground attach` shows them");
+        }
         Msg::Frame(frame) => frames::on_frame(model, &frame, now),
         Msg::Received { bytes, framing } => {
             model.link.stats.on_rx_bytes(bytes, now);
@@ -133,6 +165,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::Tick => tick::on_tick(model, now),
     }
+    alarms::watch(model, now);
     std::mem::take(&mut model.outbox)
 }
 

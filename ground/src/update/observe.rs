@@ -8,7 +8,9 @@ use protocol::log::record::EventLevel;
 use super::{Action, commands};
 use crate::model::command::{CommandKind, is_aborted};
 use crate::model::events::Speaker;
+use crate::model::history::{History, Maxima};
 use crate::model::outcome::Outcome;
+use crate::model::parameters::Parameters;
 use crate::model::vehicle::{Vehicle, Verdict, is_flight};
 use crate::model::{Model, words};
 
@@ -38,6 +40,9 @@ impl Facts {
 pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.warn(now, "the vehicle has rebooted: everything known of it before is forgotten");
     model.outcome = Outcome { error: model.outcome.error.take(), ..Outcome::default() };
+    model.history = History::default();
+    model.parameters = Parameters::default();
+    model.rebooted_at = Some(now);
     // What was asked of the vehicle before its reboot is not asked of it afterwards; an abort is.
     let aborting = model.commands.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none());
     model.commands.sender.withdraw_all(now);
@@ -80,6 +85,10 @@ pub(super) fn on_change(model: &mut Model, before: Facts, now: Duration) {
 
 fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
     let from = before.map_or_else(String::new, |before| format!("{} -> ", words::phase(before)));
+    if is_flight(phase) && !before.is_some_and(is_flight) && !model.outcome.started {
+        model.history.maxima = Maxima::default();
+    }
+    model.history.note_phase(phase, now);
     model.info(now, format!("phase {from}{}", words::phase(phase)));
     model.outbox.push(Action::SyncLog);
     if is_flight(phase) && !before.is_some_and(is_flight) {

@@ -40,6 +40,8 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         frames::say_text(model, &text, now);
     }
     note_loss(model, now);
+    let silence = model.link.heartbeat_at.map(|at| now.saturating_sub(at));
+    model.history.note_values(&model.vehicle, silence, now);
     auto::step(model, now);
     commands::poll(model, now);
     commands::observe(model, now);

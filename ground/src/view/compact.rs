@@ -7,15 +7,15 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::number::{STALE_MARK, fixed};
 use super::theme::{Role, Theme};
-use super::{actuators, controller, dialog, draw_lines, happenings, top, touchdown};
+use super::{alarms, dialog, draw_lines, pages, top};
 use crate::model::Model;
 use crate::model::command::CommandKind;
-use crate::model::vehicle::Sample;
 
 /// Lines that no dialog covers.
 const FIXED_ROWS: u16 = 3;
+/// Rows from which the screen's name and number have a line of their own.
+const NAMED_ROWS: u16 = 10;
 
 /// Draws everything that fits.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -32,29 +32,24 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         return;
     }
     lines.extend(top::pad_wait(model, theme));
-    lines.push(motion(model, theme, now));
-    let rows = usize::from(area.height);
-    // The newest event earns a line before anything else does.
-    lines.extend(happenings_short(model, theme));
-    // An abort has its place above.
-    if let Some(track) = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort) {
-        lines.push(top::facts_short(track, theme, now));
+    lines.extend(model.playing.map(|playing| alarms::replay(playing, theme)));
+    if model.playing.is_none() {
+        lines.extend(alarms::alarm(model, theme, now));
     }
-    lines.push(attitude(model, theme, now));
-    let (title, touchdown) = touchdown::panel(model, theme, now);
-    let mut verdict = Line::styled(format!(" {title}: "), theme.style(Role::Label));
-    verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
-        let style = line.style;
-        line.spans.into_iter().map(move |span| span.patch_style(style))
-    }));
-    lines.push(verdict);
-    lines.extend(controller::rows(model, theme, now).into_iter().take(2));
-    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
-    lines.extend(actuators::fin_rows(model, theme, now));
-    lines.push(happenings::link(model, theme, now, usize::from(area.width)));
-    let room = rows.saturating_sub(lines.len());
-    lines.extend(happenings::events(model, theme, usize::from(area.width), room));
+    let page = model.page();
+    let named = u16::from(area.height >= NAMED_ROWS);
+    let taken = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(named);
+    let room = Rect { height: area.height.saturating_sub(taken), ..area };
+    let mut body = pages::lines(model, page, theme, now, room);
+    body.truncate(usize::from(room.height));
+    lines.extend(body);
     draw_lines(frame, area, &lines);
+    if named > 0 {
+        let held = if model.pages.held.is_some() { "HELD, 0 follows" } else { "auto" };
+        let text = format!(" [{}{}] 1-9 {held}  ? help", page.digit(), page.name());
+        let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
+        frame.render_widget(Line::styled(text, theme.style(Role::Label)), last);
+    }
 }
 
 fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
@@ -68,52 +63,4 @@ fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let mut spans = vec![Span::styled(" ^X^X ABORT:", theme.style(Role::Key))];
     spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
     Line::from(spans)
-}
-
-fn value(
-    theme: Theme,
-    label: &str,
-    sample: Option<Sample<f64>>,
-    decimals: usize,
-    now: Duration,
-) -> Vec<Span<'static>> {
-    let text = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
-    let stale = sample.is_some_and(|sample| sample.is_stale(now));
-    let mark = if stale { STALE_MARK } else { "" };
-    let role = if stale { Role::Stale } else { Role::Plain };
-    vec![
-        Span::styled(format!(" {label} "), theme.style(Role::Label)),
-        Span::styled(format!("{mark}{text}"), theme.style(role)),
-    ]
-}
-
-fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let motion = model.vehicle.best_motion();
-    let altitude =
-        motion.map(|motion| Sample { value: motion.value.altitude_m, received_at: motion.received_at });
-    let climb =
-        motion.map(|motion| Sample { value: motion.value.climb_m_s, received_at: motion.received_at });
-    let mut spans = value(theme, "alt", altitude, 1, now);
-    spans.extend(value(theme, "vz", climb, 1, now));
-    Line::from(spans)
-}
-
-fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let body = model.vehicle.body_speed();
-    let attitude = model.vehicle.attitude;
-    let u = body.map(|body| Sample { value: body.value.u_m_s, received_at: body.received_at });
-    let w = body.map(|body| Sample { value: body.value.w_m_s, received_at: body.received_at });
-    let pitch = attitude.map(|attitude| Sample {
-        value: attitude.value.pitch_rad.to_degrees(),
-        received_at: attitude.received_at,
-    });
-    let mut spans = value(theme, "pitch", pitch, 1, now);
-    spans.extend(value(theme, "u", u, 1, now));
-    spans.extend(value(theme, "w", w, 2, now));
-    Line::from(spans)
-}
-
-fn happenings_short(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let event = model.events.newest(1).next()?;
-    Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(Role::Plain)))
 }

@@ -22,7 +22,6 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
     let strong = |text: String| Line::styled(text, theme.style(Role::Caution));
     let dialog = match &model.dialog {
         Dialog::Closed => return None,
-        Dialog::Help => ("Keys", help()),
         Dialog::Arm { typed, .. } => {
             let mut lines = vec![
                 strong(format!("Type {ARM_WORD} and Enter within {left:.0} s:  [{typed:<3}]")),
@@ -70,26 +69,6 @@ fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         failing.into_iter().map(|name| Line::styled(format!("  NO {name}"), theme.style(Role::Caution))),
     );
     lines
-}
-
-fn help() -> Vec<Line<'static>> {
-    [
-        "A               open the arming dialog (step 1);",
-        "                then type ARM and Enter within 10 s (step 2)",
-        "S, Enter        start the countdown; Enter within 5 s",
-        "D, Enter        disarm",
-        "Ctrl-X Ctrl-X   ABORT, from anywhere: two presses within 2 s;",
-        "                a held key is one press. Sent until acknowledged",
-        "Ctrl-L          draw the screen again",
-        "q, Ctrl-C       quit; asks when armed or in flight",
-        "? or F1         this help; any key closes it",
-        "",
-        "~ before a value: older than 1.5 s. Commanded, acknowledged and",
-        "observed are three facts; armed is what HEARTBEAT says.",
-    ]
-    .into_iter()
-    .map(Line::raw)
-    .collect()
 }
 
 /// Draws the open dialog into the middle of an area.

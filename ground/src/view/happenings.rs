@@ -1,4 +1,4 @@
-//! The event list, the link's figures and the keys.
+//! The event list and the link's figures.
 
 use std::time::Duration;
 
@@ -183,23 +183,6 @@ fn log(model: &Model, theme: Theme) -> Span<'static> {
     } else {
         Span::styled("log ok", theme.style(Role::Good))
     }
-}
-
-/// The keys, on one line.
-pub fn keys(theme: Theme) -> Line<'static> {
-    let mut spans = Vec::new();
-    for (key, what) in [
-        ("A", "arm"),
-        ("S", "start"),
-        ("D", "disarm"),
-        (super::top::ABORT_KEY, "ABORT"),
-        ("?", "help"),
-        ("q", "quit"),
-    ] {
-        spans.push(Span::styled(format!(" {key} "), theme.style(Role::Key)));
-        spans.push(Span::styled(format!("{what} "), theme.style(Role::Label)));
-    }
-    Line::from(spans)
 }
 
 #[cfg(test)]

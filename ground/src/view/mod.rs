@@ -1,18 +1,25 @@
 //! The screen: one pure function from the model and the time to a frame.
 //!
 //! The top lines (phase, armed, countdown, link, abort key and what an abort would do) stand in the
-//! same place on every screen and under every dialog. From 80x24 on the panels are laid out
-//! side by side ([`wide`]); on anything smaller the same facts come as lines, the most important first
-//! ([`compact`]).
+//! same place on every screen and under every dialog; so do the alarm line and the screens' names. One room
+//! a screen is in [`pages`]. From 80x24 on the panels are laid out side by side ([`wide`]); on anything
+//! smaller the same facts come as lines, the most important first ([`compact`]). A terminal without Unicode
+//! gets the same cells in ASCII ([`ascii`]).
 
 pub mod actuators;
+pub mod alarms;
+pub mod ascii;
 pub mod big;
 pub mod compact;
 pub mod controller;
 pub mod dialog;
+pub mod fins;
 pub mod flight;
+pub mod gauge;
 pub mod happenings;
+pub mod lost;
 pub mod number;
+pub mod pages;
 pub mod side;
 pub mod theme;
 pub mod top;
@@ -39,6 +46,9 @@ pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
         wide::draw(model, theme, now, frame, area);
     } else {
         compact::draw(model, theme, now, frame, area);
+    }
+    if theme.ascii {
+        ascii::flatten(frame.buffer_mut());
     }
 }
 

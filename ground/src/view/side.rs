@@ -1,13 +1,17 @@
-//! The side view: where it flew (line), where it will fly (dots), the pad.
+//! The side view: where it flew (line), where it will fly (dots), the pad; after the loss of the link where it
+//! probably is (a cross) and how far from there it may be (a circle).
+
+use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
-use ratatui::widgets::canvas::{Canvas, Line, Points};
+use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
 
 use super::theme::Theme;
 use crate::model::Model;
+use crate::model::reckoning::reckon;
 
 /// Braille dots in a cell.
 const DOTS_ACROSS: f64 = 2.0;
@@ -18,7 +22,7 @@ const ALTITUDE_MIN_M: f64 = 5.0;
 const PAD_HALF_M: f64 = 1.0;
 
 /// Draws the picture; both axes have the same scale.
-pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if area.width < 8 || area.height < 3 {
         return;
     }
@@ -28,7 +32,10 @@ pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
         Some(path) if model.vehicle.verdict.is_none() => &path.value,
         _ => &[],
     };
-    let ([left, right], [bottom, top]) = bounds(flown.iter().chain(predicted), area);
+    let lost = reckon(&model.vehicle, now);
+    let reckoned: Vec<(f64, f64)> = lost.iter().map(|at| (at.x_m, at.altitude_m)).collect();
+    let points = flown.iter().chain(predicted).chain(&reckoned);
+    let ([left, right], [bottom, top]) = bounds(points, area);
     let colour = |colour| if theme.colour { colour } else { Color::Reset };
     let canvas = Canvas::default()
         .marker(Marker::Braille)
@@ -43,6 +50,11 @@ pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
             for pair in flown.windows(2) {
                 let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
                 context.draw(&Line { x1, y1, x2, y2, color: colour(Color::Yellow) });
+            }
+            if let Some(at) = lost {
+                let (x, y, radius) = (at.x_m, at.altitude_m, at.error_m);
+                context.draw(&Circle { x, y, radius, color: colour(Color::Magenta) });
+                context.print(x, y, "+");
             }
             let scale = (right - left) / 4.0;
             context.print(left, top, format!("{:.0} m up", top.floor()));

@@ -6,13 +6,21 @@ use ratatui::text::{Line, Span};
 
 use super::number::{age_mark, seconds};
 use super::theme::{Role, Theme};
-use crate::model::Model;
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
-use crate::model::words;
+use crate::model::{self, Model, too_late, words};
 
 /// The abort key, in words.
 pub const ABORT_KEY: &str = "Ctrl-X Ctrl-X";
+
+/// What aborts from this screen, or why nothing does.
+pub fn abort_key(model: &Model) -> String {
+    match model.settings.role {
+        model::Role::Station | model::Role::Attached => format!("ABORT {ABORT_KEY}"),
+        model::Role::Watching => "WATCHING only".to_owned(),
+        model::Role::Replaying => "REPLAY".to_owned(),
+    }
+}
 
 /// The phase, with its age.
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
@@ -58,7 +66,8 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.link.state(now) {
         LinkState::NeverHeard => Span::styled("link: not heard", theme.style(Role::Caution)),
-        LinkState::Alive(age) => Span::styled(format!("link ok {}", seconds(age)), theme.style(Role::Good)),
+        // An age that only counts from heartbeat to heartbeat says nothing, ten times a second.
+        LinkState::Alive(_) => Span::styled("link ok", theme.style(Role::Good)),
         LinkState::Doubtful(age) => {
             Span::styled(format!("LINK? {}", seconds(age)), theme.style(Role::Caution))
         }
@@ -84,8 +93,12 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 /// What an abort would do now, marked when that was said too long ago.
 fn abort_effect(model: &Model, now: Duration) -> String {
     let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
+    if let Some(why) = too_late::why(model, now) {
+        return why.to_owned();
+    }
     let mark = if status.is_stale(now) { "~" } else { "" };
-    format!("{mark}{}", words::abort_effect(status.value.abort_effect))
+    let reach = if let LinkState::Lost(_) = model.link.state(now) { "; MAY NOT ARRIVE" } else { "" };
+    format!("{mark}{}{reach}", words::abort_effect(status.value.abort_effect))
 }
 
 /// After an abort on the pad: nobody goes there yet.

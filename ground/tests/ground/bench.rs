@@ -3,16 +3,16 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{Model, Settings};
+use ground::model::{Model, Role, Settings};
 use ground::update::{Action, Msg, update};
 use ground::view::theme::Theme;
 use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
-    MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdControlLevel,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdChute, TdControlLevel,
     TdInterlock, TdLimit, TdPhase, TdSolverStatus,
 };
 use protocol::frame::{Encoder, Frame};
@@ -21,7 +21,7 @@ use protocol::text::chunks;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
-pub(crate) const MONO: Theme = Theme { colour: false };
+pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
 
 pub(crate) struct Bench {
     pub(crate) model: Model,
@@ -257,6 +257,27 @@ impl Bench {
         }));
     }
 
+    /// Coming down under fins, this far above the pad.
+    pub(crate) fn descent(&mut self, height_m: f32) {
+        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+            time_boot_ms: self.boot_ms(),
+            height_m,
+            vertical_speed_m_s: -21.5,
+            band_low_m: 48.0,
+            band_high_m: 71.5,
+            chosen_height_m: 58.0,
+            commit_height_m: 95.0,
+            time_to_ignition_s: (height_m - 58.0) / 21.5,
+            wind_x_m_s: 2.4,
+            wind_y_m_s: -1.8,
+            drag_scale: 1.042,
+            thrust_scale: 0.985,
+            touchdown_x_m: 0.8,
+            touchdown_y_m: -1.1,
+            chute: TdChute::TD_CHUTE_STOWED,
+        }));
+    }
+
     /// What counts as a landing for this vehicle.
     pub(crate) fn limits(&mut self) {
         self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
@@ -329,6 +350,8 @@ pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
         link_name: "udpin:127.0.0.1:14550".to_owned(),
         link_capacity_bytes_s: None,
         log_path: Some("flight.mcap".to_owned()),
+        tlog_path: None,
+        role: Role::Station,
         auto,
         interactive,
         time_limit: None,

@@ -271,3 +271,18 @@ fn nothing_takes_back_a_complete_abort_chord() {
     bench.keys(&[Key::CtrlX, Key::Escape]);
     assert!(bench.take_commands().iter().any(is_abort));
 }
+
+/// Where repeats are told apart, the second press is one, and is not waited for.
+#[test]
+fn the_second_press_acts_at_once_where_the_terminal_tells_repeats() {
+    let mut bench = Bench::crewed();
+    bench.model.repeats_told = true;
+    bench.key(Key::CtrlX);
+    bench.run(0.3);
+    assert!(!bench.take_commands().iter().any(is_abort));
+    bench.key(Key::CtrlX);
+    assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
+    bench.answer(ABORT, ACCEPTED);
+    bench.run(3.0);
+    assert!(bench.take_commands().is_empty(), "once");
+}

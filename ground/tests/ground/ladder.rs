@@ -2,9 +2,13 @@
 
 use std::time::Duration;
 
+use ground::attach::codec::Asked;
 use ground::key::Key;
+use ground::model::Role;
 use ground::model::chord::ABORT_TIME_LIMIT;
+use ground::model::command::CommandKind;
 use ground::model::dialog::ARM_TIME_LIMIT;
+use ground::update::Action;
 use proptest::prelude::*;
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
@@ -22,8 +26,8 @@ fn ends_in_complete_ladder(history: &[(Key, Duration)]) -> bool {
             match key {
                 Key::Char(c) => word.push(*c),
                 Key::Backspace => drop(word.pop()),
-                Key::CtrlX | Key::CtrlL | Key::F1 => {}
                 Key::Enter | Key::Escape | Key::CtrlC => return false,
+                _ => {}
             }
         }
         word.eq_ignore_ascii_case("ARM")
@@ -49,6 +53,14 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
         Key::CtrlC,
         Key::CtrlL,
         Key::CtrlX,
+        Key::Char(' '),
+        Key::Char('h'),
+        Key::Char('0'),
+        Key::Char('1'),
+        Key::Char('7'),
+        Key::Up,
+        Key::PageDown,
+        Key::Home,
     ]);
     // Pieces of the ladder, so that near misses are common.
     prop_oneof![
@@ -92,5 +104,39 @@ proptest! {
         bench.take_commands();
         bench.abort_chord();
         prop_assert!(bench.take_commands().iter().any(is_abort));
+    }
+
+    /// The same ladder on a screen whose station runs elsewhere; it asks, and sends nothing itself.
+    #[test]
+    fn an_attached_screen_asks_to_arm_by_the_complete_ladder_alone(
+        steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
+    ) {
+        let mut bench = Bench::crewed();
+        bench.model.settings.role = Role::Attached;
+        let mut history = Vec::new();
+        bench.take_commands();
+        for (keys, pause_ms) in steps {
+            bench.run((pause_ms / 100) as f64 / 10.0);
+            for key in keys {
+                history.push((key, bench.now));
+                bench.key(key);
+                let asks = bench.actions.contains(&Action::Request(Asked::Command(CommandKind::Arm)));
+                prop_assert!(!asks || ends_in_complete_ladder(&history), "{history:?}");
+                prop_assert!(bench.take_commands().is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn a_screen_that_only_watches_asks_for_nothing(
+        keys in prop::collection::vec(some_keys(), 0..40),
+    ) {
+        let mut bench = Bench::crewed();
+        bench.model.settings.role = Role::Watching;
+        bench.take_commands();
+        bench.keys(&keys.concat());
+        bench.abort_chord();
+        let asked = |action: &Action| matches!(action, Action::Request(Asked::Command(_)));
+        prop_assert!(!bench.actions.iter().any(asked) && bench.take_commands().is_empty());
     }
 }

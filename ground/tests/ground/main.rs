@@ -1,10 +1,14 @@
 //! The ground station from outside: its keys, its radio, its screens, the program itself.
 
+mod alarms;
 mod auto;
 mod bench;
+mod daemon;
 mod disarm;
 mod hand;
 mod ladder;
 mod program;
 mod radio;
+mod replay;
 mod screens;
+mod terminal;

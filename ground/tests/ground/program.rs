@@ -106,4 +106,65 @@ fn the_demonstration_lands_with_code_0_and_names_its_log() {
     for topic in ["/telemetry", "/operator", "/events", "/controller/tick", "/verdict"] {
         assert!(reader.channels().any(|(_, channel)| channel.topic == topic), "{topic} is missing");
     }
+    let output = ground(directory.path(), &["--replay", log]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    let replayed = out(&output);
+    for words in ["ARM acknowledged: accepted", "phase PAD_ARMED -> ", "LANDED inside every limit"] {
+        assert!(replayed.contains(words), "{words} is missing in\n{replayed}");
+    }
+    let output = ground(directory.path(), &["--replay", log, "--from", "CHUTE"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        err(&output).contains("has no phase CHUTE; it has SAFE, PAD_IDLE, PAD_ARMED"),
+        "{}",
+        err(&output)
+    );
+}
+
+#[test]
+fn settings_are_checked_and_what_is_wrong_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let example = ground(directory.path(), &["config", "example"]);
+    assert!(out(&example).contains("#alarm_command"));
+    let check = |text: &str| {
+        std::fs::write(directory.path().join("ground.toml"), text).unwrap();
+        ground(directory.path(), &["config", "check", "--config", "ground.toml"])
+    };
+    let right = check("connect = [\"udpin:0.0.0.0:14550\"]\nbell = false\n");
+    assert_eq!(right.status.code(), Some(0));
+    assert!(out(&right).contains("understood") && out(&right).contains("14550"));
+    let wrong = check("bel = false\n");
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(err(&wrong).contains("ground.toml") && err(&wrong).contains("bel"), "{}", err(&wrong));
+}
+
+#[test]
+fn completions_and_the_manual_come_from_the_command_line_itself() {
+    let directory = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = ground(directory.path(), &["completions", shell]);
+        assert_eq!(script.status.code(), Some(0));
+        assert!(out(&script).contains("replay") && out(&script).contains("daemon"), "{shell}");
+    }
+    let manual = ground(directory.path(), &["man"]);
+    assert!(out(&manual).starts_with(".ie") || out(&manual).contains(".TH ground"));
+    assert!(out(&manual).contains("Exit codes"));
+}
+
+/// A demonstration with its telemetry log: the same flight from both logs.
+#[test]
+fn the_telemetry_log_holds_the_same_flight() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = ground(directory.path(), &["--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    let verdict = |file: &str| {
+        let output = ground(directory.path(), &["--replay", file]);
+        assert_eq!(output.status.code(), Some(0), "{file}: {}", err(&output));
+        let lines = out(&output);
+        lines.lines().filter(|line| line.starts_with("  ok") || line.starts_with("LANDED")).count()
+    };
+    assert_eq!((verdict("f.mcap"), verdict("f.tlog")), (7, 7));
+    let output = ground(directory.path(), &["--log", "none", "--tlog", "g.tlog"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(err(&output).contains("--tlog writes beside a log"));
 }

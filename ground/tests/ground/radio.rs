@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, settings, typed};
 use ground::exit::{Exit, decide};
+use ground::key::Key;
 use ground::model::link::{LinkReport, LinkState};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
@@ -138,6 +139,7 @@ fn our_clock_question_is_answered_and_the_round_trip_is_shown() {
     let asked_at = i64::try_from(bench.now.as_nanos()).unwrap();
     bench.run(0.2);
     bench.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: asked_at, ..Default::default() }));
+    bench.key(Key::Char('5'));
     assert!(bench.screen(80, 24).contains("rtt 200 ms"));
 }
 

@@ -3,6 +3,7 @@
 use crate::bench::{Bench, MONO, is_abort, settings, typed};
 use ground::key::Key;
 use ground::update::Msg;
+use ground::view::theme::Theme;
 use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdLimit, TdPhase};
 use protocol::frame::FramerCounters;
 use ratatui::style::Color;
@@ -79,6 +80,7 @@ fn regress_pad_no_go() {
 #[test]
 fn limits_are_shown_once_the_vehicle_has_said_them() {
     let mut bench = Bench::crewed();
+    bench.key(Key::Char('3'));
     bench.actuators(0);
     bench.plan(TdLimit::TD_LIMIT_AXIAL_SPEED);
     let screen = bench.screen(80, 24);
@@ -97,10 +99,12 @@ fn the_links_capacity_is_shown_beside_its_rate() {
     let mut settings = settings(false, true);
     settings.link_capacity_bytes_s = Some(5_760);
     let mut bench = Bench::new(settings);
+    bench.key(Key::Char('5'));
     bench.run(1.0);
     bench.msg(Msg::Received { bytes: 1_600, framing: FramerCounters::default() });
     assert!(bench.screen(80, 24).contains(" rx 1600/5760 B/s "), "{}", bench.screen(80, 24));
     let mut bench = Bench::crewed();
+    bench.key(Key::Char('5'));
     bench.msg(Msg::Received { bytes: 1_600, framing: FramerCounters::default() });
     assert!(bench.screen(80, 24).contains(" rx 1600 B/s "));
 }
@@ -162,6 +166,87 @@ fn regress_nothing_heard() {
     snapshot("nothing_heard", &bench);
 }
 
+fn descending() -> Bench {
+    let mut bench = armed();
+    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    bench.run(1.0);
+    bench.state(4.0, 132.0, -0.6, -21.5, 88.0);
+    bench.actuators(0);
+    bench.descent(132.0);
+    bench
+}
+
+#[test]
+fn regress_descent() {
+    snapshot("descent", &descending());
+}
+
+#[test]
+fn regress_descent_without_its_data() {
+    let mut bench = armed();
+    bench.phase = TdPhase::TD_PHASE_COAST;
+    bench.run(1.0);
+    snapshot("coast", &bench);
+}
+
+/// Every screen by its digit, before and during a flight.
+#[test]
+fn regress_every_screen_by_its_digit() {
+    for (digit, name) in [
+        ('4', "review"),
+        ('5', "link"),
+        ('6', "messages"),
+        ('7', "parameters"),
+        ('8', "log"),
+        ('1', "pad_held"),
+    ] {
+        let mut bench = powered();
+        bench.key(Key::Char(digit));
+        snapshot(&format!("screen_{name}"), &bench);
+    }
+}
+
+#[test]
+fn regress_ascii() {
+    for (name, bench) in [("powered", powered()), ("descent", descending()), ("pad", on_the_pad())] {
+        let ascii = Theme { colour: false, ascii: true };
+        insta::assert_snapshot!(format!("ascii_{name}"), bench.draw(80, 24, ascii).backend().to_string());
+    }
+}
+
+/// No page, phase, dialog or size leaves a cell that an ASCII terminal cannot show, and none panics.
+#[test]
+fn every_screen_at_every_size_and_in_ascii() {
+    let benches = [on_the_pad(), counting(), descending(), powered()];
+    for mut bench in benches {
+        for digit in '0'..='9' {
+            bench.key(Key::Char(digit));
+            for (columns, rows) in [(1, 1), (7, 3), (20, 5), (40, 12), (79, 60), (80, 24), (300, 90)] {
+                let terminal = bench.draw(columns, rows, Theme { colour: true, ascii: true });
+                let cells = &terminal.backend().buffer().content;
+                assert!(cells.iter().all(|cell| cell.symbol().is_ascii()), "{digit} {columns}x{rows}");
+            }
+        }
+    }
+}
+
+/// The screen follows the flight; a held one stays; Escape follows again.
+#[test]
+fn screens_follow_the_flight_and_can_be_held() {
+    let mut bench = descending();
+    assert!(bench.screen(80, 24).contains("[2Descent]"));
+    bench.key(Key::Char('h'));
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.run(1.0);
+    assert!(bench.screen(80, 24).contains("[2Descent]") && bench.screen(80, 24).contains("HELD"));
+    bench.key(Key::Escape);
+    assert!(bench.screen(80, 24).contains("[3Landing]") && bench.screen(80, 24).contains("auto"));
+    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    bench.run(1.0);
+    assert!(bench.screen(80, 24).contains("[4Review]"));
+}
+
 #[test]
 fn regress_help() {
     let mut bench = on_the_pad();
@@ -172,16 +257,23 @@ fn regress_help() {
 /// Colour only repeats: without it the same words stand in the same cells, and no cell has a colour.
 #[test]
 fn colour_carries_nothing_alone() {
-    let bench = powered();
-    let mono = bench.draw(80, 24, MONO);
-    let coloured = bench.draw(80, 24, ground::view::theme::Theme { colour: true });
-    let cells = |terminal: &ratatui::Terminal<ratatui::backend::TestBackend>| {
-        terminal.backend().buffer().content.iter().map(|cell| cell.symbol().to_owned()).collect::<Vec<_>>()
-    };
-    assert_eq!(cells(&mono), cells(&coloured));
-    assert!(
-        mono.backend().buffer().content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset)
-    );
+    let mut lost = powered();
+    lost.speaks = false;
+    lost.run(6.0);
+    for mut bench in [on_the_pad(), counting(), descending(), powered(), lost] {
+        for digit in '0'..='9' {
+            bench.key(Key::Char(digit));
+            let mono = bench.draw(80, 24, MONO);
+            let coloured = bench.draw(80, 24, Theme { colour: true, ascii: false });
+            let cells = |terminal: &ratatui::Terminal<ratatui::backend::TestBackend>| {
+                let cells = &terminal.backend().buffer().content;
+                cells.iter().map(|cell| cell.symbol().to_owned()).collect::<Vec<_>>()
+            };
+            assert_eq!(cells(&mono), cells(&coloured), "screen {digit}");
+            let grey = |cell: &ratatui::buffer::Cell| cell.fg == Color::Reset && cell.bg == Color::Reset;
+            assert!(mono.backend().buffer().content.iter().all(grey), "screen {digit}");
+        }
+    }
 }
 
 /// Phase, armed, countdown, link and the abort key stay where they are under every dialog.

@@ -8,6 +8,7 @@ pub mod build;
 pub mod reader;
 pub mod record;
 pub mod recorder;
+pub mod tlog;
 pub mod writer;
 
 /// The records of `proto/touchdown/log/v1.proto`, generated.

@@ -15,6 +15,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::record::Record;
+use super::tlog::TlogWriter;
 use super::writer::{LogHeader, LogWriteError, LogWriter};
 
 const QUEUE_RECORDS: usize = 8192;
@@ -62,6 +63,7 @@ pub struct Recorder {
 
 struct Shared {
     path: PathBuf,
+    tlog_path: Option<PathBuf>,
     dropped: AtomicU64,
     failed: AtomicBool,
     thread: Mutex<Option<JoinHandle<Result<(), LogWriteError>>>>,
@@ -73,15 +75,38 @@ impl Recorder {
     /// # Errors
     /// The file exists or cannot be made, or its header cannot be written.
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
+        Self::create_with_tlog(path, None, header)
+    }
+
+    /// As [`Recorder::create`], and writes the ground's raw frames into a `.tlog` beside it.
+    ///
+    /// # Errors
+    /// A file exists or cannot be made, or the header cannot be written.
+    pub fn create_with_tlog(
+        path: &Path,
+        tlog: Option<&Path>,
+        header: &LogHeader,
+    ) -> Result<Self, RecorderError> {
         let create_error = |source| RecorderError::Create { path: path.to_owned(), source };
         let file =
             File::options().write(true).read(true).create_new(true).open(path).map_err(create_error)?;
+        let tlog_path = tlog.map(Path::to_owned);
+        let tlog = match tlog.map(|path| (path, File::options().write(true).create_new(true).open(path))) {
+            None => None,
+            Some((_, Ok(made))) => Some(TlogWriter::new(BufWriter::new(made), header.start_unix_ns)),
+            Some((refused, Err(source))) => {
+                // Made a moment ago, and empty: it would only stand in the way of the next attempt.
+                let _ = std::fs::remove_file(path);
+                return Err(RecorderError::Create { path: refused.to_owned(), source });
+            }
+        };
         let disk = file.try_clone().map_err(create_error)?;
         let writer = LogWriter::new(BufWriter::new(file), header)
             .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
         let (orders, inbox) = sync_channel(QUEUE_RECORDS);
         let shared = Arc::new(Shared {
             path: path.to_owned(),
+            tlog_path,
             dropped: AtomicU64::new(0),
             failed: AtomicBool::new(false),
             thread: Mutex::new(None),
@@ -101,7 +126,7 @@ impl Recorder {
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
-                let ended = write_until_finished(writer, &disk, &inbox, &sync_wanted);
+                let ended = write_until_finished(writer, tlog, &disk, &inbox, &sync_wanted);
                 for_thread.failed.store(ended.is_err(), Ordering::Release);
                 ended
             })
@@ -115,6 +140,11 @@ impl Recorder {
     /// The file.
     pub fn path(&self) -> &Path {
         &self.shared.path
+    }
+
+    /// The `.tlog` beside it, if there is one.
+    pub fn tlog_path(&self) -> Option<&Path> {
+        self.shared.tlog_path.as_deref()
     }
 
     /// Records that found no room, or came after the writer had stopped.
@@ -170,6 +200,7 @@ impl Recorder {
 #[expect(clippy::disallowed_methods, reason = "the flush timer is about the disk, not about the flight")]
 fn write_until_finished(
     mut writer: LogWriter<BufWriter<File>>,
+    mut tlog: Option<TlogWriter<BufWriter<File>>>,
     disk: &File,
     inbox: &Receiver<Order>,
     sync_wanted: &SyncSender<()>,
@@ -183,18 +214,24 @@ fn write_until_finished(
         match order {
             Ok(Order::Write(record, time_ns)) => {
                 writer.write(&record, time_ns)?;
+                if let Some(tlog) = &mut tlog {
+                    tlog.write(&record, time_ns).map_err(mcap::McapError::from)?;
+                }
                 let due = *flush_due.get_or_insert_with(|| Instant::now() + FLUSH_INTERVAL);
                 // Under a steady stream the receive never times out.
                 if Instant::now() >= due {
-                    hand_over(&mut writer, sync_wanted)?;
+                    hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                     flush_due = None;
                 }
             }
             Ok(Order::SyncSoon) | Err(RecvTimeoutError::Timeout) => {
-                hand_over(&mut writer, sync_wanted)?;
+                hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                 flush_due = None;
             }
             Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
+                if let Some(tlog) = &mut tlog {
+                    tlog.flush().map_err(mcap::McapError::from)?;
+                }
                 let mut output = writer.finish()?;
                 output.flush().map_err(mcap::McapError::from)?;
                 return disk.sync_data().map_err(|error| mcap::McapError::from(error).into());
@@ -207,9 +244,13 @@ fn write_until_finished(
 /// the disk, which may take longer than the next flush can wait.
 fn hand_over(
     writer: &mut LogWriter<BufWriter<File>>,
+    tlog: Option<&mut TlogWriter<BufWriter<File>>>,
     sync_wanted: &SyncSender<()>,
 ) -> Result<(), LogWriteError> {
     writer.flush()?;
+    if let Some(tlog) = tlog {
+        tlog.flush().map_err(mcap::McapError::from)?;
+    }
     // Full means that a sync is wanted already.
     let _ = sync_wanted.try_send(());
     Ok(())

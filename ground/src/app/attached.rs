@@ -1,0 +1,221 @@
+//! The run loop of a screen that shows a station which runs elsewhere on this machine.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use protocol::log::record::Record;
+use tokio::io::AsyncWriteExt as _;
+use tokio::net::unix::OwnedWriteHalf;
+use tokio::sync::mpsc;
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::clock::Clock;
+use super::screen::Screen;
+use super::server::read_one;
+use super::signals::Signals;
+use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_asked};
+use crate::attach::place;
+use crate::config::Config;
+use crate::exit::{self, Exit};
+use crate::model::{Model, Role, Settings};
+use crate::update::{Action, Msg, update};
+
+/// Dialogs and chords expire on time although the station is silent.
+const TICK: Duration = Duration::from_millis(100);
+/// A station that is gone is looked for again this often.
+const AGAIN_AFTER: Duration = Duration::from_secs(1);
+/// Messages waiting to be taken into the model.
+const WAITING_MAX: usize = 4_096;
+
+/// Shows the station until the person at the screen quits; the station goes on.
+///
+/// # Errors
+/// No station runs there, or the terminal failed.
+pub async fn session(path: &Path, watch: bool, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
+    anyhow::ensure!(interactive, "a screen needs a terminal; `ground daemon` runs without one");
+    let mut link = Link::open(path, watch).await.with_context(|| {
+        format!("no ground station serves {}; start one with `ground daemon`", path.display())
+    })?;
+    let clock = Clock::start();
+    let mut signals = Signals::listen()?;
+    let mut model = Model::new(settings(&Hello::default(), watch));
+    let mut times = Times::default();
+    // The history first: the first frame shows everything.
+    while let Some((told, at)) = link.told.recv().await {
+        times.heard(at, clock.now());
+        match told {
+            Told::Live => break,
+            told => take(&mut model, told, at, watch)?,
+        }
+    }
+    let mut screen = Screen::open(config)?;
+    model.repeats_told = screen.tells_repeats();
+    let mut ticks = interval(TICK);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut look_again_at: Option<Duration> = None;
+    loop {
+        let (redraw_at, chord_at) = (screen.redraw_at(), model.abort_chord.acts_at());
+        let chord_at = chord_at.map(|at| times.ours(at));
+        let actions = tokio::select! {
+            biased;
+            signal = signals.next() => {
+                model.warn(times.theirs(clock.now()), format!("{signal}: the screen ends, the station goes on"));
+                break;
+            }
+            msg = screen.input() => {
+                screen.mark_changed();
+                if matches!(msg, Msg::Terminate(_)) {
+                    break;
+                }
+                update(&mut model, msg, times.theirs(clock.now()))
+            }
+            () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
+            told = link.told.recv(), if look_again_at.is_none() => {
+                match &told {
+                    Some((Told::Msg(msg), _)) => screen.mark_message(msg, &model),
+                    _ => screen.mark_changed(),
+                }
+                if let Some((told, at)) = told {
+                    times.heard(at, clock.now());
+                    take_live(&mut model, told, at)
+                } else {
+                    look_again_at = Some(clock.now() + AGAIN_AFTER);
+                    let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
+                    update(&mut model, gone, times.theirs(clock.now()))
+                }
+            },
+            () = clock.sleep_until(look_again_at) => {
+                look_again_at = Some(clock.now() + AGAIN_AFTER);
+                if let Ok(found) = Link::open(path, watch).await {
+                    link = found;
+                    let pages = model.pages;
+                    model = Model::new(settings(&Hello::default(), watch));
+                    model.pages = pages;
+                    model.repeats_told = screen.tells_repeats();
+                    look_again_at = None;
+                }
+                Vec::new()
+            }
+            _ = ticks.tick() => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
+            () = clock.sleep_until(Some(redraw_at)) => Vec::new(),
+        };
+        let mut quit = false;
+        for action in actions {
+            match action {
+                Action::Request(asked) => link.ask(&asked).await,
+                Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
+                    link.ask(&Asked::Key(action.detail)).await;
+                }
+                Action::Redraw => screen.clear(),
+                Action::Bell => screen.bell(),
+                Action::Quit => quit = true,
+                // The station itself sends, records and tells.
+                Action::Send(_) | Action::Record(_) | Action::SyncLog | Action::Alarm(_) => {}
+            }
+        }
+        screen.show_at(&model, clock.now(), times.theirs(clock.now())).context("drawing on the terminal")?;
+        if quit {
+            break;
+        }
+    }
+    drop(screen);
+    Ok(exit::decide(&model.outcome, true))
+}
+
+fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Result<()> {
+    match told {
+        Told::Hello(hello) => {
+            let (ours, theirs) = (VERSION, hello.version);
+            anyhow::ensure!(
+                ours == theirs,
+                "the station speaks version {theirs}, this screen {ours}; update"
+            );
+            model.settings = settings(&hello, watch);
+        }
+        Told::Live => {}
+        // What the station did then is done.
+        Told::Msg(msg) => drop(update(model, msg, at)),
+    }
+    Ok(())
+}
+
+fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
+    match told {
+        Told::Hello(hello) => {
+            model.settings = settings(&hello, model.settings.role == Role::Watching);
+            Vec::new()
+        }
+        Told::Live => Vec::new(),
+        Told::Msg(msg) => {
+            let actions = update(model, msg, at);
+            // The station asks for what the crew asks; a screen only rings.
+            actions.into_iter().filter(|action| *action == Action::Bell).collect()
+        }
+    }
+}
+
+fn settings(hello: &Hello, watch: bool) -> Settings {
+    let path = |path: &String| Some(path.clone()).filter(|path| !path.is_empty());
+    Settings {
+        link_name: hello.link_name.clone(),
+        link_capacity_bytes_s: Some(hello.link_capacity_bytes_s).filter(|most| *most > 0),
+        log_path: path(&hello.log_path),
+        tlog_path: path(&hello.tlog_path),
+        role: if watch { Role::Watching } else { Role::Attached },
+        auto: hello.auto,
+        interactive: true,
+        time_limit: None,
+    }
+}
+
+/// The station's time and the screen's own.
+#[derive(Debug, Default, Clone, Copy)]
+struct Times {
+    theirs_at: Duration,
+    ours_at: Duration,
+}
+
+impl Times {
+    fn heard(&mut self, theirs: Duration, ours: Duration) {
+        if theirs >= self.theirs_at {
+            (self.theirs_at, self.ours_at) = (theirs, ours);
+        }
+    }
+
+    fn theirs(&self, ours: Duration) -> Duration {
+        self.theirs_at + ours.saturating_sub(self.ours_at)
+    }
+
+    fn ours(&self, theirs: Duration) -> Duration {
+        self.ours_at + theirs.saturating_sub(self.theirs_at)
+    }
+}
+
+struct Link {
+    told: mpsc::Receiver<(Told, Duration)>,
+    write: OwnedWriteHalf,
+}
+
+impl Link {
+    async fn open(path: &Path, watch: bool) -> std::io::Result<Self> {
+        let (mut read, write) = place::connect(path).await?.into_split();
+        let (tell, told) = mpsc::channel(WAITING_MAX);
+        tokio::spawn(async move {
+            while let Some(bytes) = read_one(&mut read).await {
+                let Ok(told) = decode_told(&bytes) else { return };
+                if tell.send(told).await.is_err() {
+                    return;
+                }
+            }
+        });
+        let mut link = Self { told, write };
+        link.ask(&Asked::Hello { watch }).await;
+        Ok(link)
+    }
+
+    /// A station that is gone shows by its silence.
+    async fn ask(&mut self, asked: &Asked) {
+        let _ = self.write.write_all(&encode_asked(asked)).await;
+    }
+}

@@ -1,0 +1,107 @@
+//! The run loop of a replay: a screen and a film, no link and no log.
+
+use std::io::IsTerminal as _;
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::clock::Clock;
+use super::lines::{self, Lines};
+use super::screen::Screen;
+use super::signals::Signals;
+use crate::cli::{Cli, ReplayFrom};
+use crate::config::Config;
+use crate::exit::{self, Exit};
+use crate::model::{Role, Settings, words};
+use crate::replay::film::Film;
+use crate::replay::player::Player;
+use crate::update::Msg;
+
+/// Time moves on the screen this often.
+const STEP: Duration = Duration::from_millis(100);
+
+/// Shows a recorded flight until the person at the screen quits; without a screen, its events at once.
+///
+/// # Errors
+/// The log cannot be read, the terminal failed, or the film has no such phase.
+pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
+    let film = Film::load(path)?;
+    let damage = film.damage.clone();
+    let settings = Settings {
+        link_name: path.display().to_string(),
+        link_capacity_bytes_s: None,
+        log_path: Some(path.display().to_string()),
+        tlog_path: None,
+        role: Role::Replaying,
+        auto: false,
+        interactive: true,
+        time_limit: None,
+    };
+    let mut player = Player::new(film, settings);
+    match cli.from {
+        None => {}
+        Some(ReplayFrom::Time(at)) => player.seek(at),
+        Some(ReplayFrom::Phase(phase)) => {
+            let found = player.seek_phase(phase);
+            anyhow::ensure!(
+                found,
+                "{}: has no phase {}; it has {}",
+                path.display(),
+                words::phase(phase),
+                player
+                    .film()
+                    .phases
+                    .iter()
+                    .map(|(phase, _)| words::phase(*phase))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            );
+        }
+    }
+    if let Some(damage) = damage {
+        player.model.warn(player.position(), format!("the log {damage}"));
+    }
+    if interactive {
+        watch(&mut player, config).await?;
+    } else {
+        player.seek(player.film().length());
+        Lines::new().show(&player.model);
+    }
+    lines::closing(&player.model, interactive, Ok(&None));
+    Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
+}
+
+async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
+    let clock = Clock::start();
+    let mut screen = Screen::open(config)?;
+    let mut signals = Signals::listen()?;
+    let mut steps = interval(STEP);
+    steps.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let mut then = clock.now();
+    loop {
+        let redraw_at = screen.redraw_at();
+        tokio::select! {
+            biased;
+            _ = signals.next() => return Ok(()),
+            msg = screen.input() => match msg {
+                Msg::Key(crate::key::Key::CtrlL) => screen.clear(),
+                Msg::Key(key) if player.on_key(key) => return Ok(()),
+                Msg::Terminate(_) => return Ok(()),
+                _ => screen.mark_changed(),
+            },
+            _ = steps.tick() => {
+                let now = clock.now();
+                let before = player.position();
+                player.pass(now.saturating_sub(then));
+                then = now;
+                if player.position() != before {
+                    screen.mark_changed();
+                }
+            }
+            () = clock.sleep_until(Some(redraw_at)) => {}
+        }
+        screen.show_at(&player.model, clock.now(), player.position()).context("drawing on the terminal")?;
+    }
+}

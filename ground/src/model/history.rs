@@ -1,0 +1,82 @@
+//! The flight as a review needs it: when each phase began, and the greatest values.
+
+use std::time::Duration;
+
+use protocol::dialect::TdPhase;
+
+use super::vehicle::Vehicle;
+
+/// Phases kept; a vehicle that jumps to and fro cannot grow memory.
+const TIMELINE_MAX: usize = 64;
+
+/// Greatest values since the vehicle left the pad; `None` for what was never received.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Maxima {
+    /// Altitude, m.
+    pub altitude_m: Option<f64>,
+    /// Descent speed, m/s, down.
+    pub descent_m_s: Option<f64>,
+    /// Tilt from the vertical, rad.
+    pub tilt_rad: Option<f64>,
+    /// Pitch rate, rad/s, either way.
+    pub pitch_rate_rad_s: Option<f64>,
+    /// Gimbal angle measured, rad, either way.
+    pub gimbal_rad: Option<f64>,
+    /// Solve time, s.
+    pub solve_time_s: Option<f64>,
+    /// Smallest margin to the deadline, s.
+    pub margin_min_s: Option<f64>,
+    /// Time without a heartbeat, s.
+    pub silence_s: Option<f64>,
+}
+
+/// What a review shows.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    /// Phase and when it was seen first, since the start of the run.
+    pub timeline: Vec<(TdPhase, Duration)>,
+    /// Greatest values.
+    pub maxima: Maxima,
+}
+
+impl History {
+    pub(crate) fn note_phase(&mut self, phase: TdPhase, now: Duration) {
+        if self.timeline.len() < TIMELINE_MAX && self.timeline.last().is_none_or(|(last, _)| *last != phase) {
+            self.timeline.push((phase, now));
+        }
+    }
+
+    /// Takes what the vehicle says now, as far as it says it now.
+    pub(crate) fn note_values(&mut self, vehicle: &Vehicle, silence: Option<Duration>, now: Duration) {
+        if !vehicle.in_flight() {
+            return;
+        }
+        let maxima = &mut self.maxima;
+        if let Some(motion) = vehicle.best_motion().filter(|motion| !motion.is_stale(now)) {
+            raise(&mut maxima.altitude_m, motion.value.altitude_m);
+            raise(&mut maxima.descent_m_s, -motion.value.climb_m_s);
+        }
+        if let Some(attitude) = vehicle.attitude.filter(|attitude| !attitude.is_stale(now)) {
+            raise(&mut maxima.tilt_rad, attitude.value.tilt_rad);
+            raise(&mut maxima.pitch_rate_rad_s, attitude.value.pitch_rate_rad_s.abs());
+        }
+        if let Some(gimbal) = vehicle.gimbal.filter(|gimbal| !gimbal.is_stale(now)) {
+            raise(&mut maxima.gimbal_rad, gimbal.value.pitch.measured_rad.abs());
+        }
+        if let Some(controller) = vehicle.controller.as_ref().filter(|controller| !controller.is_stale(now)) {
+            raise(&mut maxima.solve_time_s, f64::from(controller.value.solve_time_us) * 1e-6);
+            let mut less = maxima.margin_min_s.map(|margin| -margin);
+            raise(&mut less, -f64::from(controller.value.deadline_margin_us) * 1e-6);
+            maxima.margin_min_s = less.map(|margin| -margin);
+        }
+        if let Some(silence) = silence {
+            raise(&mut maxima.silence_s, silence.as_secs_f64());
+        }
+    }
+}
+
+fn raise(greatest: &mut Option<f64>, value: f64) {
+    if value.is_finite() {
+        *greatest = Some(greatest.map_or(value, |known| known.max(value)));
+    }
+}

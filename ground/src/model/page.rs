@@ -1,0 +1,132 @@
+//! The screens a crew leafs through: the flight chooses one, a key holds another.
+
+use protocol::dialect::TdPhase;
+
+/// One screen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Page {
+    /// Arming checks and the arming ladder.
+    Pad,
+    /// Height and speed against the ignition band.
+    Descent,
+    /// The burn: side view, controller, actuators.
+    Landing,
+    /// The flight, judged.
+    Review,
+    /// The link's figures and the age of every message.
+    Link,
+    /// Everything that was said.
+    Messages,
+    /// The vehicle's parameters.
+    Parameters,
+    /// The recording.
+    Log,
+    /// The keys.
+    Help,
+}
+
+impl Page {
+    /// Every screen, in the order of its digit.
+    pub const ALL: [Self; 9] = [
+        Self::Pad,
+        Self::Descent,
+        Self::Landing,
+        Self::Review,
+        Self::Link,
+        Self::Messages,
+        Self::Parameters,
+        Self::Log,
+        Self::Help,
+    ];
+
+    /// The digit that shows it, 1 to 9.
+    pub fn digit(self) -> usize {
+        1 + self as usize
+    }
+
+    /// The screen of a digit.
+    pub fn from_digit(digit: char) -> Option<Self> {
+        let number = usize::try_from(digit.to_digit(10)?).ok()?;
+        Self::ALL.get(number.checked_sub(1)?).copied()
+    }
+
+    /// The name on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pad => "Pad",
+            Self::Descent => "Descent",
+            Self::Landing => "Landing",
+            Self::Review => "Review",
+            Self::Link => "Link",
+            Self::Messages => "Messages",
+            Self::Parameters => "Params",
+            Self::Log => "Log",
+            Self::Help => "Help",
+        }
+    }
+
+    /// The screen that belongs to a phase.
+    pub fn of_phase(phase: TdPhase) -> Self {
+        match phase {
+            TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => Self::Pad,
+            TdPhase::TD_PHASE_BOOST
+            | TdPhase::TD_PHASE_COAST
+            | TdPhase::TD_PHASE_DEPLOY
+            | TdPhase::TD_PHASE_AERO_DESCENT
+            | TdPhase::TD_PHASE_LAND_ARMED
+            | TdPhase::TD_PHASE_CHUTE => Self::Descent,
+            TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED => Self::Landing,
+            TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED => Self::Review,
+        }
+    }
+}
+
+/// Which screen is shown, and how far its list is scrolled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Pages {
+    /// The screen that the crew holds; `None` follows the flight.
+    pub held: Option<Page>,
+    /// Lines that a list is scrolled back from its newest, or down from its first.
+    pub scroll: usize,
+}
+
+impl Pages {
+    /// The screen to show in this phase.
+    pub fn shown(self, phase: Option<TdPhase>) -> Page {
+        self.held.unwrap_or_else(|| phase.map_or(Page::Pad, Page::of_phase))
+    }
+
+    /// Holds a screen, or follows the flight again.
+    pub fn hold(&mut self, page: Option<Page>) {
+        *self = Self { held: page, scroll: 0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_screen_has_its_digit() {
+        for page in Page::ALL {
+            let digit = char::from_digit(u32::try_from(page.digit()).unwrap(), 10).unwrap();
+            assert_eq!(Page::from_digit(digit), Some(page));
+        }
+        for other in ['0', 'x', '\u{0661}'] {
+            assert_eq!(Page::from_digit(other), None);
+        }
+    }
+
+    #[test]
+    fn the_flight_chooses_unless_a_screen_is_held() {
+        let mut pages = Pages::default();
+        assert_eq!(pages.shown(None), Page::Pad);
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_AERO_DESCENT)), Page::Descent);
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_POWERED)), Page::Landing);
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_TOUCHDOWN)), Page::Review);
+        pages.hold(Some(Page::Link));
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_POWERED)), Page::Link);
+        pages.hold(None);
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_POWERED)), Page::Landing);
+    }
+}

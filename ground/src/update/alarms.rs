@@ -1,0 +1,100 @@
+//! Which conditions are alarms. Each has words of its own; colour only repeats them.
+
+use std::time::Duration;
+
+use protocol::dialect::{TdControlLevel, TdInterlock, TdPhase};
+
+use super::Action;
+use crate::model::Model;
+use crate::model::alarm::AlarmKind;
+use crate::model::command::{Acknowledged, CommandKind};
+use crate::model::link::LinkState;
+
+/// An abort that was sent more often than this without an answer is an alarm.
+const UNANSWERED_ATTEMPTS: u32 = 3;
+/// A reboot is an alarm for this long, and until it is acknowledged.
+const REBOOT_SHOWN: Duration = Duration::from_secs(10);
+
+/// Compares the conditions with the alarms; rings and tells what is new.
+pub(super) fn watch(model: &mut Model, now: Duration) {
+    let mut conditions = Vec::new();
+    link_conditions(model, now, &mut conditions);
+    command_conditions(model, now, &mut conditions);
+    vehicle_conditions(model, now, &mut conditions);
+    let raised = model.alarms.watch(now, conditions);
+    if model.alarms.rings(now, !raised.is_empty()) {
+        model.outbox.push(Action::Bell);
+    }
+    model.outbox.extend(raised.into_iter().map(|alarm| Action::Alarm(alarm.text)));
+}
+
+fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+    if let LinkState::Lost(_) = model.link.state(now) {
+        found.push((AlarmKind::LinkLost, "LINK LOST: the vehicle is not heard".to_owned()));
+    }
+    if let Some(why) = &model.link.trouble {
+        found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
+    }
+    if model.log.failed {
+        found.push((AlarmKind::Log, "LOG FAILED: nothing more is recorded".to_owned()));
+    } else if model.log.dropped > 0 {
+        found.push((AlarmKind::Log, "LOG cannot keep up: records are lost".to_owned()));
+    }
+}
+
+fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+    for track in &model.commands.tracks {
+        let name = track.kind.name();
+        if track.disagrees(now) {
+            found.push((AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED")));
+        }
+        let waits = matches!(track.acknowledged, Acknowledged::Waiting | Acknowledged::Nothing);
+        if track.kind == CommandKind::Abort && waits && track.attempts >= UNANSWERED_ATTEMPTS {
+            found.push((AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated")));
+        } else if track.acknowledged == Acknowledged::Nothing && !track.not_observed_said {
+            found.push((AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged")));
+        }
+        if matches!(track.acknowledged, Acknowledged::Answered(_)) && !track.accepted() {
+            found.push((AlarmKind::Refused(track.kind), format!("{name} REFUSED by the vehicle")));
+        }
+    }
+}
+
+fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+    let vehicle = &model.vehicle;
+    if model.rebooted_at.is_some_and(|at| now.saturating_sub(at) < REBOOT_SHOWN) {
+        found.push((AlarmKind::Rebooted, "the vehicle has REBOOTED".to_owned()));
+    }
+    if let Some(locks) = vehicle.interlocks() {
+        let latched = [
+            (TdInterlock::TD_INTERLOCK_ABORT_LATCHED, AlarmKind::Aborted, "ABORT LATCHED on the vehicle"),
+            (TdInterlock::TD_INTERLOCK_NO_LIGHT, AlarmKind::NoLight, "NO LIGHT: the motor did not light"),
+            (TdInterlock::TD_INTERLOCK_DEGRADED, AlarmKind::Degraded, "DEGRADED: the stabiliser flies"),
+        ];
+        for (bit, kind, words) in latched {
+            if locks.contains(bit) {
+                found.push((kind, words.to_owned()));
+            }
+        }
+    }
+    if vehicle.verdict.is_some_and(|verdict| !verdict.value.landed) {
+        found.push((AlarmKind::NotLanded, "NOT LANDED inside the limits".to_owned()));
+    }
+    let powered = vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_POWERED);
+    if !powered || vehicle.verdict.is_some() {
+        return;
+    }
+    if let Some(controller) = vehicle.controller.as_ref().filter(|controller| !controller.is_stale(now)) {
+        if controller.value.deadline_margin_us < 0 {
+            found.push((AlarmKind::DeadlineMissed, "controller DEADLINE MISSED".to_owned()));
+        }
+        if controller.value.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER
+            && !found.iter().any(|(kind, _)| *kind == AlarmKind::Degraded)
+        {
+            found.push((AlarmKind::Degraded, "DEGRADED: the stabiliser flies".to_owned()));
+        }
+    }
+    if let Some(names) = vehicle.prediction.and_then(|prediction| prediction.value.touchdown.violations()) {
+        found.push((AlarmKind::PlanOutside, format!("plan ends OUTSIDE {names}")));
+    }
+}

@@ -1,0 +1,63 @@
+//! The height gauge: a scale from the pad up, the ignition band on it, the vehicle beside it.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use super::number::{age_mark, fixed};
+use super::theme::{Role, Theme};
+use crate::model::Model;
+use crate::model::reckoning::reckon;
+
+/// The scale reaches at least this high, m.
+const TOP_MIN_M: f64 = 20.0;
+
+/// One line a row, the greatest height first.
+pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
+    if rows < 3 {
+        return Vec::new();
+    }
+    let descent = model.vehicle.descent.as_ref();
+    let motion = model.vehicle.best_motion();
+    let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
+    let band = descent
+        .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
+    let chosen = descent.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
+    let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
+    let lost = reckon(&model.vehicle, now);
+    let (height, mark, role) = match (lost, motion) {
+        (Some(at), _) => (finite(at.altitude_m), "?", Role::Stale),
+        (None, Some(motion)) => {
+            let (mark, role) = age_mark(&motion, now);
+            (finite(motion.value.altitude_m.max(0.0)), mark, role)
+        }
+        (None, None) => (None, " ", Role::Label),
+    };
+    let marks = [height, band.map(|band| band.1), chosen, commit];
+    let top = marks.into_iter().flatten().fold(TOP_MIN_M, f64::max) * 1.1;
+    let per_row = top / (rows - 1) as f64;
+    (0..rows)
+        .rev()
+        .map(|row| {
+            let (low, high) = ((row as f64 - 0.5) * per_row, (row as f64 + 0.5) * per_row);
+            let here = |height: Option<f64>| height.is_some_and(|height| (low..high).contains(&height));
+            let inside = band.is_some_and(|(bottom, top)| bottom < high && top >= low);
+            let mut spans = vec![
+                Span::styled(format!("{:>6} ", fixed(row as f64 * per_row, 0)), theme.style(Role::Label)),
+                Span::styled(if inside { "▐█▌" } else { " │ " }, theme.style(Role::Plain)),
+            ];
+            if here(height) {
+                let text = height.map_or_else(String::new, |height| fixed(height, 1));
+                let role = if role == Role::Stale { role } else { Role::Title };
+                spans.push(Span::styled(format!("<{mark}{text} "), theme.style(role)));
+            }
+            for (at, name) in [(chosen, "IGNITE"), (commit, "commit")] {
+                if here(at) {
+                    let text = at.map_or_else(String::new, |height| fixed(height, 0));
+                    spans.push(Span::styled(format!("-{name} {text} "), theme.style(Role::Caution)));
+                }
+            }
+            Line::from(spans)
+        })
+        .collect()
+}

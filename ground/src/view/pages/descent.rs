@@ -1,0 +1,129 @@
+//! The way down: height and speed against the ignition band, the countdown, fins from above, the wind.
+
+use std::time::Duration;
+
+use protocol::dialect::{TD_DESCENT_DATA, TdChute};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::Line;
+
+use super::titled;
+use crate::model::vehicle::Sample;
+use crate::model::{Model, words};
+use crate::view::number::{age_mark, row, text_row};
+use crate::view::theme::{Role, Theme};
+use crate::view::{draw_lines, fins, gauge, happenings, lost, side};
+
+/// Columns of the height gauge.
+const GAUGE_COLUMNS: u16 = 27;
+/// Columns of the numbers.
+const NUMBER_COLUMNS: u16 = 28;
+/// Rows of the numbers, their title included.
+const NUMBER_ROWS: u16 = 16;
+
+/// Gauge on the left, numbers in the middle, fins and side view on the right.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
+        Constraint::Length(GAUGE_COLUMNS),
+        Constraint::Length(NUMBER_COLUMNS),
+        Constraint::Fill(1),
+    ]));
+    let inside = titled("Height, m", theme, frame, gauge_area);
+    draw_lines(frame, inside, &gauge::lines(model, theme, now, usize::from(inside.height)));
+    let [numbers, below] =
+        middle.layout(&Layout::vertical([Constraint::Length(NUMBER_ROWS), Constraint::Fill(1)]));
+    let title = if lost::is_lost(model, now) { "PREDICTED, not heard" } else { "Descent" };
+    let inside = titled(title, theme, frame, numbers);
+    draw_lines(frame, inside, &lines(model, theme, now));
+    draw_lines(frame, below, &[happenings::link(model, theme, now, usize::from(below.width))]);
+    let [fin_area, picture] =
+        right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
+    let inside = titled("Fins from above", theme, frame, fin_area);
+    draw_lines(frame, inside, &fins::lines(model, theme, now));
+    let inside = titled("Side view", theme, frame, picture);
+    side::draw(model, theme, now, frame, inside);
+}
+
+/// The numbers, the most important first.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = lost::rows(model, theme, now);
+    let descent = model.vehicle.descent.as_ref();
+    let motion = model.vehicle.best_motion();
+    let of = |pick: fn(&TD_DESCENT_DATA) -> f32| {
+        descent
+            .map(|d| Sample { value: f64::from(pick(&d.value)), received_at: d.received_at })
+            .filter(|sample| sample.value.is_finite())
+    };
+    let of_motion = |value: Option<f64>| {
+        value.zip(motion.map(|motion| motion.received_at)).map(|(value, at)| Sample::new(value, at))
+    };
+    let height = of(|d| d.height_m).or(of_motion(motion.map(|m| m.value.altitude_m)));
+    let speed = of(|d| d.vertical_speed_m_s).or(of_motion(motion.map(|m| m.value.climb_m_s)));
+    lines.push(band_word(model, theme, now));
+    lines.push(row(theme, "height", height, 1, "m", now));
+    lines.push(row(theme, "vertical", speed, 1, "m/s", now));
+    lines.push(row(theme, "ignite in", of(|d| d.time_to_ignition_s), 1, "s", now));
+    lines.push(row(theme, "ignite at", of(|d| d.chosen_height_m), 1, "m", now));
+    lines.push(row(theme, "band high", of(|d| d.band_high_m), 1, "m", now));
+    lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
+    lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
+    lines.push(chute(descent, theme, now));
+    lines.push(row(theme, "wind", wind_speed(descent), 1, "m/s", now));
+    lines.push(row(theme, "wind from", wind_from(descent), 0, "deg", now));
+    lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
+    lines.push(row(theme, "thrust x", of(|d| d.thrust_scale), 3, "", now));
+    lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
+    lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
+    lines
+}
+
+/// Where the height stands against the band and the commit height, in words.
+fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = model.vehicle.descent.as_ref() else {
+        return Line::styled(" ignition band: no data", theme.style(Role::Caution));
+    };
+    let (mark, stale) = age_mark(descent, now);
+    let d = &descent.value;
+    let (words, role) = if !(d.height_m.is_finite() && d.band_low_m.is_finite() && d.band_high_m.is_finite())
+    {
+        ("band not known", Role::Caution)
+    } else if d.band_low_m > d.band_high_m {
+        ("NO HEIGHT LANDS", Role::Alarm)
+    } else if d.height_m < d.band_low_m {
+        ("BELOW the band", Role::Alarm)
+    } else if d.height_m > d.band_high_m {
+        ("above the band", Role::Plain)
+    } else {
+        ("INSIDE the band", Role::Good)
+    };
+    let committed = d.height_m < d.commit_height_m;
+    let commit = if committed { ", committed" } else { "" };
+    let role = if stale == Role::Stale { stale } else { role };
+    Line::styled(format!("{mark}{words}{commit}"), theme.style(role))
+}
+
+fn chute(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = descent else { return text_row(theme, "chute", " ", "no data", Role::Label, "") };
+    let (mark, stale) = age_mark(descent, now);
+    let text = words::lower_case(&descent.value.chute, "TD_CHUTE_");
+    let role = match descent.value.chute {
+        TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => Role::Caution,
+        _ => Role::Plain,
+    };
+    text_row(theme, "chute", mark, &text, if stale == Role::Stale { stale } else { role }, "")
+}
+
+fn wind_speed(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
+    let descent = descent?;
+    let speed = libm::hypot(f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
+    speed.is_finite().then(|| Sample::new(speed, descent.received_at))
+}
+
+/// Where it blows from, as weather reports say it: 0 north, 90 east.
+fn wind_from(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
+    let descent = descent?;
+    let (north, east) = (f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
+    let from_deg = libm::atan2(-east, -north).to_degrees().rem_euclid(360.0);
+    let known = from_deg.is_finite() && (north != 0.0 || east != 0.0);
+    known.then(|| Sample::new(from_deg, descent.received_at))
+}

@@ -1,0 +1,30 @@
+//! The keys, explained.
+
+use ratatui::text::Line;
+
+/// The screen's lines.
+pub fn lines() -> Vec<Line<'static>> {
+    [
+        " A               open the arming dialog (step 1);",
+        "                 then type ARM and Enter within 10 s (step 2)",
+        " S, Enter        start the countdown; Enter within 5 s",
+        " D, Enter        disarm",
+        " Ctrl-X Ctrl-X   ABORT, from anywhere: two presses within 2 s;",
+        "                 a held key is one press. Sent until acknowledged",
+        " Space           acknowledge the alarms: the bell stops",
+        " 1 to 9          show a screen and hold it; h holds the present one",
+        " 0 or Esc        follow the flight again",
+        " Up Down PgUp PgDn Home End   scroll a list",
+        " Ctrl-L          draw the screen again",
+        " In a replay: Space, Left, Right, [ and ] (phases), + and - (speed), g, G",
+        " q, Ctrl-C       quit; asks when armed or in flight",
+        "",
+        " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
+        " observed are three facts; armed is what HEARTBEAT says.",
+        " o command, # actual. A line is flown, dots are planned; after the",
+        " loss of the link the position is a PREDICTION, + and its circle.",
+    ]
+    .into_iter()
+    .map(Line::raw)
+    .collect()
+}

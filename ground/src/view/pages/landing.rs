@@ -1,0 +1,160 @@
+//! The burn: flight, controller, touchdown, actuators, side view.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+
+use super::titled;
+use crate::model::Model;
+use crate::model::command::CommandKind;
+use crate::model::vehicle::Sample;
+use crate::view::number::{STALE_MARK, fixed};
+use crate::view::theme::{Role, Theme};
+use crate::view::{actuators, big, controller, draw_lines, flight, happenings, lost, side, top, touchdown};
+
+/// Rows of the three panels at the top, their title included.
+const PANEL_ROWS: u16 = 9;
+/// Rows of the actuators, their title included.
+const ACTUATOR_ROWS: u16 = 5;
+/// Columns left of the side view at 80 columns.
+const LEFT_COLUMNS: u16 = 54;
+
+/// Draws the panels.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [panels, below] =
+        area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS), Constraint::Fill(1)]));
+    draw_panels(model, theme, now, frame, panels);
+    let left_columns = LEFT_COLUMNS.max(area.width * 3 / 5);
+    let [left, right] =
+        below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
+    draw_left(model, theme, now, frame, left);
+    let title = if lost::is_lost(model, now) { "Side view: PREDICTION +" } else { "Side view: flown, plan" };
+    let inside = titled(title, theme, frame, right);
+    side::draw(model, theme, now, frame, inside);
+}
+
+fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [first, second, third] =
+        area.layout(&Layout::horizontal([Constraint::Fill(27), Constraint::Fill(26), Constraint::Fill(27)]));
+    if lost::is_lost(model, now) {
+        let inside = titled("PREDICTED, not heard", theme, frame, first);
+        draw_lines(frame, inside, &lost::rows(model, theme, now));
+    } else {
+        let inside = titled("Flight", theme, frame, first);
+        draw_lines(frame, inside, &flight::rows(model, theme, now));
+    }
+    let inside = titled("NMPC", theme, frame, second);
+    draw_lines(frame, inside, &controller::rows(model, theme, now));
+    let (title, rows) = touchdown::panel(model, theme, now);
+    let inside = titled(title, theme, frame, third);
+    draw_lines(frame, inside, &rows);
+}
+
+fn draw_left(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [actuators, link, events] = area.layout(&Layout::vertical([
+        Constraint::Length(ACTUATOR_ROWS),
+        Constraint::Length(1),
+        Constraint::Fill(1),
+    ]));
+    if let Some(verdict) = model.vehicle.verdict {
+        draw_verdict(verdict.value.landed, theme, frame, actuators);
+    } else {
+        let [fins, gimbal] =
+            actuators.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+        let inside = titled("Fins command|actual", theme, frame, fins);
+        draw_lines(frame, inside, &actuators::fin_rows(model, theme, now));
+        let inside = titled("Gimbal", theme, frame, gimbal);
+        draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
+    }
+    frame.render_widget(happenings::link(model, theme, now, usize::from(link.width)), link);
+    let inside = titled("Events", theme, frame, events);
+    let lines = happenings::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &lines);
+}
+
+fn draw_verdict(landed: bool, theme: Theme, frame: &mut Frame, area: Rect) {
+    let word = if landed { "LANDED" } else { "NOT LANDED" };
+    let role = if landed { Role::Good } else { Role::Caution };
+    let lines = big::word(word).map(|line| Line::styled(format!(" {line}"), theme.style(role)));
+    let below = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
+    draw_lines(frame, below, &lines);
+}
+
+/// The same facts as lines, the most important first.
+pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let mut lines = vec![motion(model, theme, now)];
+    if lost::is_lost(model, now) {
+        lines = lost::rows(model, theme, now);
+    }
+    // The newest event earns a line before anything else does.
+    lines.extend(newest_event(model, theme));
+    // An abort has its place above.
+    if let Some(track) = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort) {
+        lines.push(top::facts_short(track, theme, now));
+    }
+    lines.push(attitude(model, theme, now));
+    let (title, touchdown) = touchdown::panel(model, theme, now);
+    let mut verdict = Line::styled(format!(" {title}: "), theme.style(Role::Label));
+    verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
+        let style = line.style;
+        line.spans.into_iter().map(move |span| span.patch_style(style))
+    }));
+    lines.push(verdict);
+    lines.extend(controller::rows(model, theme, now).into_iter().take(2));
+    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
+    lines.extend(actuators::fin_rows(model, theme, now));
+    lines.push(happenings::link(model, theme, now, columns));
+    let room = rows.saturating_sub(lines.len());
+    lines.extend(happenings::events(model, theme, columns, room));
+    lines
+}
+
+fn value(
+    theme: Theme,
+    label: &str,
+    sample: Option<Sample<f64>>,
+    decimals: usize,
+    now: Duration,
+) -> Vec<Span<'static>> {
+    let text = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
+    let stale = sample.is_some_and(|sample| sample.is_stale(now));
+    let mark = if stale { STALE_MARK } else { "" };
+    let role = if stale { Role::Stale } else { Role::Plain };
+    vec![
+        Span::styled(format!(" {label} "), theme.style(Role::Label)),
+        Span::styled(format!("{mark}{text}"), theme.style(role)),
+    ]
+}
+
+fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let motion = model.vehicle.best_motion();
+    let altitude =
+        motion.map(|motion| Sample { value: motion.value.altitude_m, received_at: motion.received_at });
+    let climb =
+        motion.map(|motion| Sample { value: motion.value.climb_m_s, received_at: motion.received_at });
+    let mut spans = value(theme, "alt", altitude, 1, now);
+    spans.extend(value(theme, "vz", climb, 1, now));
+    Line::from(spans)
+}
+
+fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let body = model.vehicle.body_speed();
+    let attitude = model.vehicle.attitude;
+    let u = body.map(|body| Sample { value: body.value.u_m_s, received_at: body.received_at });
+    let w = body.map(|body| Sample { value: body.value.w_m_s, received_at: body.received_at });
+    let pitch = attitude.map(|attitude| Sample {
+        value: attitude.value.pitch_rad.to_degrees(),
+        received_at: attitude.received_at,
+    });
+    let mut spans = value(theme, "pitch", pitch, 1, now);
+    spans.extend(value(theme, "u", u, 1, now));
+    spans.extend(value(theme, "w", w, 2, now));
+    Line::from(spans)
+}
+
+fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let event = model.events.newest(1).next()?;
+    Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(Role::Plain)))
+}

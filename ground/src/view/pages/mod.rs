@@ -1,0 +1,66 @@
+//! One room a screen. Each gives its lines for small terminals; those with panels also draw them.
+
+pub mod descent;
+pub mod help;
+pub mod landing;
+pub mod link;
+pub mod log;
+pub mod messages;
+pub mod pad;
+pub mod parameters;
+pub mod review;
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+use ratatui::widgets::{Block, Borders};
+
+use super::draw_lines;
+use super::theme::{Role, Theme};
+use crate::model::Model;
+use crate::model::page::Page;
+
+/// Draws the present screen between the top lines and the alarm line.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    match model.page() {
+        Page::Pad => pad::draw(model, theme, now, frame, area),
+        Page::Descent => descent::draw(model, theme, now, frame, area),
+        Page::Landing => landing::draw(model, theme, now, frame, area),
+        page => {
+            let inside = titled(page.name(), theme, frame, area);
+            draw_lines(frame, inside, &lines(model, page, theme, now, inside));
+        }
+    }
+}
+
+/// The present screen as lines, the most important first.
+pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
+    let (columns, rows) = (usize::from(area.width), usize::from(area.height));
+    match page {
+        Page::Pad => pad::lines(model, theme, now),
+        Page::Descent => descent::lines(model, theme, now),
+        Page::Landing => landing::lines(model, theme, now, columns, rows),
+        Page::Review => review::lines(model, theme, now, columns),
+        Page::Link => link::lines(model, theme, now, columns),
+        Page::Messages => messages::lines(model, theme, columns, rows),
+        Page::Parameters => parameters::lines(model, theme, rows),
+        Page::Log => log::lines(model, theme, now),
+        Page::Help => help::lines(),
+    }
+}
+
+/// Draws a title with a rule and returns the area below it.
+pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
+    let title = Line::styled(format!(" {title} "), theme.style(Role::Title));
+    let block = Block::new().borders(Borders::TOP).border_style(theme.style(Role::Label)).title(title);
+    let inside = block.inner(area);
+    frame.render_widget(block, area.intersection(frame.area()));
+    inside
+}
+
+/// So many lines from a place on.
+fn window(lines: Vec<Line<'static>>, start: usize, rows: usize) -> Vec<Line<'static>> {
+    lines.into_iter().skip(start).take(rows).collect()
+}

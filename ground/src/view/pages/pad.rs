@@ -1,0 +1,198 @@
+//! Before the flight: every arming check with its value and reason, and the ladder that arms.
+
+use std::time::Duration;
+
+use protocol::dialect::{TdCheck, TdInterlock, TdPhase};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+
+use super::titled;
+use crate::model::Model;
+use crate::model::command::CommandKind;
+use crate::model::vehicle::Vehicle;
+use crate::model::words;
+use crate::view::number::{STALE_MARK, fixed};
+use crate::view::theme::{Role, Theme};
+use crate::view::{draw_lines, flight, happenings, top};
+
+/// Columns of the checks at 80 columns.
+const CHECK_COLUMNS: u16 = 47;
+/// Rows of the checks, title and summary included.
+const CHECK_ROWS: u16 = 15;
+/// Rows of the ladder, its title included.
+const LADDER_ROWS: u16 = 9;
+
+/// Checks and ladder side by side, the events below.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [upper, events] =
+        area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
+    let columns = CHECK_COLUMNS.max(area.width / 2);
+    let [left, right] = upper.layout(&Layout::horizontal([Constraint::Length(columns), Constraint::Fill(1)]));
+    let inside = titled("Arming checks", theme, frame, left);
+    draw_lines(frame, inside, &checks(model, theme, now));
+    let [ladder_area, picture] =
+        right.layout(&Layout::vertical([Constraint::Length(LADDER_ROWS), Constraint::Fill(1)]));
+    let inside = titled("Arming ladder", theme, frame, ladder_area);
+    draw_lines(frame, inside, &ladder(model, theme, now));
+    let inside = titled("Now", theme, frame, picture);
+    let mut lines = flight::rows(model, theme, now);
+    lines.truncate(2);
+    lines.push(happenings::link(model, theme, now, usize::from(inside.width)));
+    draw_lines(frame, inside, &lines);
+    let inside = titled("Events", theme, frame, events);
+    let lines = happenings::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &lines);
+}
+
+/// The failing checks first: they are what a small screen must show.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = vec![top::command(model, theme, now)];
+    let mut checks = checks(model, theme, now);
+    checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
+    lines.extend(checks);
+    lines.extend(ladder(model, theme, now));
+    lines
+}
+
+/// One line a check: GO or NO, its name, the value found, and why it refuses.
+fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let status = model.vehicle.status.as_ref();
+    let stale = status.is_some_and(|status| status.is_stale(now));
+    let mut lines: Vec<Line> = TdCheck::all()
+        .iter_names()
+        .map(|(name, bit)| {
+            let (word, role) = match status {
+                None => (" ?  ", Role::Label),
+                Some(status) if status.value.checks_failed.contains(bit) => (" NO ", Role::Alarm),
+                Some(_) => (" GO ", Role::Good),
+            };
+            let mark = if stale { STALE_MARK } else { " " };
+            let name = words::lower_case(&NameOf(name), "TD_CHECK_");
+            let failing = status.is_some_and(|status| status.value.checks_failed.contains(bit));
+            let reason = if failing { why(bit) } else { "" };
+            Line::from(vec![
+                Span::styled(word, theme.style(role)),
+                Span::styled(format!("{mark}{name:<19.19}"), theme.style(Role::Plain)),
+                Span::styled(format!("{:>10} ", found(&model.vehicle, bit)), theme.style(Role::Plain)),
+                Span::styled(reason, theme.style(Role::Caution)),
+            ])
+        })
+        .collect();
+    let summary = match status {
+        None => Line::styled(" the vehicle has not said how its checks stand", theme.style(Role::Caution)),
+        Some(status) if status.value.checks_failed.is_empty() => {
+            Line::styled(" GO: every arming check passes", theme.style(Role::Good))
+        }
+        Some(status) => {
+            let count = status.value.checks_failed.iter_names().count();
+            Line::styled(format!(" NO-GO: {count} of {} checks fail", lines.len()), theme.style(Role::Alarm))
+        }
+    };
+    lines.insert(0, summary);
+    lines
+}
+
+/// A bit's name, printed as it is.
+struct NameOf<'a>(&'a str);
+
+impl std::fmt::Debug for NameOf<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(self.0)
+    }
+}
+
+/// What telemetry shows of a check; empty where it shows nothing.
+fn found(vehicle: &Vehicle, check: TdCheck) -> String {
+    let locks = vehicle.interlocks();
+    let yes_no = |bit: TdInterlock, yes: &'static str, no: &'static str| {
+        locks.map_or("", |locks| if locks.contains(bit) { yes } else { no }).to_owned()
+    };
+    let number = |value: Option<f64>, decimals: usize, unit: &str| {
+        value.map_or_else(String::new, |value| format!("{} {unit}", fixed(value, decimals)))
+    };
+    let attitude = vehicle.attitude.map(|attitude| attitude.value);
+    match check {
+        TdCheck::TD_CHECK_ABORT_LATCH => yes_no(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, "latched", "free"),
+        TdCheck::TD_CHECK_PIN => yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"),
+        TdCheck::TD_CHECK_TILT => number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"),
+        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.pitch_rate_rad_s.to_degrees()), 1, "deg/s"),
+        TdCheck::TD_CHECK_SPEED => {
+            let speed = vehicle.motion.map(|m| libm::hypot(m.value.vx_m_s, m.value.climb_m_s));
+            number(speed, 2, "m/s")
+        }
+        TdCheck::TD_CHECK_FINS => {
+            let error = vehicle.fins.map(|fins| {
+                let apart = |fin: &crate::model::vehicle::Deflection| {
+                    (fin.commanded_rad - fin.measured_rad).abs().to_degrees()
+                };
+                fins.value.iter().map(apart).fold(0.0, f64::max)
+            });
+            number(error, 1, "deg")
+        }
+        TdCheck::TD_CHECK_CONTROLLER_WARM => vehicle.controller.as_ref().map_or_else(String::new, |c| {
+            words::lower_case(&c.value.solver_status, "TD_SOLVER_STATUS_").chars().take(10).collect()
+        }),
+        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => vehicle.prediction.map_or_else(String::new, |prediction| {
+            prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
+        }),
+        _ => String::new(),
+    }
+}
+
+/// Why a failing check refuses, in the dialect's words.
+fn why(check: TdCheck) -> &'static str {
+    match check {
+        TdCheck::TD_CHECK_ABORT_LATCH => "power cycle",
+        TdCheck::TD_CHECK_PIN => "pull the pin",
+        TdCheck::TD_CHECK_SELF_TEST => "not passed",
+        TdCheck::TD_CHECK_TILT => "not upright",
+        TdCheck::TD_CHECK_ROTATION => "turning",
+        TdCheck::TD_CHECK_SPEED => "moving",
+        TdCheck::TD_CHECK_ESTIMATOR => "not settled",
+        TdCheck::TD_CHECK_FINS => "no answer",
+        TdCheck::TD_CHECK_IGNITER => "open circuit",
+        TdCheck::TD_CHECK_LOG => "not running",
+        TdCheck::TD_CHECK_LOG_SPACE => "disk full",
+        TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
+        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
+        _ => "",
+    }
+}
+
+/// The rungs from link to countdown, and which stand.
+fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let vehicle = &model.vehicle;
+    let phase = vehicle.phase().map(|phase| phase.value);
+    let armed = vehicle.armed().is_some_and(|armed| armed.value);
+    let checked = vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
+    let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
+    let counting = vehicle.countdown_s().is_some();
+    let rungs = [
+        (model.link.state(now).carries(), "the vehicle is heard"),
+        (pin_out, "pin out (first inhibit)"),
+        (checked, "every check passes"),
+        (armed, "A, then ARM Enter (10 s)"),
+        (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT"),
+        (counting, "S, Enter (5 s): countdown"),
+    ];
+    let mut lines: Vec<Line> = rungs
+        .into_iter()
+        .map(|(stands, words)| {
+            let (mark, role) = if stands { (" [x] ", Role::Good) } else { (" [ ] ", Role::Label) };
+            Line::from(vec![
+                Span::styled(mark, theme.style(role)),
+                Span::styled(words, theme.style(Role::Plain)),
+            ])
+        })
+        .collect();
+    lines.push(Line::from(vec![
+        Span::styled(" D", theme.style(Role::Key)),
+        Span::styled(" disarm   ", theme.style(Role::Label)),
+        Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
+        Span::styled(" ABORT", theme.style(Role::Label)),
+    ]));
+    let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
+    lines.extend(arming.map(|track| top::facts_short(track, theme, now)));
+    lines
+}

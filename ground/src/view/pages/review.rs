@@ -1,0 +1,97 @@
+//! After the flight: the verdict against each limit, the timeline, the greatest values.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use crate::model::{Model, words};
+use crate::view::number::fixed;
+use crate::view::theme::{Role, Theme};
+use crate::view::touchdown;
+
+/// Columns of the verdict beside the greatest values.
+const VERDICT_COLUMNS: usize = 38;
+
+/// The word that decides, then limits and maxima, then the timeline.
+pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let mut lines = vec![match model.vehicle.verdict {
+        Some(verdict) => {
+            let (word, role) = touchdown::verdict_word(verdict.value.landed);
+            Line::styled(format!(" {word}"), theme.style(role))
+        }
+        None => Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution)),
+    }];
+    let (title, mut limits) = touchdown::panel(model, theme, now);
+    if model.vehicle.verdict.is_some() {
+        limits.pop();
+    }
+    limits.insert(0, Line::styled(title, theme.style(Role::Title)));
+    let mut maxima = maxima(model, theme);
+    maxima.insert(0, Line::styled(" Greatest values in flight", theme.style(Role::Title)));
+    if columns >= 2 * VERDICT_COLUMNS {
+        lines.extend(beside(limits, maxima));
+    } else {
+        lines.extend(limits);
+        lines.extend(maxima);
+    }
+    lines.push(Line::styled(" leg load   no data: the vehicle does not report it", theme.style(Role::Label)));
+    lines.push(Line::styled(" Timeline", theme.style(Role::Title)));
+    lines.extend(timeline(model, theme));
+    lines
+}
+
+fn beside(left: Vec<Line<'static>>, right: Vec<Line<'static>>) -> Vec<Line<'static>> {
+    let rows = left.len().max(right.len());
+    let (mut left, mut right) = (left.into_iter(), right.into_iter());
+    (0..rows)
+        .map(|_| {
+            let line = left.next().unwrap_or_default();
+            let gap = VERDICT_COLUMNS.saturating_sub(line.width() + 1);
+            let mut spans = vec![Span::raw(" ")];
+            let style = line.style;
+            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            spans.push(Span::raw(" ".repeat(gap)));
+            let line = right.next().unwrap_or_default();
+            let style = line.style;
+            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            Line::from(spans)
+        })
+        .collect()
+}
+
+fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+    let most = &model.history.maxima;
+    let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
+        let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
+        Line::from(vec![
+            Span::styled(format!(" {label:<18}"), theme.style(Role::Label)),
+            Span::styled(format!("{text:>9}"), theme.style(Role::Plain)),
+            Span::styled(format!(" {unit}"), theme.style(Role::Label)),
+        ])
+    };
+    let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
+    vec![
+        row("altitude", most.altitude_m, 2, "m"),
+        row("descent speed", most.descent_m_s, 2, "m/s"),
+        row("tilt", most.tilt_rad.map(f64::to_degrees), 2, "deg"),
+        row("pitch rate", most.pitch_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
+        row("gimbal", most.gimbal_rad.map(f64::to_degrees), 2, "deg"),
+        row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
+        row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
+        row("silence", most.silence_s, 1, "s"),
+    ]
+}
+
+/// Each phase and when it began, several on a line.
+fn timeline(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+    let entries: Vec<String> = model
+        .history
+        .timeline
+        .iter()
+        .map(|(phase, at)| format!("{:>8.1} {:<14}", at.as_secs_f64(), words::phase(*phase)))
+        .collect();
+    if entries.is_empty() {
+        return vec![Line::styled("  nothing heard", theme.style(Role::Label))];
+    }
+    entries.chunks(3).map(|chunk| Line::styled(chunk.concat(), theme.style(Role::Plain))).collect()
+}

@@ -1,0 +1,114 @@
+//! Alarms: rung until seen, never by colour alone; what is too old or too late says so.
+
+use ground::key::Key;
+use ground::model::alarm::{AlarmKind, RING_EVERY};
+use ground::model::command::CommandKind;
+use ground::update::Action;
+use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdPhase};
+
+use crate::bench::Bench;
+use crate::hand::ladder;
+
+fn bells(bench: &Bench) -> usize {
+    bench.actions.iter().filter(|action| **action == Action::Bell).count()
+}
+
+#[test]
+fn the_loss_of_the_link_rings_until_it_is_acknowledged() {
+    let mut bench = Bench::crewed();
+    bench.actions.clear();
+    bench.speaks = false;
+    bench.run(3.4);
+    assert_eq!(bells(&bench), 0);
+    bench.run(1.0);
+    assert_eq!(bells(&bench), 1);
+    assert!(bench.screen(80, 24).contains("ALARM LINK LOST"));
+    assert!(bench.screen(20, 5).contains("ALARM LINK LOST"));
+    bench.run(RING_EVERY.as_secs_f64());
+    assert_eq!(bells(&bench), 2);
+    bench.key(Key::Char(' '));
+    bench.run(20.0);
+    assert_eq!(bells(&bench), 2);
+    assert!(bench.screen(80, 24).contains("alarm seen: LINK LOST"), "it still holds");
+    bench.speaks = true;
+    bench.run(1.1);
+    assert!(bench.model.alarms.list().is_empty());
+}
+
+#[test]
+fn an_alarm_that_is_over_stays_until_it_was_seen() {
+    let mut bench = Bench::crewed();
+    bench.speaks = false;
+    bench.run(5.0);
+    bench.speaks = true;
+    bench.run(2.0);
+    assert!(bench.screen(80, 24).contains(", over"));
+    bench.key(Key::Char(' '));
+    assert!(!bench.screen(80, 24).contains("ALARM"));
+}
+
+#[test]
+fn disagreement_between_acknowledged_and_observed_is_an_alarm() {
+    let mut bench = Bench::crewed();
+    bench.keys(&ladder());
+    bench.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
+    bench.run(4.0);
+    let kinds: Vec<_> = bench.model.alarms.list().iter().map(|alarm| alarm.kind).collect();
+    assert_eq!(kinds, [AlarmKind::Disagreement(CommandKind::Arm)]);
+}
+
+#[test]
+fn what_the_vehicle_latches_is_an_alarm() {
+    let mut bench = Bench::crewed();
+    bench.interlocks |= TdInterlock::TD_INTERLOCK_NO_LIGHT;
+    bench.run(0.1);
+    assert!(bench.screen(80, 24).contains("ALARM NO LIGHT"));
+}
+
+#[test]
+fn an_abort_without_an_answer_is_an_alarm_while_it_is_repeated() {
+    let mut bench = Bench::crewed();
+    bench.abort_chord();
+    bench.run(3.0);
+    assert!(bench.screen(80, 24).contains("ABORT NOT ACKNOWLEDGED"));
+    bench.answer(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 0);
+    bench.key(Key::Char(' '));
+    bench.run(0.1);
+    assert!(!bench.screen(80, 24).contains("NOT ACKNOWLEDGED"));
+}
+
+#[test]
+fn an_abort_that_would_arrive_too_late_says_so() {
+    let mut bench = Bench::crewed();
+    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    bench.run(1.0);
+    bench.descent(180.0);
+    assert!(bench.screen(80, 24).contains("abort now: inhibit motor, fins open, chute NOW"));
+    // 5 m above the commit height at 21.5 m/s: 0.23 s.
+    bench.descent(100.0);
+    assert!(bench.screen(80, 24).contains("abort now: TOO LATE for a chute"));
+    // 0.2 s to ignition.
+    bench.descent(62.0);
+    assert!(bench.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition"));
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.run(2.0);
+    assert!(bench.screen(80, 24).contains("abort now: TOO LATE: no cut-off exists"));
+}
+
+#[test]
+fn after_the_loss_of_the_link_the_position_is_a_prediction_that_grows_uncertain() {
+    let mut bench = Bench::crewed();
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.run(1.0);
+    bench.state(1.0, 60.0, 0.0, -5.0, 90.0);
+    bench.speaks = false;
+    bench.run(2.0);
+    let early = bench.screen(80, 24);
+    assert!(early.contains("PREDICTED, not heard") && early.contains("free fall"), "{early}");
+    // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + t^2.
+    assert!(early.contains("30.4 ±6.5 m"), "{early}");
+    bench.run(1.0);
+    assert!(bench.screen(80, 24).contains("0.9 ±12.0 m"));
+}

@@ -1,0 +1,66 @@
+//! The program on a real terminal, which then vanishes: link and log go on, and a screen finds them again.
+//!
+//! `script` (util-linux) makes the terminal; where it is missing the test says so and checks nothing.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// Runs a command line on a terminal of its own.
+fn on_a_terminal(directory: &Path, command_line: &str) -> Option<Child> {
+    Command::new("script")
+        .args(["--quiet", "--flush", "--command", command_line, "terminal.txt"])
+        .current_dir(directory)
+        .env("TERM", "xterm")
+        .env("LANG", "C.UTF-8")
+        .env("XDG_RUNTIME_DIR", directory)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()
+}
+
+/// Waits until a file holds this word, as long as a slow machine needs. A screen does not write its spaces.
+fn wait_for(path: &Path, what: &str) -> bool {
+    (0..600).any(|_| {
+        std::thread::park_timeout(Duration::from_millis(50));
+        std::fs::read(path).is_ok_and(|bytes| String::from_utf8_lossy(&bytes).contains(what))
+    })
+}
+
+fn signal(name: &str, process: &str) -> bool {
+    Command::new("kill").args(["-s", name, process]).status().is_ok_and(|status| status.success())
+}
+
+#[test]
+fn a_terminal_that_vanishes_takes_nothing_with_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_ground");
+    let arguments = "--connect udpin:127.0.0.1:0 --log kept.mcap";
+    let line = format!("sh -c 'stty rows 24 cols 80; echo $$ > pid; exec {program} {arguments}'");
+    let Some(mut terminal) = on_a_terminal(directory.path(), &line) else {
+        return writeln!(std::io::stderr(), "no `script` here: not checked").unwrap();
+    };
+    assert!(wait_for(&directory.path().join("terminal.txt"), "Arming ladder"));
+    let process = std::fs::read_to_string(directory.path().join("pid")).unwrap().trim().to_owned();
+    // The session drops: its terminal is gone at once.
+    terminal.kill().unwrap();
+    terminal.wait().unwrap();
+    assert!(directory.path().join("touchdown-ground.sock").exists(), "it serves screens");
+    let mut attached =
+        on_a_terminal(directory.path(), &format!("sh -c 'stty rows 24 cols 80; exec {program} attach'"))
+            .unwrap();
+    assert!(wait_for(&directory.path().join("terminal.txt"), "gone:"));
+    attached.stdin.take().unwrap().write_all(b"q").unwrap();
+    assert!(attached.wait().unwrap().success());
+    assert!(signal("TERM", &process), "it still runs");
+    let tlog = directory.path().join("kept.tlog");
+    assert!(tlog.exists());
+    let ended = (0..200).any(|_| {
+        std::thread::park_timeout(Duration::from_millis(50));
+        !signal("0", &process)
+    });
+    assert!(ended && !directory.path().join("touchdown-ground.sock").exists());
+}

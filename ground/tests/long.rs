@@ -1,0 +1,104 @@
+//! Ten hours on the pad and in the air, on a clock turned by hand: memory stays where it was.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::time::Duration;
+
+use ground::model::{Model, Role, Settings};
+use ground::update::{Msg, update};
+use ground::view::theme::Theme;
+use ground::view::view;
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage, MavSeverity,
+    TD_FLIGHT_STATUS_DATA, TdPhase,
+};
+use protocol::frame::Encoder;
+use protocol::identity::VEHICLE;
+use protocol::text::chunks;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+
+const HOURS: u64 = 10;
+/// What may be added between the first hour and the last: the allocator's own moods.
+const GROWTH_MAX_BYTES: u64 = 1024 * 1024;
+
+/// Memory that is held by this process, bytes (Linux: the second number of `statm`, in pages of 4 KiB).
+fn resident_bytes() -> u64 {
+    let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
+    statm.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096
+}
+
+fn settings() -> Settings {
+    Settings {
+        link_name: "udpin:0.0.0.0:14550".to_owned(),
+        link_capacity_bytes_s: None,
+        log_path: None,
+        tlog_path: None,
+        role: Role::Station,
+        auto: false,
+        interactive: true,
+        time_limit: None,
+    }
+}
+
+#[test]
+fn ten_hours_take_no_more_memory_than_one() {
+    let mut model = Model::new(settings());
+    let mut encoder = Encoder::new(VEHICLE);
+    let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
+    let mut after_one_hour = 0;
+    for second in 0..HOURS * 3_600 {
+        // Half an hour on the pad, half an hour of never-ending flight, in turn.
+        let flying = (second / 1_800) % 2 == 1;
+        let phase = if flying { TdPhase::TD_PHASE_AERO_DESCENT } else { TdPhase::TD_PHASE_PAD_IDLE };
+        for tenth in 0..10 {
+            let now = Duration::from_millis(second * 1_000 + tenth * 100);
+            let time_boot_ms = u32::try_from(now.as_millis()).unwrap();
+            let mut messages = vec![MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+                time_boot_ms,
+                phase,
+                countdown_ms: i32::MAX,
+                ..TD_FLIGHT_STATUS_DATA::default()
+            })];
+            if tenth == 0 {
+                let custom_mode = phase as u32;
+                messages
+                    .push(MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
+            }
+            if tenth % 2 == 0 {
+                let q1 = 1.0;
+                messages.push(MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+                    time_boot_ms,
+                    q1,
+                    ..ATTITUDE_QUATERNION_DATA::default()
+                }));
+                let (x, z) = ((second % 977) as f32, -((second % 1_009) as f32));
+                messages.push(MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+                    time_boot_ms,
+                    x,
+                    z,
+                    ..LOCAL_POSITION_NED_DATA::default()
+                }));
+            }
+            if tenth == 5 && second % 7 == 0 {
+                let text = format!("second {second}: all is well");
+                messages.extend(
+                    chunks(MavSeverity::MAV_SEVERITY_INFO, &text, 0).into_iter().map(MavMessage::STATUSTEXT),
+                );
+            }
+            for message in messages {
+                drop(update(&mut model, Msg::Frame(encoder.encode(&message)), now));
+            }
+            drop(update(&mut model, Msg::Tick, now));
+        }
+        if second % 60 == 0 {
+            let now = Duration::from_secs(second);
+            terminal.draw(|frame| view(&model, Theme { colour: true, ascii: false }, now, frame)).unwrap();
+        }
+        if second == 3_600 {
+            after_one_hour = resident_bytes();
+        }
+    }
+    let grown = resident_bytes().saturating_sub(after_one_hour);
+    assert!(grown < GROWTH_MAX_BYTES, "{grown} bytes more after {HOURS} hours than after one");
+    assert!(model.events.total() > 5_000, "much was said meanwhile");
+}

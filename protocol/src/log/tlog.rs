@@ -1,0 +1,65 @@
+//! The telemetry log that other ground stations write and read: `.tlog`.
+//!
+//! Microseconds since the Unix epoch (eight bytes, big-endian), then the raw frame; again and again. MAVProxy's
+//! `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's `mavlogfile` read it.
+
+use std::io::{self, Write};
+
+use super::record::Record;
+
+/// Writes the frames that a ground station received and sent.
+pub struct TlogWriter<W: Write> {
+    out: W,
+    start_unix_ns: u64,
+}
+
+impl<W: Write> TlogWriter<W> {
+    /// An empty log; times of records count from the start.
+    pub fn new(out: W, start_unix_ns: u64) -> Self {
+        Self { out, start_unix_ns }
+    }
+
+    /// Writes the ground's own raw frames, both ways; every other record is not for this log.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn write(&mut self, record: &Record, time_ns: u64) -> io::Result<()> {
+        let Record::RawFrame(frame) = record else { return Ok(()) };
+        if frame.endpoint != "ground" {
+            return Ok(());
+        }
+        let unix_us = self.start_unix_ns.saturating_add(time_ns) / 1_000;
+        self.out.write_all(&unix_us.to_be_bytes())?;
+        self.out.write_all(&frame.bytes)
+    }
+
+    /// Hands everything to the system.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::record::{Direction, RawFrame};
+
+    /// The layout by hand: 1.000 002 s is 1,000,002 us, 0x0F4242.
+    #[test]
+    fn val_tlog_is_a_big_endian_time_and_the_frame() -> io::Result<()> {
+        let mut bytes = Vec::new();
+        let mut tlog = TlogWriter::new(&mut bytes, 1_000_000_000);
+        let frame = |endpoint| {
+            let link = "udpin:0.0.0.0:14550".to_owned();
+            Record::RawFrame(RawFrame { direction: Direction::Rx, endpoint, link, bytes: vec![0xFD, 1, 2] })
+        };
+        tlog.write(&frame("vehicle"), 0)?;
+        tlog.write(&frame("ground"), 2_000)?;
+        tlog.flush()?;
+        assert_eq!(bytes, [0, 0, 0, 0, 0, 0x0F, 0x42, 0x42, 0xFD, 1, 2]);
+        Ok(())
+    }
+}
