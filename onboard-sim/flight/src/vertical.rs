@@ -242,8 +242,14 @@ impl Column {
     ) -> f64 {
         /// Share of the fins per share of the band.
         const GAIN: f64 = 1.5;
+        /// A band is taken to be at least this wide, in time at the present speed, s: above a narrow band lies hardly
+        /// a landing, but closing the fins would only make the vehicle faster.
+        const NARROW_S: f64 = 0.25;
         match self.band(burn, burning_s, vertical_m_s) {
-            Some(band) => (0.5 + GAIN * (place - band.place(height_m))).clamp(0.0, 1.0),
+            Some(band) => {
+                let at_least = Band { high_m: band.high_m.max(band.low_m - NARROW_S * vertical_m_s), ..band };
+                (0.5 + GAIN * (place - at_least.place(height_m))).clamp(0.0, 1.0)
+            }
             // Falling slower than a landing would: let it fall.
             None if vertical_m_s > -1.0 => 0.0,
             None => 1.0,

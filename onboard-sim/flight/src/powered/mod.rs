@@ -45,7 +45,9 @@ pub struct PoweredSettings {
     pub tilt_max_deg: f64,
     /// Largest planned gimbal angle on either side, degrees; the rest of the travel is the attitude loop's.
     pub gimbal_deg: f64,
-    /// Largest horizontal distance at the end, m.
+    /// Where along the plane a plan is drawn to.
+    pub homing: Homing,
+    /// Largest horizontal distance at the end from there, m.
     pub x_final_m: f64,
     /// Box the plan ends in; its lateral speed is over the ground.
     #[serde(rename = "final")]
@@ -78,8 +80,31 @@ const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that holds a plan that is flown out to its velocity, rad.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
+/// How a plan is drawn to the pad: no nearer than need be, and no farther than a moderate lean goes.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Homing {
+    /// Distance from the pad that is near enough, m.
+    pub near_m: f64,
+    /// Farthest that a plan is drawn aside, for each second squared that is left, m/s^2.
+    pub reach_m_s2: f64,
+}
+
+impl Homing {
+    /// Where to land along the plane, m from the pad, moving at `along_m_s` with `left_s` to go.
+    fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+        // Where an even deceleration ends.
+        let free_m = x_m + 0.5 * along_m_s * left_s;
+        let reach_m = self.reach_m_s2 * left_s * left_s;
+        free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)
+    }
+}
+
 /// How much dearer a tilt becomes when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
+
+/// A plan that tilts further than this even so is not flown, rad.
+const TILT_BELIEVED_RAD: f64 = 1.3;
 
 /// What a tick must know besides the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -263,7 +288,8 @@ impl PoweredGuidance {
         }
         let wind_m_s = situation.wind_m_s.dot(&plane.along);
         let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let Some(mut problem) = self.pose(initial, wind_m_s, situation) else {
+        let along_m_s = state.velocity_m_s.dot(&plane.along);
+        let Some(mut problem) = self.pose(initial, along_m_s, wind_m_s, situation) else {
             self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
             return;
         };
@@ -280,6 +306,7 @@ impl PoweredGuidance {
     fn pose(
         &self,
         initial: PlanarState,
+        along_m_s: f64,
         wind_m_s: f64,
         situation: &PoweredSituation<'_>,
     ) -> Option<FreeTimeProblem> {
@@ -295,6 +322,7 @@ impl PoweredGuidance {
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
         let step_s = horizon_s / intervals as f64;
+        let target_x_m = settings.homing.target_m(initial.x_m, along_m_s, horizon_s);
         let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
         let landing = Problem {
             model: situation.model(),
@@ -302,7 +330,7 @@ impl PoweredGuidance {
             step_s: settings.interval_s,
             thrust_n: Vec::new(),
             mass_kg: Vec::new(),
-            target: Plane::rest(wind_m_s),
+            target: PlanarState { x_m: target_x_m, ..Plane::rest(wind_m_s) },
             state_weights: settings.weights.state_diagonal(),
             input_weight: settings.weights.delta,
             gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
@@ -335,6 +363,7 @@ impl PoweredGuidance {
         let solution = &self.trial.solution;
         let usable = !solution.inputs_rad.is_empty()
             && solution.states.iter().all(PlanarState::is_finite)
+            && largest_tilt_rad(&self.trial) < TILT_BELIEVED_RAD
             && solution.inputs_rad.iter().all(|input| input.is_finite());
         let level = match () {
             () if !usable => match &self.flown {
