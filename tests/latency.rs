@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use e2e::SerialLine;
 use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
-use ground::model::{Model, Settings};
+use ground::model::{Model, Role, Settings};
 use ground::update::{Action, Msg, update};
 use onboard_sim::fly::{FlyOptions, Speed, fly_observed, load_profile};
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
@@ -84,6 +84,8 @@ async fn receive(listening: Endpoint, vehicle: Endpoint) -> Result<Vec<Duration>
         link_name: String::new(),
         link_capacity_bytes_s: None,
         log_path: None,
+        tlog_path: None,
+        role: Role::Station,
         auto: false,
         interactive: true,
         time_limit: None,

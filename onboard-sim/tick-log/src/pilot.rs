@@ -313,7 +313,7 @@ mod tests {
             heights: HeightSources {
                 inertial_m: numbers[42],
                 inertial_sigma_m: numbers[43],
-                barometric_m: (health % 2 == 0).then_some(numbers[44]),
+                barometric_m: health.is_multiple_of(2).then_some(numbers[44]),
             },
             health: health.checked_sub(1).map_or(Health::Good, |doubt| Health::Doubtful(DOUBTS[doubt])),
         }
