@@ -104,6 +104,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         }
         Msg::Acknowledged => drop(out.kind(11)),
         Msg::ParametersWanted => drop(out.kind(12)),
+        Msg::ScreenGone => drop(out.kind(13)),
         _ => return None,
     }
     Some(())
@@ -151,6 +152,7 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
         }
         11 => Told::Msg(Msg::Acknowledged),
         12 => Told::Msg(Msg::ParametersWanted),
+        13 => Told::Msg(Msg::ScreenGone),
         _ => return Err(CodecError("an unknown kind of message")),
     };
     rest.end()?;

@@ -98,6 +98,7 @@ fn report(name: &str, loss: f64, trouble: Option<&str>) -> LinkReport {
 #[test]
 fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     let mut bench = Bench::crewed();
+    bench.key(Key::Char('5'));
     let links = |trouble| {
         let links =
             vec![report("udpin:0.0.0.0:14550", 0.0, None), report("serial:/dev/x:57600", 0.125, trouble)];

@@ -30,6 +30,7 @@ fn what_is_told_comes_back_the_same() {
         Msg::SimulatorEnded(Some("why".to_owned())),
         Msg::Acknowledged,
         Msg::ParametersWanted,
+        Msg::ScreenGone,
     ];
     for msg in msgs {
         let told = Told::Msg(msg);
