@@ -506,3 +506,17 @@ impl Flown {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_is_drawn_to_the_pads_edge_and_no_farther_than_it_reaches() {
+        let homing = Homing { near_m: 6.0, reach_m_s2: 0.5 };
+        assert!((homing.target_m(4.0, 0.0, 4.0) - 4.0).abs() < 1e-12, "near enough");
+        assert!((homing.target_m(10.0, 0.0, 4.0) - 6.0).abs() < 1e-12, "to the edge");
+        assert!((homing.target_m(-50.0, 0.0, 4.0) + 42.0).abs() < 1e-12, "8 m are in reach in 4 s");
+        assert!((homing.target_m(10.0, -4.0, 4.0) - 2.0).abs() < 1e-12, "braking evenly ends there");
+    }
+}
