@@ -251,9 +251,20 @@ impl Column {
                 (0.5 + GAIN * (place - at_least.place(height_m))).clamp(0.0, 1.0)
             }
             // Falling slower than a landing would: let it fall.
-            None if vertical_m_s > -1.0 => 0.0,
+            None if vertical_m_s > -1.0 || self.stops_too_soon(burn, burning_s, vertical_m_s) => 0.0,
             None => 1.0,
         }
+    }
+
+    /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.
+    fn stops_too_soon(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
+        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
+        carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
+            let soft = self.share(&self.soft);
+            let outlook = Outlook::new(burn, self.mass_at_ignition_kg, burning_s, end_s);
+            let fall = self.fall(&outlook, vertical_m_s, &Way::Even(&soft, &soft), 0.0);
+            fall.vertical_m_s > self.touchdown_m_s
+        })
     }
 
     /// Vertical speed of the unpowered fall, m/s, falling positive, that would not change any more.
@@ -279,7 +290,7 @@ mod tests {
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: 0.0267 },
             touchdown_m_s: -0.15,
             latest_after_s: 0.5,
-            settle_s: 0.3,
+            settle_s: 0.0,
         }
     }
 

@@ -88,7 +88,7 @@ const END_LEAN_MAX_RAD: f64 = 0.05;
 const UPRIGHT_DEARER: f64 = 8.0;
 
 /// A plan that tilts further than this even so is not flown, rad.
-const TILT_BELIEVED_RAD: f64 = 1.3;
+const TILT_BELIEVED_RAD: f64 = 1.6;
 
 /// What a tick found, in brief.
 #[derive(Debug, Clone, Copy, PartialEq)]
