@@ -23,6 +23,7 @@ pub(super) struct Known {
 }
 
 /// The burning vehicle of a frame.
+#[expect(clippy::struct_field_names, reason = "the time since thrust began has that name everywhere")]
 pub(super) struct Burning {
     pub(super) burning_s: f64,
     pub(super) mass: MassProperties,

@@ -26,6 +26,7 @@ pub const FRAMES_PER_PLAN: u64 = 10;
 
 /// What the flight computer knows of its motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one a frame, on the stack: a box would allocate in the loop")]
 pub enum Sensed {
     /// Sensors, through the estimator.
     Measured(Measurements),
