@@ -259,4 +259,15 @@ mod tests {
         let (_, overshoot) = fly(0.0);
         assert!(overshoot < 0.03, "{overshoot} rad");
     }
+
+    #[test]
+    fn the_play_is_crossed_at_a_reversal_and_at_no_other_time() {
+        let mut aim_loop = AimLoop::new(AimGains { play_deg: 0.5, ..GAINS }, 0.005);
+        let half_rad = 0.25_f64.to_radians();
+        let mut horn_rad = |nozzle_rad| aim_loop.across_the_play_rad(0, nozzle_rad);
+        assert!((horn_rad(0.010) - (0.010 + half_rad)).abs() < 1e-15);
+        assert!((horn_rad(0.012) - (0.012 + half_rad)).abs() < 1e-15);
+        assert!((horn_rad(0.0119) - (0.0119 + half_rad)).abs() < 1e-15, "too little to be a reversal");
+        assert!((horn_rad(0.008) - (0.008 - half_rad)).abs() < 1e-15);
+    }
 }

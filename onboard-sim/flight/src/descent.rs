@@ -154,7 +154,10 @@ impl DescentGains {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
+    use crate::rigid::upright;
 
     fn gains() -> DescentGains {
         DescentGains {
@@ -224,5 +227,34 @@ mod tests {
     fn hanging_at_apogee_the_fins_are_left_alone() {
         let demand = gains().demand(&RigidState::upright(300.0), &situation(), true);
         assert_eq!(demand.moment_n_m, Vector3::zeros());
+    }
+
+    #[test]
+    fn the_lean_is_taken_back_before_the_ignition() {
+        let lean_deg = |time_to_go_s| {
+            let mut state = falling();
+            state.position_m.x = 60.0;
+            let situation = DescentSituation { time_to_go_s, ..situation() };
+            libm::acos(gains().demand(&state, &situation, true).nose_in_world.z).to_degrees()
+        };
+        assert!((lean_deg(None) - 14.0).abs() < 1e-9, "all of it while the ignition is far");
+        assert!((lean_deg(Some(4.0)) - 14.0).abs() < 1e-9);
+        assert!((lean_deg(Some(0.5)) - 6.0).abs() < 1e-9, "as little as the gate wants");
+    }
+
+    #[test]
+    fn a_lean_that_is_there_is_held_against_the_weathercock() {
+        // Leaning as wanted and at rest, all that is asked is what the air takes.
+        let mut state = falling();
+        state.position_m.x = 60.0;
+        let nose = gains().demand(&state, &situation(), true).nose_in_world;
+        state.world_from_body =
+            UnitQuaternion::rotation_between(&Vector3::z(), &nose).expect("not opposite") * upright();
+        let demand = gains().demand(&state, &situation(), true);
+        let lean_rad = 14.0_f64.to_radians();
+        let weathercock_m3 = (0.0061 - 0.0622 * 0.05 * libm::sin(lean_rad)) * lean_rad;
+        let held_n_m = demand.dynamic_pressure_pa * weathercock_m3;
+        assert!((demand.moment_n_m.norm() - held_n_m).abs() < 1e-9, "{} for {held_n_m}", demand.moment_n_m);
+        assert!(demand.moment_n_m.y < 0.0, "the nose is kept down towards +x");
     }
 }

@@ -22,6 +22,9 @@ const ROUNDS: usize = 8;
 /// their lift can undo the moment of their drag.
 const SLOPE_FLOOR: f64 = 0.2;
 
+/// Less dynamic pressure is no air at all, Pa: it would only make numbers that overflow.
+const LEAST_PRESSURE_PA: f64 = 1e-6;
+
 /// What is wanted of the fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FinCommand {
@@ -180,7 +183,10 @@ impl Allocation {
             command.moments.yaw_n_m / dynamic_pressure_pa,
         ];
         let mean = command.drag_area_m2 / (4.0 * self.fin_drag_area_m2());
-        if !(mean.is_finite() && wanted.iter().all(|value| value.is_finite()) && dynamic_pressure_pa > 0.0) {
+        if !(mean.is_finite()
+            && wanted.iter().all(|value| value.is_finite())
+            && dynamic_pressure_pa > LEAST_PRESSURE_PA)
+        {
             return [max_rad; 4];
         }
         let mut patterns = Patterns { mean, ..Patterns::default() }.fit(lowest, highest);

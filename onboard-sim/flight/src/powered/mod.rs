@@ -1,7 +1,7 @@
 //! Phase 2 in space: from ignition to touchdown on a motor that cannot be throttled.
 //!
 //! A tick plans the landing in one vertical plane with the [NMPC](crate::nmpc), in the frame that moves with the wind,
-//! with the real thrust curve as the [`Burn`] believes it, a mass that burns off, the body's and the fins' drag, a
+//! with the real thrust curve as the [`Burn`](crate::burn::Burn) believes it, a mass that burns off, the body's and the fins' drag, a
 //! floor above the ground and a free final time not before the thrust falls through the weight. Between ticks
 //! [`PoweredGuidance::aim`] reads where the nose is to point from that plan, and leans it across the plane as the
 //! velocity there and the wind ask. The fins open and close with the place in the
@@ -9,9 +9,14 @@
 //!
 //! When no plan can be had it degrades in announced steps, the [`ControlLevel`]s of the planar controller.
 
+mod homing;
 mod plane;
+mod situation;
 
+pub use homing::Homing;
 pub use plane::Plane;
+use situation::Ahead;
+pub use situation::PoweredSituation;
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -19,9 +24,8 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use crate::aim::Aim;
-use crate::burn::Burn;
 use crate::controller::ControlLevel;
-use crate::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
+use crate::dynamics::PlanarState;
 use crate::nmpc::free_time::{
     FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into,
 };
@@ -80,109 +84,11 @@ const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that holds a plan that is flown out to its velocity, rad.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
-/// How a plan is drawn to the pad: no nearer than need be, and no farther than a moderate lean goes.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Homing {
-    /// Distance from the pad that is near enough, m.
-    pub near_m: f64,
-    /// Farthest that a plan is drawn aside, for each second squared that is left, m/s^2.
-    pub reach_m_s2: f64,
-}
-
-impl Homing {
-    /// Where to land along the plane, m from the pad, moving at `along_m_s` with `left_s` to go.
-    fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
-        // Where an even deceleration ends.
-        let free_m = x_m + 0.5 * along_m_s * left_s;
-        let reach_m = self.reach_m_s2 * left_s * left_s;
-        free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)
-    }
-}
-
 /// How much dearer a tilt becomes when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
 
 /// A plan that tilts further than this even so is not flown, rad.
-const TILT_BELIEVED_RAD: f64 = 1.3;
-
-/// What a tick must know besides the state.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PoweredSituation<'a> {
-    /// The motor.
-    pub burn: Burn<'a>,
-    /// Time since thrust began, s.
-    pub burning_s: f64,
-    /// Mass before ignition, kg.
-    pub mass_at_ignition_kg: f64,
-    /// Moment of inertia across the axis, kg m^2.
-    pub inertia_kg_m2: f64,
-    /// Thrust's arm about the centre of gravity, m.
-    pub arm_m: f64,
-    /// Centre of gravity above the feet when upright, m.
-    pub feet_below_cg_m: f64,
-    /// Gravity, m/s^2.
-    pub gravity_m_s2: f64,
-    /// Air density, kg/m^3.
-    pub air_density_kg_m3: f64,
-    /// Wind in the world, m/s.
-    pub wind_m_s: Vector3<f64>,
-    /// Drag area of the body along its axis, m^2.
-    pub body_drag_area_m2: f64,
-    /// Drag area of the body across its axis, m^2.
-    pub crossflow_area_m2: f64,
-    /// Drag area of the fins at their present opening, m^2.
-    pub fin_drag_area_m2: f64,
-    /// Largest gimbal angle, rad.
-    pub gimbal_limit_rad: f64,
-}
-
-impl PoweredSituation<'_> {
-    fn mass_kg(&self) -> f64 {
-        self.mass_at_ignition_kg - self.burn.burnt_kg(self.burning_s)
-    }
-
-    fn model(&self) -> PlanarModel {
-        let mass_kg = self.mass_kg();
-        let per_m = |area_m2: f64| 0.5 * self.air_density_kg_m3 * area_m2 / mass_kg;
-        PlanarModel {
-            params: PlanarParams {
-                mass_kg,
-                pitch_inertia_kg_m2: self.inertia_kg_m2,
-                thrust_arm_m: self.arm_m,
-                drag_per_m: per_m(self.body_drag_area_m2 + self.fin_drag_area_m2),
-                lateral_drag_per_m: per_m(self.fin_drag_area_m2),
-                crossflow_per_m: per_m(self.crossflow_area_m2),
-                gravity_m_s2: self.gravity_m_s2,
-            },
-            kind: ModelKind::Consistent,
-        }
-    }
-
-    /// Horizontal acceleration by the air, m/s^2.
-    fn air_m_s2(&self, state: &RigidState) -> Vector3<f64> {
-        let through_air = state.velocity_m_s - self.wind_m_s;
-        let nose = state.nose_in_world();
-        let across = through_air - nose * through_air.dot(&nose);
-        let per_mass = -0.5 * self.air_density_kg_m3 / self.mass_kg();
-        through_air * (per_mass * self.fin_drag_area_m2 * through_air.norm())
-            + across * (per_mass * self.crossflow_area_m2 * across.norm())
-    }
-}
-
-/// The burn ahead of a moment, as the planner wants it.
-struct Ahead<'a, 'b>(&'a PoweredSituation<'b>);
-
-impl Motor for Ahead<'_, '_> {
-    fn mean_thrust_n(&self, from_s: f64, to_s: f64) -> f64 {
-        self.0.burn.mean_thrust_n(self.0.burning_s + from_s, to_s - from_s)
-    }
-
-    fn mean_mass_kg(&self, from_s: f64, to_s: f64) -> f64 {
-        let middle_s = self.0.burning_s + 0.5 * (from_s + to_s);
-        self.0.mass_at_ignition_kg - self.0.burn.burnt_kg(middle_s)
-    }
-}
+const TILT_BELIEVED_RAD: f64 = 1.6;
 
 /// What a tick found, in brief.
 #[derive(Debug, Clone, Copy, PartialEq)]

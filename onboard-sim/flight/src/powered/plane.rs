@@ -104,6 +104,8 @@ mod tests {
         let plane =
             Plane::choose(&Vector3::zeros(), &Vector3::new(0.0, -0.3, -40.0), &Vector3::new(9.0, 0.0, 0.0));
         assert!((plane.along - Vector3::x()).norm() < 1e-15);
+        let plane = Plane::choose(&Vector3::new(0.0, 30.0, 60.0), &Vector3::zeros(), &Vector3::zeros());
+        assert!((plane.along - Vector3::y()).norm() < 1e-15, "far from the pad, the way back");
     }
 
     #[test]

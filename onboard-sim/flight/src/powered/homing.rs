@@ -1,0 +1,37 @@
+//! Where along its plane a plan is drawn to.
+
+use serde::Deserialize;
+
+/// How a plan is drawn to the pad: no nearer than need be, and no farther than a moderate lean goes.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Homing {
+    /// Distance from the pad that is near enough, m.
+    pub near_m: f64,
+    /// Farthest that a plan is drawn aside, for each second squared that is left, m/s^2.
+    pub reach_m_s2: f64,
+}
+
+impl Homing {
+    /// Where to land along the plane, m from the pad, moving at `along_m_s` with `left_s` to go.
+    pub(super) fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+        // Where an even deceleration ends.
+        let free_m = x_m + 0.5 * along_m_s * left_s;
+        let reach_m = self.reach_m_s2 * left_s * left_s;
+        free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_is_drawn_to_the_pads_edge_and_no_farther_than_it_reaches() {
+        let homing = Homing { near_m: 6.0, reach_m_s2: 0.5 };
+        assert!((homing.target_m(4.0, 0.0, 4.0) - 4.0).abs() < 1e-12, "near enough");
+        assert!((homing.target_m(10.0, 0.0, 4.0) - 6.0).abs() < 1e-12, "to the edge");
+        assert!((homing.target_m(-50.0, 0.0, 4.0) + 42.0).abs() < 1e-12, "8 m are in reach in 4 s");
+        assert!((homing.target_m(10.0, -4.0, 4.0) - 2.0).abs() < 1e-12, "braking evenly ends there");
+    }
+}
