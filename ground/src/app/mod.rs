@@ -148,7 +148,8 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         false => None,
     };
     let alarm_command = config.alarm_command.clone();
-    let mut station = Station { clock, log_time, recorder, demo, output, socket, server, alarm_command };
+    let mut station =
+        Station { clock, log_time, recorder, demo, output, socket, server, alarm_command, quiet_input: None };
     let ran = station.run(&mut model, &mut wire).await;
     wire.remember();
     station.close(&model).await;

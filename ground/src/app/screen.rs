@@ -2,6 +2,7 @@
 
 use std::io;
 use std::mem::ManuallyDrop;
+use std::os::fd::OwnedFd;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -221,6 +222,16 @@ fn restore() {
     }
     let _ = queue!(out, LeaveAlternateScreen, Show);
     let _ = io::Write::flush(&mut out);
+}
+
+/// Puts a pipe that nothing comes out of where a terminal was that is gone; it stays one while the answer is held.
+///
+/// The thread that reads the terminal's events cannot be told to stop there: a terminal that is gone answers every
+/// read at once with nothing, and it would read for ever, on half a core.
+pub fn quiet_input() -> Option<OwnedFd> {
+    let (silent, held) = rustix::pipe::pipe().ok()?;
+    rustix::stdio::dup2_stdin(&silent).ok()?;
+    Some(held)
 }
 
 /// A panic's message belongs on the restored terminal, not on a screen that vanishes with it.

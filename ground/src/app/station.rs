@@ -1,5 +1,6 @@
 //! The run loop of a station: link, log, clock, signals and whoever looks, around a pure model.
 
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -32,6 +33,8 @@ pub(super) struct Station {
     pub(super) socket: PathBuf,
     pub(super) server: Option<Server>,
     pub(super) alarm_command: Option<String>,
+    /// What keeps the input quiet where a terminal was.
+    pub(super) quiet_input: Option<OwnedFd>,
 }
 
 impl Station {
@@ -95,6 +98,9 @@ impl Station {
     /// Goes on without the terminal, and serves screens from now on.
     async fn lose_screen(&mut self, model: &Model) {
         self.output = Output::Lines(Lines::closed());
+        if self.quiet_input.is_none() {
+            self.quiet_input = screen::quiet_input();
+        }
         if self.server.is_none() {
             // Another station may serve there; then this one goes on alone.
             self.server = Server::open(&self.socket, hello(model)).await.ok();
