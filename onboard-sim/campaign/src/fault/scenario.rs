@@ -65,7 +65,11 @@ pub struct Expectation {
 /// What is expected of each fault, on the data as they stand with sensors and a day at the field.
 pub const EXPECTATIONS: &[Expectation] = &[
     expectation("link-loss@0", Expected::Land, "nothing on board waits for the radio"),
-    expectation("gnss-out@5", Expected::Land, "barometer and inertia carry the last seconds"),
+    expectation(
+        "gnss-out@5",
+        Expected::Degrade,
+        "without satellites the drift sideways is not known to the legs' limit",
+    ),
     expectation("barometer-out@5", Expected::Land, "satellite heights and the lidar are left"),
     expectation("lidar-out@0", Expected::Land, "satellites and barometer are left, to some decimetres"),
     expectation("accelerometer-bias:30@5", Expected::Degrade, "the filter follows a bias, in its time"),
@@ -74,11 +78,15 @@ pub const EXPECTATIONS: &[Expectation] = &[
         Expected::Inhibit,
         "satellites contradict the estimate: the gate stays shut",
     ),
-    expectation("fin-stuck:2@descent+2", Expected::Degrade, "three fins steer, and cannot stop all roll"),
+    expectation(
+        "fin-stuck:2@descent+2",
+        Expected::Inhibit,
+        "three fins cannot hold the lean that steers: the gate stays shut",
+    ),
     expectation("gimbal-slow:0.3@ignition", Expected::Degrade, "the loop is slower than it was tuned for"),
     expectation("gimbal-stuck@powered+0.5", Expected::Degrade, "thrust brakes, nothing steers"),
     expectation("no-light@0", Expected::Inhibit, "no thrust within half a second latches the inhibit"),
-    expectation("late-light:0.3@0", Expected::Land, "the band of feasible heights is deeper than that"),
+    expectation("late-light:0.3@0", Expected::Degrade, "13 m lower than chosen, at the edge of the band"),
     expectation(
         "weak-motor:0.8@0",
         Expected::Degrade,
