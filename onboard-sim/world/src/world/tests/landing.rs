@@ -58,7 +58,7 @@ fn landings_on_the_verdicts_limits_stay_upright() {
 
 #[test]
 fn a_fast_or_leaning_landing_tips_over() {
-    for (velocity_m_s, lean_deg) in [([4.0, -0.5], 0.0), ([0.0, -0.2], 35.0), ([2.0, -0.5], 15.0)] {
+    for (velocity_m_s, lean_deg) in [([4.0, -0.5], 0.0), ([0.0, -0.2], 43.0), ([2.0, -0.5], 15.0)] {
         let mut world = approaching(0.1, velocity_m_s, f64::to_radians(lean_deg), 0.0);
         let rest = until_rest(&mut world);
         assert_eq!(rest.outcome, RestOutcome::TippedOver, "{velocity_m_s:?} {lean_deg}");
