@@ -46,6 +46,7 @@
 //!   2020: fixed-size stage kernels.
 
 mod barrier;
+mod bend;
 mod block;
 mod clamped;
 mod filter;

@@ -28,6 +28,9 @@ const LEAST_CURVATURE: f64 = 1e-11;
 struct Feedback {
     gain: [f64; 6],
     offset: f64,
+    /// Second derivative by state and input, and the inverse of that by the input: `gain = cross * inverse`.
+    cross: [f64; 6],
+    inverse: f64,
 }
 
 /// The Newton step and what it is made from.
@@ -40,6 +43,8 @@ pub(super) struct Sweep {
     /// Second and first derivative of the objective by each input.
     pub(super) input_terms: Vec<(f64, f64)>,
     feedbacks: Vec<Feedback>,
+    /// `P` of the node after each interval.
+    values: Vec<[[f64; 6]; 6]>,
     /// Change of each state.
     pub(super) states: Vec<[f64; 6]>,
     /// Change of each input.
@@ -66,6 +71,22 @@ impl NullaryFnOnce for Backward<'_> {
     }
 }
 
+/// The backward sweep of the slopes alone, in the same.
+struct Again<'a> {
+    sweep: &'a mut Sweep,
+    iterate: &'a Iterate,
+    step_s: f64,
+}
+
+impl NullaryFnOnce for Again<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.sweep.eliminate_again(self.iterate, self.step_s);
+    }
+}
+
 /// The forward sweep, in the same.
 struct Forward<'a> {
     sweep: &'a mut Sweep,
@@ -89,6 +110,7 @@ impl Sweep {
         self.slopes.resize(intervals + 1, [0.0; 6]);
         self.input_terms.resize(intervals, (0.0, 0.0));
         self.feedbacks.resize(intervals, Feedback::default());
+        self.values.resize(intervals, [[0.0; 6]; 6]);
         self.states.resize(intervals + 1, [0.0; 6]);
         self.inputs.resize(intervals, 0.0);
         self.costates.resize(intervals + 1, [0.0; 6]);
@@ -98,6 +120,11 @@ impl Sweep {
     pub(super) fn backward(&mut self, iterate: &Iterate, step_s: f64, share: f64) -> bool {
         self.share = share;
         Arch::new().dispatch(Backward { sweep: self, iterate, step_s })
+    }
+
+    /// The backward sweep for new slopes and defects at the second derivatives of the last one.
+    pub(super) fn backward_again(&mut self, iterate: &Iterate, step_s: f64) {
+        Arch::new().dispatch(Again { sweep: self, iterate, step_s });
     }
 
     /// The forward sweep: states, inputs, and then the costates, backwards again.
@@ -121,6 +148,7 @@ impl Sweep {
             let lane = k % LANES;
             let interval = Interval::of(block, lane, step_s);
             let residual = iterate.defect(k);
+            self.values[k] = p;
             // P (A, b) by rows, P r + p, and (A, b)' P (A, b) by rows.
             let mut m = [[0.0; WIDE]; 6];
             for (product, row) in m.iter_mut().zip(&p) {
@@ -155,7 +183,7 @@ impl Sweep {
                 *entry *= inverse;
             }
             let offset = (own_slope + pulled[D]) * inverse;
-            self.feedbacks[k] = Feedback { gain, offset };
+            self.feedbacks[k] = Feedback { gain, offset, cross, inverse };
             if k == 0 {
                 break;
             }
@@ -191,6 +219,53 @@ impl Sweep {
         true
     }
 
+    /// [`backward_again`](Self::backward_again) in the vectors of the function it is inlined into.
+    #[inline(always)]
+    pub(super) fn eliminate_again(&mut self, iterate: &Iterate, step_s: f64) {
+        let count = self.inputs.len();
+        let mut slope = self.slopes[count];
+        for k in (0..count).rev() {
+            let interval = Interval::of(&iterate.blocks[k / LANES], k % LANES, step_s);
+            let residual = iterate.defect(k);
+            let mut g = slope;
+            for (row, gap) in self.values[k].iter().zip(&residual) {
+                for (sum, entry) in g.iter_mut().zip(row) {
+                    *sum += entry * gap;
+                }
+            }
+            let pulled = interval.pull(&g);
+            // What the dynamics have turned since: their first derivatives are the old ones, too.
+            let block = &iterate.blocks[k / LANES];
+            let before = interval.pull(&iterate.costates[k + 1]);
+            let turned = |j: usize| block.pulled[j].0[k % LANES] - before[j];
+            self.input_terms[k].1 += turned(D);
+            let slopes = &mut self.slopes[k];
+            for (i, entry) in slopes.iter_mut().enumerate().skip(T) {
+                *entry += turned(i - T);
+            }
+            let feedback = &mut self.feedbacks[k];
+            feedback.offset = (self.input_terms[k].1 + pulled[D]) * feedback.inverse;
+            let g = [g[X], g[Z], pulled[0], pulled[1], pulled[2], pulled[3]];
+            for i in 0..6 {
+                slope[i] = slopes[i] + g[i] - feedback.cross[i] * feedback.offset;
+            }
+        }
+    }
+
+    /// Where the defects alone, without any change of the inputs, would move the states.
+    pub(super) fn drift(&self, iterate: &Iterate, step_s: f64, drifts: &mut [[f64; 6]]) {
+        let mut dx = [0.0; 6];
+        for (k, drift) in drifts.iter_mut().enumerate() {
+            *drift = dx;
+            if k == self.inputs.len() {
+                break;
+            }
+            let moved = Interval::of(&iterate.blocks[k / LANES], k % LANES, step_s).push(&dx, 0.0);
+            let residual = iterate.defect(k);
+            dx = core::array::from_fn(|i| moved[i] + residual[i]);
+        }
+    }
+
     /// What is left of the optimality of input `k` after the step; rounding, unless the sweeps are wrong.
     #[cfg(test)]
     pub(super) fn input_residual(&self, iterate: &Iterate, step_s: f64, k: usize) -> f64 {
@@ -212,7 +287,7 @@ impl Sweep {
         let mut dx = [0.0; 6];
         self.states[0] = dx;
         for k in 0..count {
-            let Feedback { gain, offset } = self.feedbacks[k];
+            let Feedback { gain, offset, .. } = self.feedbacks[k];
             let answer = (gain[X] * dx[X] + gain[Z] * dx[Z])
                 + (gain[T] * dx[T] + gain[U] * dx[U])
                 + (gain[W] * dx[W] + gain[Q] * dx[Q]);

@@ -18,15 +18,28 @@ const NO_MULTIPLIER: f64 = 1e-9;
 
 /// Where an input is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+pub(super) enum Place {
     Free,
     Lower,
     Upper,
 }
 
+impl Place {
+    /// An input that a step moves to `moved`, and where it is then.
+    pub(super) fn moved(self, moved: f64, limit: f64) -> (f64, Self) {
+        match self {
+            Self::Upper => (limit, Self::Upper),
+            Self::Lower => (-limit, Self::Lower),
+            Self::Free if moved > limit => (limit, Self::Upper),
+            Self::Free if moved < -limit => (-limit, Self::Lower),
+            Self::Free => (moved, Self::Free),
+        }
+    }
+}
+
 /// Where a condition's multiplier is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Role {
+pub(super) enum Role {
     /// At its least value: met with room to spare, or an equality broken above.
     Least,
     /// Within its range; the condition holds as an equation.
@@ -38,9 +51,9 @@ enum Role {
 /// The side of every limit and condition.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sides {
-    places: Vec<Place>,
-    roles: Vec<Role>,
-    multipliers: Vec<f64>,
+    pub(super) places: Vec<Place>,
+    pub(super) roles: Vec<Role>,
+    pub(super) multipliers: Vec<f64>,
 }
 
 impl Sides {
@@ -53,7 +66,7 @@ impl Sides {
 }
 
 /// The range of a condition's multiplier.
-fn range(condition: &Condition, price: f64) -> (f64, f64) {
+pub(super) fn range(condition: &Condition, price: f64) -> (f64, f64) {
     (if condition.equality { -price } else { 0.0 }, price)
 }
 
@@ -192,15 +205,8 @@ impl Workspace {
         current.costates.copy_from_slice(&sweep.costates);
         for ((input, step), place) in current.inputs_rad.iter_mut().zip(&sweep.inputs).zip(&mut sides.places)
         {
-            let moved = *input + step;
             let before = *place;
-            (*input, *place) = match before {
-                Place::Upper => (limit, Place::Upper),
-                Place::Lower => (-limit, Place::Lower),
-                Place::Free if moved > limit => (limit, Place::Upper),
-                Place::Free if moved < -limit => (-limit, Place::Lower),
-                Place::Free => (moved, Place::Free),
-            };
+            (*input, *place) = before.moved(*input + step, limit);
             changed |= *place != before;
         }
         for (index, condition) in self.conditions.iter().enumerate() {
