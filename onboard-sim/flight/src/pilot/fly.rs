@@ -113,16 +113,22 @@ impl Pilot {
             may_burn: burning,
         };
         self.known.motor.update(&self.known.curve, &sample);
-        let ahead = self.known.motor.predict(&self.known.curve, input.time_s + CAUTION_AHEAD_S, input.time_s);
-        self.known.caution = if ahead.thrust_n > 0.0 {
+        self.known.caution = self.caution(input.time_s);
+    }
+
+    /// How much less impulse than estimated to plan with; none before the motor burns, when nothing is planned.
+    fn caution(&self, time_s: f64) -> f64 {
+        let Some(burning_s) = self.known.burning_s(time_s) else { return 0.0 };
+        let ahead = self.known.motor.predict(&self.known.curve, time_s + CAUTION_AHEAD_S, time_s);
+        if ahead.thrust_n > 0.0 {
             // Nothing is thrown away late when it is late already.
-            let carried_until_s = self.known.carried_until_s().unwrap_or(0.0)
-                - self.known.burning_s(input.time_s).unwrap_or(0.0);
+            let carried_until_s = self.known.carried_until_s().unwrap_or(0.0) - burning_s;
             let early = (carried_until_s / CAUTION_FADES_S).clamp(0.0, 1.0);
-            early * (mission.caution_sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
+            let sigmas = self.known.mission.caution_sigmas;
+            early * (sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
         } else {
             0.0
-        };
+        }
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {

@@ -12,16 +12,13 @@
 //! lost thrust. The model has that drag, `1/2 rho V^2 S_n sin^3`, so it knows that fins are the early throttle and
 //! tilt the late one.
 
+mod fall;
+
+use self::fall::Fall;
 use crate::burn::Burn;
 
-/// Intervals of the outlook.
-const INTERVALS: usize = 40;
 /// End times tried between thrust falling through weight and the latest.
 const END_TIMES: usize = 4;
-/// Halvings of a switching time: to a millionth of the burn.
-const HALVINGS: usize = 20;
-/// Faster upwards than this, a vehicle rises, m/s.
-const RISING_M_S: f64 = 0.05;
 
 /// How hard the vehicle brakes: its tilt and its fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,70 +81,7 @@ impl Band {
     }
 }
 
-/// Thrust and mass ahead, in equal intervals up to an end time.
-struct Outlook {
-    step_s: f64,
-    thrust_n: [f64; INTERVALS],
-    mass_kg: [f64; INTERVALS],
-}
-
-impl Outlook {
-    fn new(burn: &Burn<'_>, mass_at_ignition_kg: f64, from_s: f64, to_s: f64) -> Self {
-        let step_s = (to_s - from_s) / INTERVALS as f64;
-        let mut outlook = Self { step_s, thrust_n: [0.0; INTERVALS], mass_kg: [0.0; INTERVALS] };
-        for (k, (thrust_n, mass_kg)) in outlook.thrust_n.iter_mut().zip(&mut outlook.mass_kg).enumerate() {
-            let at_s = from_s + k as f64 * step_s;
-            *thrust_n = burn.mean_thrust_n(at_s, step_s);
-            *mass_kg = mass_at_ignition_kg - burn.burnt_kg(at_s + 0.5 * step_s);
-        }
-        outlook
-    }
-}
-
-/// Thrust and drag of braking.
-struct Share {
-    thrust: f64,
-    drag_per_v2: f64,
-}
-
-/// A family of ways to brake, with one parameter between 0 and 1.
-enum Way<'a> {
-    /// One first, then the other; the parameter is the share of the time.
-    Switch(&'a Share, &'a Share),
-    /// A mixture of both throughout; the parameter is the second's share.
-    Even(&'a Share, &'a Share),
-}
-
-impl Way<'_> {
-    /// Braking in interval `k`.
-    fn at(&self, k: f64, parameter: f64) -> Share {
-        let (first, then, share) = match self {
-            Self::Switch(first, then) => (first, then, (parameter * INTERVALS as f64 - k).clamp(0.0, 1.0)),
-            Self::Even(first, then) => (first, then, 1.0 - parameter),
-        };
-        Share {
-            thrust: share * first.thrust + (1.0 - share) * then.thrust,
-            drag_per_v2: share * first.drag_per_v2 + (1.0 - share) * then.drag_per_v2,
-        }
-    }
-}
-
-/// How a fall ends.
-struct Fall {
-    fallen_m: f64,
-    vertical_m_s: f64,
-    highest_m_s: f64,
-}
-
 impl Column {
-    fn share(&self, braking: &Braking) -> Share {
-        let (sin, cos) = libm::sincos(braking.tilt_rad);
-        let area_m2 = self.body_drag_area_m2 * cos * cos
-            + braking.fin_drag_area_m2
-            + self.crossflow_area_m2 * sin * sin * sin;
-        Share { thrust: cos, drag_per_v2: 0.5 * self.air_density_kg_m3 * area_m2 }
-    }
-
     /// Heights from which a landing exists, burning since `burning_s` (0 for an ignition now) and moving vertically at
     /// `vertical_m_s` (up positive); `None` if none does.
     pub fn band(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> Option<Band> {
@@ -156,10 +90,8 @@ impl Column {
         let mut band: Option<Band> = None;
         for i in 0..END_TIMES {
             let end_s = soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64;
-            let outlook = Outlook::new(burn, self.mass_at_ignition_kg, burning_s, end_s);
-            let (soft, hard) = (self.share(&self.soft), self.share(&self.hard));
-            let ways = [Way::Switch(&soft, &hard), Way::Switch(&hard, &soft), Way::Even(&soft, &hard)];
-            for height_m in ways.iter().filter_map(|way| self.height_of(&outlook, vertical_m_s, way)) {
+            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
+            for height_m in fall.heights_m().into_iter().flatten() {
                 band = Some(band.map_or(Band { low_m: height_m, high_m: height_m }, |band| Band {
                     low_m: band.low_m.min(height_m),
                     high_m: band.high_m.max(height_m),
@@ -167,48 +99,6 @@ impl Column {
             }
         }
         band
-    }
-
-    /// The height that a way of braking begins at; `None` if it cannot arrive at the touchdown speed however it is
-    /// divided, or rises on the way.
-    fn height_of(&self, outlook: &Outlook, vertical_m_s: f64, way: &Way<'_>) -> Option<f64> {
-        let end = |parameter: f64| self.fall(outlook, vertical_m_s, way, parameter);
-        let (mut low, mut high) = (0.0, 1.0);
-        let rises = end(high).vertical_m_s > end(low).vertical_m_s;
-        let reached = |parameter: f64| (end(parameter).vertical_m_s > self.touchdown_m_s) == rises;
-        if reached(low) || !reached(high) {
-            return None;
-        }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if reached(middle) { high = middle } else { low = middle }
-        }
-        let end = end(high);
-        (end.highest_m_s <= RISING_M_S).then_some(end.fallen_m)
-    }
-
-    /// Falls along the outlook.
-    fn fall(&self, outlook: &Outlook, vertical_m_s: f64, way: &Way<'_>, parameter: f64) -> Fall {
-        let step_s = outlook.step_s;
-        let settled = self.settle_s / step_s;
-        let upright = self.share(&Braking { tilt_rad: 0.0, ..self.soft });
-        let mut fall = Fall { fallen_m: 0.0, vertical_m_s, highest_m_s: f64::NEG_INFINITY };
-        for (k, (thrust_n, mass_kg)) in outlook.thrust_n.iter().zip(&outlook.mass_kg).enumerate() {
-            let braking = way.at(k as f64, parameter);
-            // Upright from the settling on.
-            let leaning = (INTERVALS as f64 - settled - k as f64).clamp(0.0, 1.0);
-            let cosine = leaning * braking.thrust + (1.0 - leaning) * upright.thrust;
-            let drag_per_v2 = leaning * braking.drag_per_v2 + (1.0 - leaning) * upright.drag_per_v2;
-            let acceleration = |speed_m_s: f64| {
-                (thrust_n * cosine - drag_per_v2 * speed_m_s * speed_m_s.abs()) / mass_kg - self.gravity_m_s2
-            };
-            // Midpoint rule.
-            let midway_m_s = fall.vertical_m_s + 0.5 * step_s * acceleration(fall.vertical_m_s);
-            fall.fallen_m -= step_s * midway_m_s;
-            fall.vertical_m_s += step_s * acceleration(midway_m_s);
-            fall.highest_m_s = fall.highest_m_s.max(fall.vertical_m_s);
-        }
-        fall
     }
 
     /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
@@ -260,10 +150,8 @@ impl Column {
     fn stops_too_soon(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
-            let soft = self.share(&self.soft);
-            let outlook = Outlook::new(burn, self.mass_at_ignition_kg, burning_s, end_s);
-            let fall = self.fall(&outlook, vertical_m_s, &Way::Even(&soft, &soft), 0.0);
-            fall.vertical_m_s > self.touchdown_m_s
+            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
+            fall.softest_m_s() > self.touchdown_m_s
         })
     }
 
@@ -316,14 +204,11 @@ mod tests {
         let burn = Burn::nominal(&curve);
         let band = column.band(&burn, 1.0, -25.0).expect("lands");
         let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("carried");
-        let outlook = Outlook::new(&burn, 3.13, 1.0, end_s);
-        let (soft, hard) = (column.share(&column.soft), column.share(&column.hard));
+        let fall = Fall::new(&column, &burn, 1.0, end_s, -25.0);
         let mut found = 0;
-        for way in [Way::Switch(&soft, &hard), Way::Switch(&hard, &soft), Way::Even(&soft, &hard)] {
-            if let Some(height_m) = column.height_of(&outlook, -25.0, &way) {
-                assert!(band.contains(height_m), "{height_m} in {band:?}");
-                found += 1;
-            }
+        for height_m in fall.heights_m().into_iter().flatten() {
+            assert!(band.contains(height_m), "{height_m} in {band:?}");
+            found += 1;
         }
         assert!(found >= 2, "{found}");
         assert!((band.place(band.low_m), band.place(band.high_m)) == (0.0, 1.0));
