@@ -138,9 +138,9 @@ fn on_page_key(model: &mut Model, key: Key, now: Duration) {
 }
 
 /// Scrolls up by this many lines; down when negative. What happened is read from its newest line, a list of
-/// names from its first.
+/// names or figures from its first.
 fn scroll(model: &mut Model, up: i32) {
-    let away = if model.page() == Page::Parameters { -up } else { up };
+    let away = if matches!(model.page(), Page::Parameters | Page::Link) { -up } else { up };
     let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
     let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
