@@ -1,7 +1,7 @@
 //! The hand of the crew.
 //!
 //! Nothing dangerous on a single letter: arming takes the dialog and then the typed word, start and
-//! disarming a letter and Enter, an abort the same chord twice; each within its time.
+//! disarming a letter and Enter, an abort Ctrl-X and Enter (or Ctrl-X twice); each within its time.
 
 use std::time::Duration;
 
@@ -40,7 +40,11 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         }
         return;
     }
-    // The chord is twice the same key with nothing between; once complete, nothing takes it back.
+    // Before any dialog: who has begun an abort means the abort.
+    if key == Key::Enter && model.abort_chord.confirm(now) {
+        return abort(model, now);
+    }
+    // Twice Ctrl-X with nothing between; once complete, nothing takes it back.
     if model.abort_chord.end() {
         abort(model, now);
     }
