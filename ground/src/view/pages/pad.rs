@@ -186,12 +186,15 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             ])
         })
         .collect();
-    lines.push(Line::from(vec![
-        Span::styled(" D", theme.style(Role::Key)),
-        Span::styled(" disarm   ", theme.style(Role::Label)),
-        Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
-        Span::styled(" ABORT", theme.style(Role::Label)),
-    ]));
+    lines.push(match model.settings.role.why_not_command() {
+        Some(why) => Line::styled(format!(" {why}"), theme.style(Role::Label)),
+        None => Line::from(vec![
+            Span::styled(" D", theme.style(Role::Key)),
+            Span::styled(" disarm   ", theme.style(Role::Label)),
+            Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
+            Span::styled(" ABORT", theme.style(Role::Label)),
+        ]),
+    });
     let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
     lines.extend(arming.map(|track| top::facts_short(track, theme, now)));
     lines
