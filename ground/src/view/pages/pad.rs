@@ -51,6 +51,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
+    // Before the first command both begin with the same words.
+    lines.dedup_by_key(|line| line.to_string());
     lines.extend(ladder(model, theme, now));
     lines
 }
