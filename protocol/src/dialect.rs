@@ -1,9 +1,16 @@
 //! The MAVLink dialect, generated at build time from `dialect/touchdown.xml` (which includes `common.xml`).
 
+use mavlink::Message as _;
+
 pub use generated::touchdown::*;
 
 /// The dialect's own XML, for readers of a log that never saw this project.
 pub const DIALECT_XML: &str = include_str!("../dialect/touchdown.xml");
+
+/// A message's name in the dialect, as in `HEARTBEAT`; `None` for an id that it does not have.
+pub fn message_name(id: u32) -> Option<&'static str> {
+    MavMessage::default_message_from_id(id).map(|message| message.message_name())
+}
 
 mod generated {
     #![allow(

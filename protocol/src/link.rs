@@ -173,6 +173,11 @@ impl LinkStats {
         self.messages.get(&(source, message_id)).map(|at| now.saturating_sub(*at))
     }
 
+    /// Every message that was heard: from whom, its id, and the time since its last frame.
+    pub fn messages(&self, now: Duration) -> impl Iterator<Item = (Address, u32, Duration)> {
+        self.messages.iter().map(move |((source, id), at)| (*source, *id, now.saturating_sub(*at)))
+    }
+
     /// Every component that was heard, with its own rate and loss.
     pub fn sources(&self, now: Duration) -> Vec<SourceFigures> {
         let figures = |(address, source): (&Address, &Source)| {

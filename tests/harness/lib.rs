@@ -8,6 +8,7 @@ mod log_file;
 mod process;
 mod programs;
 mod serial_line;
+mod terminal;
 
 pub use bare_ground::BareGround;
 pub use clients::Clients;
@@ -16,6 +17,7 @@ pub use nix::sys::signal::Signal;
 pub use process::{Ended, Running};
 pub use programs::{Program, program};
 pub use serial_line::SerialLine;
+pub use terminal::Terminal;
 
 use std::time::Duration;
 

@@ -113,12 +113,7 @@ impl Running {
     /// # Panics
     /// The system does not say.
     pub fn processor_time(&self) -> Duration {
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).expect("it runs");
-        // The fields behind the name, which may hold spaces: user and system time are the 14th and 15th.
-        let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
-        let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
-        // 100 a second on every Linux.
-        Duration::from_millis(10 * clock_ticks)
+        processor_time_of(self.child.id())
     }
 
     /// Resident memory, bytes.
@@ -152,6 +147,16 @@ impl Drop for Running {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Processor time that a process has used so far.
+pub(crate) fn processor_time_of(process: u32) -> Duration {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
+    // The fields behind the name, which may hold spaces: user and system time are the 14th and 15th.
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
+    // 100 a second on every Linux.
+    Duration::from_millis(10 * clock_ticks)
 }
 
 #[expect(clippy::disallowed_methods, reason = "waiting for real processes has a real limit")]

@@ -148,8 +148,18 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         false => None,
     };
     let alarm_command = config.alarm_command.clone();
-    let mut station =
-        Station { clock, log_time, recorder, demo, output, socket, server, alarm_command, quiet_input: None };
+    let mut station = Station {
+        clock,
+        log_time,
+        recorder,
+        demo,
+        output,
+        socket,
+        server,
+        alarm_command,
+        quiet_input: None,
+        report_at: Duration::ZERO,
+    };
     let ran = station.run(&mut model, &mut wire).await;
     wire.remember();
     station.close(&model).await;

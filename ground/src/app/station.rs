@@ -22,6 +22,8 @@ use crate::model::{LogHealth, Model};
 use crate::update::{Action, Msg, update};
 
 const TICK: Duration = Duration::from_millis(100);
+/// Rates and loss are taken over ten seconds: more often says nothing new.
+const REPORT_EVERY: Duration = Duration::from_secs(1);
 
 /// What the run loop holds besides model and link.
 pub(super) struct Station {
@@ -35,6 +37,8 @@ pub(super) struct Station {
     pub(super) alarm_command: Option<String>,
     /// What keeps the input quiet where a terminal was.
     pub(super) quiet_input: Option<OwnedFd>,
+    /// When the links' figures are told next.
+    pub(super) report_at: Duration,
 }
 
 impl Station {
@@ -64,8 +68,7 @@ impl Station {
                 received = wire.receive() => wire.take(received),
             };
             let mut quit = false;
-            // The links' state is told with the clock, so that it is never older than a tick.
-            let report = msgs.contains(&Msg::Tick).then(|| wire.report());
+            let report = self.is_report_due(&msgs).then(|| wire.report());
             for msg in report.into_iter().chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
@@ -88,6 +91,20 @@ impl Station {
                 return Ok(());
             }
         }
+    }
+
+    /// The links' figures are told with the clock, and at once when a link comes or goes.
+    fn is_report_due(&mut self, msgs: &[Msg]) -> bool {
+        let now = self.clock.now();
+        let due = msgs.iter().any(|msg| match msg {
+            Msg::Tick => now >= self.report_at,
+            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::OneLinkDown(_) => true,
+            _ => false,
+        });
+        if due {
+            self.report_at = now + REPORT_EVERY;
+        }
+        due
     }
 
     /// A real vehicle's link and log go on without a screen; a demonstration is only looked at.

@@ -4,18 +4,24 @@
 //! u32 length of what follows | u8 kind | u64 nanoseconds since the station's start | payload
 //! ```
 
+mod bytes;
+mod report;
+
 use std::time::Duration;
 
-use protocol::frame::{Framer, FramerCounters};
+use protocol::frame::FramerCounters;
 
 use crate::model::LogHealth;
 use crate::model::command::CommandKind;
 use crate::update::Msg;
+use bytes::{Reader, Writer};
 
 /// Changes when the bytes do; a screen of another version is told so.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Nothing longer is believed.
 const LENGTH_MAX: usize = 64 * 1024;
+/// The length itself.
+const PREFIX_LEN: usize = 4;
 /// Kind and time.
 const HEAD_LEN: usize = 9;
 
@@ -70,7 +76,8 @@ pub enum Asked {
 #[error("unexpected bytes on the socket: {0}")]
 pub struct CodecError(&'static str);
 
-/// The bytes of what is told; `None` for what stays with the station (its own keys, its own end).
+/// The bytes of what is told; `None` for what stays with the station (its own keys, its own end) and for what is
+/// longer than anything that is believed.
 pub fn encode_told(told: &Told, now: Duration) -> Option<Vec<u8>> {
     let mut out = Writer::new(now);
     match told {
@@ -81,7 +88,7 @@ pub fn encode_told(told: &Told, now: Duration) -> Option<Vec<u8>> {
         Told::Live => drop(out.kind(1)),
         Told::Msg(msg) => encode_msg(msg, &mut out)?,
     }
-    Some(out.finish())
+    Some(out.finish()).filter(|bytes| bytes.len() - PREFIX_LEN <= LENGTH_MAX)
 }
 
 fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
@@ -105,7 +112,14 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::Acknowledged => drop(out.kind(11)),
         Msg::ParametersWanted => drop(out.kind(12)),
         Msg::ScreenGone => drop(out.kind(13)),
-        _ => return None,
+        Msg::HeardOver(number) => drop(out.kind(14).u64(*number as u64)),
+        Msg::OneLinkDown(why) => drop(out.kind(15).text(why)),
+        Msg::Links { links, signing } => {
+            out.kind(16);
+            report::encode(links, signing.as_ref(), out);
+        }
+        // The station's own keys and end; what only a replay or an attached screen tells itself.
+        Msg::Key(_) | Msg::Terminate(_) | Msg::Commanded(_) | Msg::ScreenTick => return None,
     }
     Some(())
 }
@@ -153,6 +167,12 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
         11 => Told::Msg(Msg::Acknowledged),
         12 => Told::Msg(Msg::ParametersWanted),
         13 => Told::Msg(Msg::ScreenGone),
+        14 => Told::Msg(Msg::HeardOver(rest.size()?)),
+        15 => Told::Msg(Msg::OneLinkDown(rest.text()?)),
+        16 => {
+            let (links, signing) = report::decode(&mut rest)?;
+            Told::Msg(Msg::Links { links, signing })
+        }
         _ => return Err(CodecError("an unknown kind of message")),
     };
     rest.end()?;
@@ -234,98 +254,6 @@ fn kind_of(number: u8) -> Result<CommandKind, CodecError> {
 fn open(bytes: &[u8]) -> Result<(u8, Duration, Reader<'_>), CodecError> {
     let mut rest = Reader(bytes);
     Ok((rest.u8()?, Duration::from_nanos(rest.u64()?), rest))
-}
-
-struct Writer {
-    bytes: Vec<u8>,
-}
-
-impl Writer {
-    fn new(now: Duration) -> Self {
-        let mut bytes = vec![0; 5];
-        bytes.extend(u64::try_from(now.as_nanos()).unwrap_or(u64::MAX).to_le_bytes());
-        Self { bytes }
-    }
-
-    fn kind(&mut self, kind: u8) -> &mut Self {
-        self.bytes[4] = kind;
-        self
-    }
-
-    fn raw(&mut self, bytes: &[u8]) -> &mut Self {
-        self.bytes.extend_from_slice(bytes);
-        self
-    }
-
-    fn u8(&mut self, value: u8) -> &mut Self {
-        self.raw(&[value])
-    }
-
-    fn u32(&mut self, value: u32) -> &mut Self {
-        self.raw(&value.to_le_bytes())
-    }
-
-    fn u64(&mut self, value: u64) -> &mut Self {
-        self.raw(&value.to_le_bytes())
-    }
-
-    /// At most 4,000 bytes of it: nothing here is longer but by somebody's intent.
-    fn text(&mut self, text: &str) -> &mut Self {
-        let mut end = text.len().min(4_000);
-        while !text.is_char_boundary(end) {
-            end -= 1;
-        }
-        self.u32(end as u32).raw(&text.as_bytes()[..end])
-    }
-
-    fn finish(mut self) -> Vec<u8> {
-        let length = (self.bytes.len() - 4) as u32;
-        self.bytes[..4].copy_from_slice(&length.to_le_bytes());
-        self.bytes
-    }
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl Reader<'_> {
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], CodecError> {
-        let (taken, rest) = self.0.split_first_chunk().ok_or(CodecError("too short"))?;
-        self.0 = rest;
-        Ok(*taken)
-    }
-
-    fn u8(&mut self) -> Result<u8, CodecError> {
-        Ok(self.take::<1>()?[0])
-    }
-
-    fn u32(&mut self) -> Result<u32, CodecError> {
-        Ok(u32::from_le_bytes(self.take()?))
-    }
-
-    fn u64(&mut self) -> Result<u64, CodecError> {
-        Ok(u64::from_le_bytes(self.take()?))
-    }
-
-    fn size(&mut self) -> Result<usize, CodecError> {
-        usize::try_from(self.u64()?).map_err(|_too_large| CodecError("a size beyond this machine"))
-    }
-
-    fn text(&mut self) -> Result<String, CodecError> {
-        let length = usize::try_from(self.u32()?).unwrap_or(usize::MAX);
-        let text = self.0.get(..length).ok_or(CodecError("too short"))?;
-        self.0 = &self.0[length..];
-        String::from_utf8(text.to_vec()).map_err(|_not_text| CodecError("not text"))
-    }
-
-    fn frame(&mut self) -> Result<protocol::frame::Frame, CodecError> {
-        let mut framer = Framer::new();
-        framer.push_datagram(std::mem::take(&mut self.0));
-        framer.next_frame().ok_or(CodecError("not a frame"))
-    }
-
-    fn end(&self) -> Result<(), CodecError> {
-        if self.0.is_empty() { Ok(()) } else { Err(CodecError("too long")) }
-    }
 }
 
 #[cfg(test)]

@@ -1,14 +1,15 @@
-//! The abort chord: Ctrl-X pressed twice, told apart from Ctrl-X held.
+//! The abort chord: Ctrl-X, then Enter; or Ctrl-X twice, told apart from Ctrl-X held.
 //!
-//! Many terminals send a held key as the same bytes over and over: once at the press, again after the
+//! Enter completes it at once, on every terminal: no keyboard repeats Ctrl-X as Enter. With Ctrl-X it is not so
+//! simple. Many terminals send a held key as the same bytes over and over: once at the press, again after the
 //! keyboard's delay (a quarter of a second and more), then every few hundredths of a second. The first
-//! repeat looks exactly like a second press; what follows it does not. So the second press counts only
+//! repeat looks exactly like a second press; what follows it does not. So a second Ctrl-X counts only
 //! once nothing has followed it for [`REPEATS_WITHIN`], and a hold, however long, is one press. A terminal that
-//! tells repeats apart lets the second press count at once.
+//! tells repeats apart lets the second Ctrl-X count at once.
 
 use std::time::Duration;
 
-/// Time for the second press, counted from the first or from the end of its hold.
+/// Time for the second key, counted from the first or from the end of its hold.
 pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
 /// Presses closer together than this are one key held: keyboards repeat every 20 to 100 ms, fingers
 /// press again later than that. Also how long a second press waits for its proof.
@@ -55,6 +56,15 @@ impl AbortChord {
             // The first, or one more of a held key.
             Self::Open | Self::Once(_) | Self::Twice(_) => Self::Once(now),
         };
+    }
+
+    /// Enter was pressed. Returns whether it completes the chord, which is over then.
+    pub fn confirm(&mut self, now: Duration) -> bool {
+        let complete = self.is_begun(now);
+        if complete {
+            *self = Self::Open;
+        }
+        complete
     }
 
     /// Another key was pressed: a key that is held no longer repeats then. Returns whether the chord is
@@ -122,6 +132,22 @@ mod tests {
         let released = presses.last().copied().unwrap();
         presses.push(released + 400);
         assert_eq!(aborts(&presses), 1);
+    }
+
+    #[test]
+    fn enter_completes_what_ctrl_x_began_and_nothing_else() {
+        let at = Duration::from_millis;
+        let mut chord = AbortChord::default();
+        assert!(!chord.confirm(at(0)));
+        chord.press(at(0));
+        assert!(chord.confirm(at(1)));
+        assert!(!chord.confirm(at(2)), "once");
+        chord.press(at(10));
+        assert!(!chord.confirm(at(2_011)), "too late");
+        for repeat in held(500, 33, 30) {
+            chord.press(at(5_000 + repeat));
+        }
+        assert!(chord.confirm(at(7_000)), "a hold is a first press");
     }
 
     #[test]

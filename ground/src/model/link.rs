@@ -59,8 +59,10 @@ pub struct LinkReport {
 pub struct Link {
     /// Rates, loss and age over all links: loss is what came over none.
     pub stats: LinkStats,
-    /// Each link by itself, where there are several or frames are signed.
+    /// Each link by itself, as it was at [`Self::reported_at`].
     pub reports: Vec<LinkReport>,
+    /// When the links were last reported.
+    pub reported_at: Duration,
     /// What signatures let in and kept out; `None` without a key.
     pub signing: Option<SigningCounters>,
     /// What a radio last said about itself, and when. It says nothing about the vehicle.

@@ -49,6 +49,8 @@ pub enum Scene {
     Heard(Frame),
     /// The crew asked for something.
     Commanded(CommandKind),
+    /// The ground sent something else, of so many bytes.
+    Sent(usize),
 }
 
 /// A whole flight.
@@ -181,7 +183,8 @@ fn frames(bytes: &[u8]) -> Vec<Frame> {
     std::iter::from_fn(|| framer.next_frame()).collect()
 }
 
-/// What a frame shows: the vehicle's own, or the crew's command for the first time it was sent.
+/// What a frame shows: the vehicle's own; the crew's command, for the first time it was sent; or that the ground sent
+/// something.
 fn scene(at_ns: u64, frame: Frame) -> Option<(u64, Scene)> {
     if frame.source() == VEHICLE {
         return Some((at_ns, Scene::Heard(frame)));
@@ -189,14 +192,15 @@ fn scene(at_ns: u64, frame: Frame) -> Option<(u64, Scene)> {
     if frame.source() != GROUND {
         return None;
     }
-    let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return None };
+    let sent = Some((at_ns, Scene::Sent(frame.as_bytes().len())));
+    let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return sent };
     let kind = match command.command {
-        _ if command.confirmation > 0 => return None,
+        _ if command.confirmation > 0 => return sent,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 => CommandKind::Arm,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => CommandKind::Disarm,
         MavCmd::MAV_CMD_MISSION_START => CommandKind::Start,
         MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => CommandKind::Abort,
-        _ => return None,
+        _ => return sent,
     };
     Some((at_ns, Scene::Commanded(kind)))
 }

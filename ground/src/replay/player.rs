@@ -136,13 +136,19 @@ impl Player {
             match (scene_at, tick_at) {
                 (None, None) => break,
                 (Some(scene), tick) if tick.is_none_or(|tick| scene <= tick) => {
-                    let msg = match &self.film.scenes[self.next_scene].1 {
-                        Scene::Heard(frame) => Msg::Frame(frame.clone()),
-                        Scene::Commanded(kind) => Msg::Commanded(*kind),
+                    let msgs = match &self.film.scenes[self.next_scene].1 {
+                        Scene::Heard(frame) => {
+                            let (bytes, framing) = (frame.as_bytes().len(), self.model.link.framing);
+                            vec![Msg::Frame(frame.clone()), Msg::Received { bytes, framing }]
+                        }
+                        Scene::Commanded(kind) => vec![Msg::Commanded(*kind)],
+                        Scene::Sent(bytes) => vec![Msg::Sent { bytes: *bytes, drops: 0 }],
                     };
                     self.next_scene += 1;
-                    // What the ground did then is in the film; nothing is done again.
-                    drop(update(&mut self.model, msg, scene));
+                    for msg in msgs {
+                        // What the ground did then is in the film; nothing is done again.
+                        drop(update(&mut self.model, msg, scene));
+                    }
                 }
                 (_, tick) => {
                     let tick = tick.unwrap_or(to);

@@ -1,7 +1,7 @@
 //! The hand of the crew.
 //!
 //! Nothing dangerous on a single letter: arming takes the dialog and then the typed word, start and
-//! disarming a letter and Enter, an abort the same chord twice; each within its time.
+//! disarming a letter and Enter, an abort Ctrl-X and Enter (or Ctrl-X twice); each within its time.
 
 use std::time::Duration;
 
@@ -40,7 +40,11 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         }
         return;
     }
-    // The chord is twice the same key with nothing between; once complete, nothing takes it back.
+    // Before any dialog: who has begun an abort means the abort.
+    if key == Key::Enter && model.abort_chord.confirm(now) {
+        return abort(model, now);
+    }
+    // Twice Ctrl-X with nothing between; once complete, nothing takes it back.
     if model.abort_chord.end() {
         abort(model, now);
     }
@@ -138,9 +142,9 @@ fn on_page_key(model: &mut Model, key: Key, now: Duration) {
 }
 
 /// Scrolls up by this many lines; down when negative. What happened is read from its newest line, a list of
-/// names from its first.
+/// names or figures from its first.
 fn scroll(model: &mut Model, up: i32) {
-    let away = if model.page() == Page::Parameters { -up } else { up };
+    let away = if matches!(model.page(), Page::Parameters | Page::Link) { -up } else { up };
     let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
     let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);

@@ -45,7 +45,7 @@ pub enum Msg {
     ScreenGone,
     /// The frame that follows came over this link; told where there are several.
     HeardOver(usize),
-    /// How each link does, several times a second.
+    /// How each link does, once a second and when one comes or goes.
     Links {
         /// In the order of their numbers.
         links: Vec<LinkReport>,
@@ -181,7 +181,7 @@ fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<Signing
             ),
         );
     }
-    (model.link.reports, model.link.signing) = (links, signing);
+    (model.link.reports, model.link.reported_at, model.link.signing) = (links, now, signing);
 }
 
 fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {

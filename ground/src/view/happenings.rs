@@ -6,8 +6,8 @@ use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
 
 use super::theme::{Role, Theme};
-use crate::model::Model;
 use crate::model::link::RADIO_FRESH;
+use crate::model::{self, Model};
 
 /// Columns before an event's text: time, speaker, mark.
 const BEFORE_TEXT: usize = 18;
@@ -94,29 +94,22 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
     let span = |text: String, role: Role| Span::styled(text, theme.style(role));
     let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-    let mut spans = vec![
-        span(
-            format!(" rx {:.0}{capacity} B/s {:.0}/s", figures.rx_bytes_s, figures.rx_frames_s),
-            Role::Plain,
-        ),
-        span(format!("  loss {:.1} %", figures.loss * 100.0), loss_role),
-        Span::raw("  "),
-        log(model, theme),
-    ];
-    let mut used: usize = spans.iter().map(Span::width).sum();
+    let received = span(format!(" rx {:.0}{capacity} B/s", figures.rx_bytes_s), Role::Plain);
     let refused = (rejected > 0 || model.link.send_drops > 0)
         .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), Role::Caution));
-    let round_trip = span(format!("  rtt {round_trip}"), Role::Plain);
-    let sent = span(format!("  tx {:.0} B/s", figures.tx_bytes_s), Role::Plain);
-    let radio = radio(model, now).map(|words| span(words, Role::Plain));
-    for more in refused.into_iter().chain([round_trip]).chain(radio).chain([sent]) {
-        used += more.width();
-        if used > columns {
-            break;
-        }
-        spans.push(more);
-    }
-    Line::from(spans)
+    // In the order of their weight; what comes first has room in the narrowest panel.
+    let mut pieces = vec![received, span(format!("  loss {:.1} %", figures.loss * 100.0), loss_role)];
+    pieces.push(log(model, theme));
+    pieces.extend(refused);
+    pieces.push(span(format!("  rtt {round_trip}"), Role::Plain));
+    pieces.extend(radio(model, now).map(|words| span(words, Role::Plain)));
+    pieces.push(span(format!("  tx {:.0} B/s", figures.tx_bytes_s), Role::Plain));
+    let mut used = 0;
+    let fits = |piece: &Span| {
+        used += piece.width();
+        used <= columns
+    };
+    Line::from(pieces.into_iter().take_while(fits).collect::<Vec<_>>())
 }
 
 /// What a radio says of itself: signal and noise, here and at the other end, in its own units.
@@ -141,7 +134,7 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let role = |loss: f64| if loss > 0.05 { Role::Caution } else { Role::Plain };
     let mut spans = vec![
         Span::styled(
-            format!(" {} links, loss {:.1} %  ", model.link.reports.len(), all.loss * 100.0),
+            format!(" {} links, loss {:.1} %", model.link.reports.len(), all.loss * 100.0),
             theme.style(role(all.loss)),
         ),
         log(model, theme),
@@ -174,15 +167,18 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
 }
 
 fn log(model: &Model, theme: Theme) -> Span<'static> {
-    if model.settings.log_path.is_none() {
-        Span::styled("no log", theme.style(Role::Caution))
+    let (words, role) = if model.settings.role == model::Role::Replaying {
+        ("  replay".to_owned(), Role::Plain)
+    } else if model.settings.log_path.is_none() {
+        ("  no log".to_owned(), Role::Caution)
     } else if model.log.failed {
-        Span::styled("LOG FAILED", theme.style(Role::Alarm))
+        ("  LOG FAILED".to_owned(), Role::Alarm)
     } else if model.log.dropped > 0 {
-        Span::styled(format!("log runs, {} DROPPED", model.log.dropped), theme.style(Role::Caution))
+        (format!("  log runs, {} DROPPED", model.log.dropped), Role::Caution)
     } else {
-        Span::styled("log ok", theme.style(Role::Good))
-    }
+        ("  log ok".to_owned(), Role::Good)
+    };
+    Span::styled(words, theme.style(role))
 }
 
 #[cfg(test)]

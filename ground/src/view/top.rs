@@ -11,7 +11,7 @@ use crate::model::link::LinkState;
 use crate::model::{self, Model, too_late, words};
 
 /// The abort key, in words.
-pub const ABORT_KEY: &str = "Ctrl-X Ctrl-X";
+pub const ABORT_KEY: &str = "Ctrl-X Enter";
 
 /// What aborts from this screen, or why nothing does.
 pub fn abort_key(model: &Model) -> String {
@@ -79,7 +79,7 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
-        return Line::styled(format!(" Ctrl-X AGAIN TO ABORT: {effect}"), theme.style(Role::Alarm));
+        return Line::styled(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), theme.style(Role::Alarm));
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return facts(track, theme, now);

@@ -80,6 +80,11 @@ impl Bench {
         }
     }
 
+    /// Ctrl-X, then Enter.
+    pub(crate) fn abort(&mut self) {
+        self.keys(&[Key::CtrlX, Key::Enter]);
+    }
+
     /// Ctrl-X twice, by an unhurried finger, and the proof that it is not held.
     pub(crate) fn abort_chord(&mut self) {
         self.key(Key::CtrlX);

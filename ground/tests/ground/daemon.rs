@@ -141,6 +141,8 @@ fn screens_come_and_go_the_station_stays() {
     let mut second = Screen::attach(&daemon.socket, false);
     assert!(second.armed(), "the history tells at once what was");
     assert!(second.model.history.timeline.len() >= 2);
+    let reports = &second.model.link.reports;
+    assert!(reports.len() == 1 && reports[0].figures.rx_frames_s > 1.0, "the link's figures: {reports:?}");
     second.ask(&Asked::Command(CommandKind::Abort));
     drop(second);
     watching.until("aborted", |screen| screen.model.outcome.aborted_at.is_some());

@@ -74,25 +74,64 @@ fn a_vehicle_that_changed_while_the_word_was_typed_is_not_armed() {
     assert!(!bench.take_commands().iter().any(is_arm));
 }
 
+/// Nothing open, each dialog, and one with letters in it.
+const OPENINGS: [&[Key]; 7] = [
+    &[],
+    &[Key::Char('A')],
+    &[Key::Char('A'), Key::Char('A')],
+    &[Key::Char('S')],
+    &[Key::Char('D')],
+    &[Key::Char('?')],
+    &[Key::Char('q')],
+];
+
+fn opened(opening: &[Key]) -> Bench {
+    let mut bench = Bench::crewed();
+    bench.armed = matches!(opening, [Key::Char('q' | 'S')]);
+    if bench.armed {
+        bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    }
+    bench.run(1.0);
+    bench.keys(opening);
+    bench.take_commands();
+    bench
+}
+
+#[test]
+fn ctrl_x_and_enter_abort_at_once_from_every_dialog_and_close_it() {
+    for opening in OPENINGS {
+        let mut bench = opened(opening);
+        bench.key(Key::CtrlX);
+        assert!(bench.take_commands().is_empty(), "one press is not enough");
+        bench.key(Key::Enter);
+        let sent = bench.take_commands();
+        assert!(sent.len() == 1 && is_abort(&sent[0]), "{opening:?}: {sent:?}");
+        assert_eq!(bench.model.dialog, Dialog::Closed);
+        bench.answer(ABORT, ACCEPTED);
+        bench.key(Key::Enter);
+        bench.run(3.0);
+        assert!(bench.take_commands().is_empty(), "once");
+    }
+}
+
+#[test]
+fn enter_alone_or_too_late_or_after_another_key_aborts_nothing() {
+    let mut bench = Bench::crewed();
+    bench.keys(&[Key::Enter, Key::Enter, Key::CtrlX]);
+    bench.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.1);
+    bench.key(Key::Enter);
+    bench.keys(&[Key::CtrlX, Key::Escape, Key::Enter, Key::CtrlX, Key::Char(' '), Key::Enter]);
+    bench.run(3.0);
+    assert!(!bench.take_commands().iter().any(is_abort));
+}
+
 #[test]
 fn abort_works_from_every_dialog_and_closes_it() {
-    let openings: [&[Key]; 6] = [
-        &[],
-        &[Key::Char('A')],
-        &[Key::Char('A'), Key::Char('A')],
-        &[Key::Char('D')],
-        &[Key::Char('?')],
-        &[Key::Char('q')],
-    ];
-    for opening in openings {
-        let mut bench = Bench::crewed();
-        bench.armed = opening == [Key::Char('q')];
-        bench.run(1.0);
-        bench.keys(opening);
-        bench.take_commands();
+    for opening in OPENINGS {
+        let mut bench = opened(opening);
         bench.key(Key::CtrlX);
         assert!(!bench.take_commands().iter().any(is_abort), "one press is not enough");
-        assert!(bench.screen(80, 24).contains("AGAIN TO ABORT"));
+        assert!(bench.screen(80, 24).contains("ENTER ABORTS (or Ctrl-X)"));
         bench.run(0.4);
         bench.key(Key::CtrlX);
         assert!(!bench.take_commands().iter().any(is_abort), "it may be the first repeat of a held key");
@@ -256,7 +295,7 @@ fn a_held_ctrl_x_does_not_abort_and_one_more_press_does() {
         bench.hold(Key::CtrlX, delay_ms, 33, 5);
         bench.run(0.5);
         assert!(!bench.take_commands().iter().any(is_abort), "first repeat after {delay_ms} ms");
-        assert!(bench.screen(80, 24).contains("AGAIN TO ABORT"));
+        assert!(bench.screen(80, 24).contains("ENTER ABORTS (or Ctrl-X)"));
         bench.key(Key::CtrlX);
         bench.run(0.2);
         assert!(bench.take_commands().iter().any(is_abort), "released and pressed again");

@@ -106,6 +106,42 @@ proptest! {
         prop_assert!(bench.take_commands().iter().any(is_abort));
     }
 
+    /// Ctrl-X and then Enter, whatever was pressed before, sends an abort with that Enter.
+    #[test]
+    fn ctrl_x_and_enter_abort_at_once_after_any_keys(keys in prop::collection::vec(some_keys(), 0..12)) {
+        let mut bench = Bench::crewed();
+        bench.keys(&keys.concat());
+        bench.take_commands();
+        bench.abort();
+        prop_assert!(bench.take_commands().iter().any(is_abort));
+    }
+
+    /// An abort that is sent at a key was begun by a Ctrl-X just before it; and one that is sent later, by two.
+    #[test]
+    fn no_keys_without_the_chord_abort(
+        steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
+    ) {
+        let mut bench = Bench::crewed();
+        let mut history = Vec::new();
+        bench.take_commands();
+        for (keys, pause_ms) in steps {
+            bench.run((pause_ms / 100) as f64 / 10.0);
+            for key in keys {
+                let begun = history.last() == Some(&Key::CtrlX);
+                let twice = history.ends_with(&[Key::CtrlX, Key::CtrlX]);
+                let earlier = bench.take_commands().iter().any(is_abort);
+                prop_assert!(!earlier || twice, "while no key was pressed: {history:?}");
+                bench.key(key);
+                history.push(key);
+                if bench.take_commands().iter().any(is_abort) {
+                    prop_assert!(twice || (begun && key == Key::Enter), "{history:?}");
+                }
+                // What was sent is answered: a repeat of it is no new abort.
+                bench.model.commands = ground::model::command::Commands::default();
+            }
+        }
+    }
+
     /// The same ladder on a screen whose station runs elsewhere; it asks, and sends nothing itself.
     #[test]
     fn an_attached_screen_asks_to_arm_by_the_complete_ladder_alone(
@@ -135,6 +171,7 @@ proptest! {
         bench.model.settings.role = Role::Watching;
         bench.take_commands();
         bench.keys(&keys.concat());
+        bench.abort();
         bench.abort_chord();
         let asked = |action: &Action| matches!(action, Action::Request(Asked::Command(_)));
         prop_assert!(!bench.actions.iter().any(asked) && bench.take_commands().is_empty());

@@ -7,6 +7,7 @@ mod daemon;
 mod disarm;
 mod hand;
 mod ladder;
+mod links;
 mod program;
 mod radio;
 mod replay;

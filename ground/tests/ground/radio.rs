@@ -3,7 +3,7 @@
 use crate::bench::{Bench, settings, typed};
 use ground::exit::{Exit, decide};
 use ground::key::Key;
-use ground::model::link::{LinkReport, LinkState};
+use ground::model::link::LinkState;
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 use protocol::dialect::{
@@ -12,8 +12,6 @@ use protocol::dialect::{
 };
 use protocol::frame::Framer;
 use protocol::identity::{Address, GROUND};
-use protocol::link::LinkFigures;
-use protocol::signing::SigningCounters;
 
 #[test]
 fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
@@ -82,51 +80,6 @@ fn an_escape_sequence_cannot_reach_the_terminal() {
     bench.text("\u{1b}[2Jgone\u{7}");
     let screen = bench.screen(80, 24);
     assert!(screen.contains("[2Jgone") && !screen.contains('\u{1b}') && !screen.contains('\u{7}'));
-}
-
-fn report(name: &str, loss: f64, trouble: Option<&str>) -> LinkReport {
-    LinkReport {
-        name: name.to_owned(),
-        figures: LinkFigures { rx_bytes_s: 1_590.0, loss, ..LinkFigures::default() },
-        sources: Vec::new(),
-        capacity_bytes_s: name.starts_with("serial").then_some(5_760),
-        copies: 0,
-        trouble: trouble.map(str::to_owned),
-    }
-}
-
-#[test]
-fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
-    let mut bench = Bench::crewed();
-    bench.key(Key::Char('5'));
-    let links = |trouble| {
-        let links =
-            vec![report("udpin:0.0.0.0:14550", 0.0, None), report("serial:/dev/x:57600", 0.125, trouble)];
-        Msg::Links { links, signing: None }
-    };
-    bench.msg(links(None));
-    let screen = bench.screen(140, 40);
-    assert!(screen.contains("2 links") && screen.contains("serial 1590/5760 B/s 12.5 %"), "{screen}");
-    bench.msg(links(Some("unplugged")));
-    assert!(bench.screen(140, 40).contains("serial DOWN"));
-    bench.msg(Msg::OneLinkDown("/dev/x: unplugged".to_owned()));
-    assert!(bench.events().contains("one link down"));
-    assert!(!bench.screen(140, 40).contains("LINK DOWN"), "the other still works");
-}
-
-#[test]
-fn what_signatures_keep_out_is_said_and_counted() {
-    let mut bench = Bench::crewed();
-    let counted = |wrong| {
-        let signing = Some(SigningCounters { wrong, accepted: 5, ..SigningCounters::default() });
-        Msg::Links { links: vec![report("udpin:0.0.0.0:14550", 0.0, None)], signing }
-    };
-    bench.msg(counted(0));
-    assert!(!bench.events().contains("frames refused"));
-    bench.msg(counted(3));
-    bench.msg(counted(4));
-    assert_eq!(bench.events().matches("frames refused: 0 unsigned, 3 wrongly signed").count(), 1);
-    assert!(bench.screen(140, 40).contains("rejected 4"));
 }
 
 #[test]

@@ -111,6 +111,25 @@ fn no_key_commands_anything_in_a_replay() {
     assert!(player.on_key(Key::Char('q')), "quits at once: nothing is armed here");
 }
 
+/// The link's figures are those of the flight, and nothing says that a replay records.
+#[test]
+fn the_links_figures_are_the_recorded_ones() {
+    let mut player = player();
+    player.seek(S(30));
+    // A heartbeat a second.
+    let figures = player.model.link.stats.figures(player.position());
+    assert!(
+        (figures.rx_frames_s - 1.0).abs() < 0.2 && (figures.rx_bytes_s - 21.0).abs() < 5.0,
+        "{figures:?}"
+    );
+    player.on_key(Key::Char('8'));
+    let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(80, 24)).unwrap();
+    let now = player.position();
+    terminal.draw(|frame| ground::view::view(&player.model, MONO, now, frame)).unwrap();
+    let screen = terminal.backend().to_string();
+    assert!(screen.contains("a recorded flight") && !screen.contains("recording"), "{screen}");
+}
+
 /// The crew's own commands are shown with what became of them, from the same code as live.
 #[test]
 fn what_was_commanded_then_is_shown() {
@@ -136,7 +155,9 @@ fn a_tlog_is_played_up_to_its_damage() {
     bytes.extend([1, 2, 3]);
     std::fs::write(&path, &bytes).unwrap();
     let film = Film::load(&path).unwrap();
-    assert_eq!(film.scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), S(2)]);
+    let at_400_ms = Duration::from_millis(400);
+    assert_eq!(film.scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
+    assert!(matches!(film.scenes[1].1, Scene::Sent(21)), "our own heartbeat: {:?}", film.scenes[1]);
     assert_eq!(film.damage.as_deref(), Some("unreadable 3 bytes before the end"));
     assert_eq!(film.begin_of(TdPhase::TD_PHASE_POWERED), Some(S(0)));
 }

@@ -7,6 +7,7 @@
 
 mod endpoint;
 mod serial;
+mod stream;
 mod tcp;
 mod udp;
 

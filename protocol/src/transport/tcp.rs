@@ -4,11 +4,12 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::io::AsyncWriteExt as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::broadcast;
 use tokio::sync::mpsc::{Receiver, Sender};
 
+use super::stream::{Line, keep_open, read_all};
 use super::{REOPEN_AFTER, Received};
 use crate::hub::Peer;
 
@@ -69,7 +70,7 @@ async fn attend(
 ) {
     // Telemetry of now must not wait for more bytes to come; where it cannot be set, it waits a moment.
     let _ = stream.set_nodelay(true);
-    let (mut reader, mut writer) = stream.into_split();
+    let (reader, mut writer) = stream.into_split();
     let write = async {
         loop {
             match all.recv().await {
@@ -85,100 +86,38 @@ async fn attend(
         }
     };
     tokio::select! {
-        _ = read_all(&mut reader, peer, &inbox) => {}
+        _ = read_all(reader, peer, SILENCE, &inbox) => {}
         () = write => {}
     }
     // Fails only when nobody wants the link any more.
     let _ = inbox.send(Received::Gone(peer)).await;
 }
 
-/// Reads until the stream ends; says why. `None`: nobody wants the link any more.
-async fn read_all(
-    reader: &mut tokio::net::tcp::OwnedReadHalf,
-    peer: Peer,
-    inbox: &Sender<Received>,
-) -> Option<String> {
-    let mut buffer = [0; 4096];
-    let mut in_burst = false;
-    loop {
-        let count = match tokio::time::timeout(SILENCE, reader.read(&mut buffer)).await {
-            Ok(Ok(0)) => return Some("the peer has closed the connection".to_owned()),
-            Ok(Ok(count)) => count,
-            Ok(Err(error)) => return Some(error.to_string()),
-            Err(_elapsed) => {
-                // Said once a burst, not every second.
-                if std::mem::take(&mut in_burst) {
-                    inbox.send(Received::Silence(peer)).await.ok()?;
-                }
-                continue;
-            }
-        };
-        in_burst = true;
-        inbox.send(Received::Stream(peer, buffer[..count].to_vec())).await.ok()?;
-    }
-}
-
 pub(super) fn connect(address: String, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
-    tokio::spawn(keep_connected(address, inbox, outbox));
+    tokio::spawn(keep_open(Connection { address }, inbox, outbox));
 }
 
-async fn keep_connected(address: String, inbox: Sender<Received>, mut outbox: Receiver<Vec<u8>>) {
-    let mut last_trouble = String::new();
-    for peer in 0.. {
-        let trouble = match tokio::time::timeout(CONNECT_WITHIN, TcpStream::connect(&address)).await {
-            Ok(Ok(stream)) => {
-                last_trouble.clear();
-                if inbox.send(Received::Up(address.clone())).await.is_err() {
-                    return;
-                }
-                let trouble = carry(stream, peer, &inbox, &mut outbox).await;
-                if inbox.send(Received::Gone(peer)).await.is_err() {
-                    return;
-                }
-                match trouble {
-                    Some(trouble) => trouble,
-                    None => return,
-                }
-            }
-            Ok(Err(error)) => error.to_string(),
-            Err(_elapsed) => format!("no answer within {CONNECT_WITHIN:?}"),
-        };
-        // Said once, not twice a second.
-        if trouble != last_trouble {
-            if inbox.send(Received::Down(format!("{address}: {trouble}"))).await.is_err() {
-                return;
-            }
-            last_trouble = trouble;
-        }
-        tokio::time::sleep(REOPEN_AFTER).await;
-        // What was queued for a dead connection is stale.
-        while outbox.try_recv().is_ok() {}
-        if inbox.is_closed() || outbox.is_closed() {
-            return;
-        }
+struct Connection {
+    address: String,
+}
+
+impl Line for Connection {
+    type Io = TcpStream;
+    const SILENCE: Duration = SILENCE;
+    const ENDED: &str = "the peer has closed the connection";
+    const BEGINS_ANEW: bool = true;
+
+    fn name(&self) -> &str {
+        &self.address
     }
-}
 
-/// Carries bytes until the connection fails (says why) or nobody wants it any more (`None`). Reading and writing do
-/// not wait for each other: a peer that takes nothing must still be heard.
-async fn carry(
-    stream: TcpStream,
-    peer: Peer,
-    inbox: &Sender<Received>,
-    outbox: &mut Receiver<Vec<u8>>,
-) -> Option<String> {
-    // A command must not wait for more bytes to come; where it cannot be set, it waits a moment.
-    let _ = stream.set_nodelay(true);
-    let (mut reader, mut writer) = stream.into_split();
-    let write = async {
-        loop {
-            if let Err(error) = writer.write_all(&outbox.recv().await?).await {
-                return Some(error.to_string());
-            }
-        }
-    };
-    tokio::select! {
-        ended = read_all(&mut reader, peer, inbox) => ended,
-        ended = write => ended,
+    async fn open(&self) -> Result<TcpStream, String> {
+        let stream = tokio::time::timeout(CONNECT_WITHIN, TcpStream::connect(&self.address))
+            .await
+            .map_err(|_elapsed| format!("no answer within {CONNECT_WITHIN:?}"))?
+            .map_err(|error| error.to_string())?;
+        // A command must not wait for more bytes to come; where it cannot be set, it waits a moment.
+        let _ = stream.set_nodelay(true);
+        Ok(stream)
     }
 }

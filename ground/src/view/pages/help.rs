@@ -9,7 +9,7 @@ pub fn lines() -> Vec<Line<'static>> {
         "                 then type ARM and Enter within 10 s (step 2)",
         " S, Enter        start the countdown; Enter within 5 s",
         " D, Enter        disarm",
-        " Ctrl-X Ctrl-X   ABORT, from anywhere: two presses within 2 s;",
+        " Ctrl-X Enter    ABORT, from anywhere: Enter within 2 s, or Ctrl-X again;",
         "                 a held key is one press. Sent until acknowledged",
         " Space           acknowledge the alarms: the bell stops",
         " 1 to 9          show a screen and hold it; h holds the present one",

@@ -2,55 +2,200 @@
 
 use std::time::Duration;
 
+use protocol::dialect::message_name;
+use protocol::identity::{Address, VEHICLE};
+use protocol::link::{LinkFigures, SourceFigures};
 use ratatui::text::{Line, Span};
 
+use super::window;
 use crate::model::Model;
-use crate::model::vehicle::{STALE_AFTER, Sample};
+use crate::model::link::LinkReport;
+use crate::model::vehicle::STALE_AFTER;
+use crate::view::happenings;
 use crate::view::number::{STALE_MARK, seconds};
 use crate::view::theme::{Role, Theme};
-use crate::view::{happenings, top};
 
-/// The figures, then the age of every message.
-pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let link = &model.link;
-    let framing = &link.framing;
+/// Above this share the loss is marked.
+const LOSS_MARKED: f64 = 0.05;
+/// From this width on, figures stand in columns below their names.
+const TABLE_COLUMNS: usize = 76;
+const NAME_WIDTH: usize = 27;
+/// The longest name of a message that the screens live by, and an age.
+const AGE_CELL_WIDTH: usize = 35;
+/// What the vehicle sends all the time, and the screens live by.
+const REGULAR: [&str; 13] = [
+    "HEARTBEAT",
+    "SYS_STATUS",
+    "EXTENDED_SYS_STATE",
+    "TD_FLIGHT_STATUS",
+    "ATTITUDE_QUATERNION",
+    "LOCAL_POSITION_NED",
+    "VFR_HUD",
+    "TD_FINS",
+    "TD_GIMBAL",
+    "TD_DESCENT",
+    "TD_CONTROLLER",
+    "TD_TOUCHDOWN_PREDICTION",
+    "TD_PREDICTED_PATH",
+];
+
+/// The figures in all, of each link and of each component; then the age of every message.
+pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let mut lines = vec![happenings::link(model, theme, now, columns)];
+    lines.extend(rejected(model, theme));
+    lines.push(heading(theme, columns));
+    for report in reports(model, now) {
+        lines.push(link_line(&report, theme, columns));
+        lines.extend(report.sources.iter().map(|source| source_line(source, theme, columns)));
+    }
+    lines.push(Line::styled(
+        format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
+        theme.style(Role::Title),
+    ));
+    lines.extend(age_lines(model, theme, now, columns));
+    // Up goes back towards the first line.
+    let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
+    window(lines, start, rows)
+}
+
+/// What was thrown away, by why.
+fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let row = |label: &str, value: String| {
         Line::from(vec![
-            Span::styled(format!(" {label:<12}"), theme.style(Role::Label)),
+            Span::styled(format!(" {label:<9}"), theme.style(Role::Label)),
             Span::styled(value, theme.style(Role::Plain)),
         ])
     };
-    let mut lines = vec![
-        Line::from(vec![Span::raw(" "), top::link(model, theme, now)]),
-        row("over", model.settings.link_name.clone()),
-        happenings::link(model, theme, now, columns),
-        row(
-            "rejected",
-            format!(
-                "checksum {}  unknown id {}  cut short {}  flags {}  fields {}  garbage {} B",
-                framing.crc_errors,
-                framing.unknown_ids,
-                framing.cut_short,
-                framing.unknown_flags,
-                link.undecodable,
-                framing.garbage_bytes
-            ),
-        ),
-        row("unsent", format!("{} writes found no room", link.send_drops)),
-        Line::styled(
-            format!(" Age of what was heard last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
-            theme.style(Role::Title),
-        ),
-    ];
-    let ages = ages(model, now);
-    // Two columns where they fit.
-    let across = if columns >= 64 { 2 } else { 1 };
-    let rows = ages.len().div_ceil(across);
-    for row in 0..rows {
-        let cells = (0..across).filter_map(|column| ages.get(row + column * rows));
-        lines.push(Line::from(cells.flat_map(|(name, age)| age_cell(name, *age, theme)).collect::<Vec<_>>()));
+    let framing = &model.link.framing;
+    let unreadable = format!(
+        "checksum {}  id {}  cut {}  flags {}  fields {}  garbage {} B",
+        framing.crc_errors,
+        framing.unknown_ids,
+        framing.cut_short,
+        framing.unknown_flags,
+        model.link.undecodable,
+        framing.garbage_bytes
+    );
+    let mut lines = vec![row("rejected", unreadable)];
+    if let Some(signing) = model.link.signing {
+        let counts = format!(
+            "good {}  unsigned {}  wrong {}  replayed {}  too old {}",
+            signing.accepted, signing.unsigned, signing.wrong, signing.replayed, signing.too_old
+        );
+        lines.push(row("signed", counts));
+    }
+    if model.link.send_drops > 0 {
+        lines.push(row("unsent", format!("{} writes found no room", model.link.send_drops)));
     }
     lines
+}
+
+/// All links together as they are now; where there are several, also each as it was reported.
+fn reports(model: &Model, now: Duration) -> Vec<LinkReport> {
+    let link = &model.link;
+    let several = link.reports.len() > 1;
+    let all = LinkReport {
+        name: if several { "all links".to_owned() } else { model.settings.link_name.clone() },
+        figures: link.stats.figures(now),
+        sources: link.stats.sources(now),
+        capacity_bytes_s: model.settings.link_capacity_bytes_s,
+        copies: link.reports.iter().map(|report| report.copies).sum(),
+        trouble: link.trouble.clone(),
+    };
+    let since_reported = now.saturating_sub(link.reported_at);
+    let aged = |report: &LinkReport| {
+        let mut report = report.clone();
+        for source in &mut report.sources {
+            source.age += since_reported;
+        }
+        report
+    };
+    let each = link.reports.iter().filter(|_| several).map(aged);
+    std::iter::once(all).chain(each).collect()
+}
+
+fn heading(theme: Theme, columns: usize) -> Line<'static> {
+    let text = if columns >= TABLE_COLUMNS {
+        format!(
+            " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
+            "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
+        )
+    } else {
+        " Over 10 s: rate, loss, age".to_owned()
+    };
+    Line::styled(text, theme.style(Role::Title))
+}
+
+fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
+    let name = &report.name;
+    if let Some(why) = &report.trouble {
+        return Line::styled(format!(" {name} DOWN {why}"), theme.style(Role::Alarm));
+    }
+    let LinkFigures { rx_bytes_s, tx_bytes_s, rx_frames_s, loss } = report.figures;
+    let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+    let rx = format!("{rx_bytes_s:.0}{capacity}");
+    let loss_words = percent(loss);
+    let text = if columns >= TABLE_COLUMNS {
+        let copies = report.copies;
+        format!(
+            " {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx_bytes_s:>6.0}{rx_frames_s:>9.1}{loss_words:>8}{copies:>8}"
+        )
+    } else {
+        let kind = name.split(':').next().unwrap_or_default();
+        format!(" {kind} {rx} B/s {loss_words}")
+    };
+    Line::styled(text, theme.style(loss_role(loss)))
+}
+
+fn source_line(source: &SourceFigures, theme: Theme, columns: usize) -> Line<'static> {
+    let SourceFigures { source: address, age, rx_frames_s, loss } = *source;
+    let Address { system_id, component_id } = address;
+    let name = format!("  {system_id}/{component_id} {}", what(address));
+    let (loss_words, age_words) = (percent(loss), seconds(age));
+    let mark = if age > STALE_AFTER { STALE_MARK } else { " " };
+    let text = if columns >= TABLE_COLUMNS {
+        format!(
+            " {name:<NAME_WIDTH$.NAME_WIDTH$}{:>17}{rx_frames_s:>9.1}{loss_words:>8}{:>8}{:>9}",
+            "",
+            "",
+            format!("{mark}{age_words}")
+        )
+    } else {
+        format!(" {name} {rx_frames_s:.1}/s {loss_words} {mark}{age_words}")
+    };
+    let role = if age > STALE_AFTER { Role::Stale } else { loss_role(loss) };
+    Line::styled(text, theme.style(role))
+}
+
+/// What a component is, as far as its ids say. Component ids: MAVLink's `MAV_COMPONENT`.
+fn what(address: Address) -> &'static str {
+    match address {
+        VEHICLE => "vehicle",
+        Address { component_id: 190, .. } => "ground station",
+        Address { component_id: 68, .. } => "radio",
+        _ => "",
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", share * 100.0)
+}
+
+fn loss_role(loss: f64) -> Role {
+    if loss > LOSS_MARKED { Role::Caution } else { Role::Plain }
+}
+
+/// As many columns of them as there is room for.
+fn age_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let ages = ages(model, now);
+    let across = (columns / AGE_CELL_WIDTH).max(1);
+    let rows = ages.len().div_ceil(across);
+    (0..rows)
+        .map(|row| {
+            let cells = (0..across).filter_map(|column| ages.get(row + column * rows));
+            Line::from(cells.flat_map(|(name, age)| age_cell(name, *age, theme)).collect::<Vec<_>>())
+        })
+        .collect()
 }
 
 fn age_cell(name: &str, age: Option<Duration>, theme: Theme) -> [Span<'static>; 2] {
@@ -60,29 +205,25 @@ fn age_cell(name: &str, age: Option<Duration>, theme: Theme) -> [Span<'static>; 
         Some(age) => (format!(" {}", seconds(age)), Role::Plain),
     };
     [
-        Span::styled(format!(" {name:<22}"), theme.style(Role::Label)),
-        Span::styled(format!("{text:<9}"), theme.style(role)),
+        Span::styled(format!(" {name:<24.24}"), theme.style(Role::Label)),
+        Span::styled(format!("{text:<10}"), theme.style(role)),
     ]
 }
 
+/// What is sent all the time, heard or not; then whatever else was heard, by its number.
 fn ages(model: &Model, now: Duration) -> Vec<(&'static str, Option<Duration>)> {
-    fn age<T>(sample: Option<&Sample<T>>, now: Duration) -> Option<Duration> {
-        sample.map(|sample| sample.age(now))
-    }
-    let vehicle = &model.vehicle;
-    vec![
-        ("HEARTBEAT", age(vehicle.heartbeat.as_ref(), now)),
-        ("TD_FLIGHT_STATUS", age(vehicle.status.as_ref(), now)),
-        ("ATTITUDE_QUATERNION", age(vehicle.attitude.as_ref(), now)),
-        ("LOCAL_POSITION_NED", age(vehicle.motion.as_ref(), now)),
-        ("VFR_HUD", age(vehicle.hud.as_ref(), now)),
-        ("TD_FINS", age(vehicle.fins.as_ref(), now)),
-        ("TD_GIMBAL", age(vehicle.gimbal.as_ref(), now)),
-        ("TD_DESCENT", age(vehicle.descent.as_ref(), now)),
-        ("TD_CONTROLLER", age(vehicle.controller.as_ref(), now)),
-        ("TD_TOUCHDOWN_PREDICT.", age(vehicle.prediction.as_ref(), now)),
-        ("TD_PREDICTED_PATH", age(vehicle.path.as_ref(), now)),
-        ("EXTENDED_SYS_STATE", age(vehicle.on_ground.as_ref(), now)),
-        ("SYS_STATUS", age(vehicle.ready_to_arm.as_ref(), now)),
-    ]
+    let heard: Vec<(&'static str, Duration)> = model
+        .link
+        .stats
+        .messages(now)
+        .filter(|(source, ..)| *source == VEHICLE)
+        .filter_map(|(_, id, age)| Some((message_name(id)?, age)))
+        .collect();
+    let age = |name| heard.iter().find(|(known, _)| *known == name).map(|(_, age)| *age);
+    let others = heard.iter().filter(|(name, _)| !REGULAR.contains(name));
+    REGULAR
+        .iter()
+        .map(|name| (*name, age(*name)))
+        .chain(others.map(|(name, age)| (*name, Some(*age))))
+        .collect()
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
-use crate::model::Model;
+use crate::model::{self, Model};
 use crate::view::number::seconds;
 use crate::view::theme::{Role, Theme};
 
@@ -16,6 +16,13 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             Span::styled(value, theme.style(role)),
         ])
     };
+    if model.settings.role == model::Role::Replaying {
+        return vec![
+            row("state", "a recorded flight; nothing is written".to_owned(), Role::Plain),
+            row("log", model.settings.log_path.clone().unwrap_or_default(), Role::Plain),
+            row("events", model.events.total().to_string(), Role::Plain),
+        ];
+    }
     let state = match (&model.settings.log_path, model.log.failed, model.log.dropped) {
         (None, _, _) => row("state", "NOT RECORDING: --log none".to_owned(), Role::Caution),
         (Some(_), true, _) => row("state", "FAILED: nothing more is recorded".to_owned(), Role::Alarm),
@@ -27,7 +34,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), Role::Plain),
         row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), Role::Plain),
-        row("runs since", seconds(now), Role::Plain),
+        row("running for", seconds(now), Role::Plain),
         row("events", model.events.total().to_string(), Role::Plain),
         Line::default(),
         Line::styled(

@@ -43,7 +43,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Descent => descent::lines(model, theme, now),
         Page::Landing => landing::lines(model, theme, now, columns, rows),
         Page::Review => review::lines(model, theme, now, columns),
-        Page::Link => link::lines(model, theme, now, columns),
+        Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => messages::lines(model, theme, columns, rows),
         Page::Parameters => parameters::lines(model, theme, rows),
         Page::Log => log::lines(model, theme, now),

@@ -51,6 +51,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
+    // Before the first command both begin with the same words.
+    lines.dedup_by_key(|line| line.to_string());
     lines.extend(ladder(model, theme, now));
     lines
 }
@@ -186,12 +188,15 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             ])
         })
         .collect();
-    lines.push(Line::from(vec![
-        Span::styled(" D", theme.style(Role::Key)),
-        Span::styled(" disarm   ", theme.style(Role::Label)),
-        Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
-        Span::styled(" ABORT", theme.style(Role::Label)),
-    ]));
+    lines.push(match model.settings.role.why_not_command() {
+        Some(why) => Line::styled(format!(" {why}"), theme.style(Role::Label)),
+        None => Line::from(vec![
+            Span::styled(" D", theme.style(Role::Key)),
+            Span::styled(" disarm   ", theme.style(Role::Label)),
+            Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
+            Span::styled(" ABORT", theme.style(Role::Label)),
+        ]),
+    });
     let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
     lines.extend(arming.map(|track| top::facts_short(track, theme, now)));
     lines

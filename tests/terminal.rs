@@ -1,0 +1,267 @@
+//! What the ground station costs on a real terminal, and how long an abort takes from the key to the wire.
+//!
+//! `cargo bench -p e2e --bench terminal`. The programs are real, and so is the terminal: a pseudo-terminal of 80 by
+//! 24 cells, whose far end types and counts what is written to it. For the abort a vehicle of frames alone tells of a
+//! landing at its usual rates, so that the screen is drawn ten times a second meanwhile; each time runs from the write
+//! of the chord's last key to the arrival of the datagram with the command.
+
+use std::io::Write as _;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use e2e::{BareGround, Program, Running, Terminal, program};
+use protocol::command::{CommandAnswer, CommandRequest};
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavResult,
+    TD_FLIGHT_STATUS_DATA, TdPhase,
+};
+use protocol::frame::{Encoder, Framer};
+use protocol::identity::VEHICLE;
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+const SIZE: (u16, u16) = (80, 24);
+const TRIALS: u32 = 200;
+/// How long the pad is watched.
+const IDLE: Duration = Duration::from_secs(30);
+const FLIGHTS: u32 = 3;
+/// An abort that is later than this was not sent.
+const GIVEN_UP_AFTER: Duration = Duration::from_secs(5);
+
+/// A way to type the chord.
+struct Hand {
+    name: &'static str,
+    tells_repeats: bool,
+    keys: [&'static [u8]; 2],
+    /// Between the two keys, at least.
+    pause: Duration,
+}
+
+const HANDS: [Hand; 4] = [
+    Hand {
+        name: "any terminal, Ctrl-X Enter",
+        tells_repeats: false,
+        keys: [b"\x18", b"\r"],
+        pause: Duration::from_millis(40),
+    },
+    Hand {
+        name: "any terminal, Ctrl-X twice",
+        tells_repeats: false,
+        keys: [b"\x18", b"\x18"],
+        pause: Duration::from_millis(150),
+    },
+    // Ctrl-X by kitty's protocol; Enter stays what it was.
+    Hand {
+        name: "repeats told, Ctrl-X Enter",
+        tells_repeats: true,
+        keys: [b"\x1b[120;5u", b"\r"],
+        pause: Duration::from_millis(40),
+    },
+    Hand {
+        name: "repeats told, Ctrl-X twice",
+        tells_repeats: true,
+        keys: [b"\x1b[120;5u", b"\x1b[120;5u"],
+        pause: Duration::from_millis(150),
+    },
+];
+
+#[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+fn free_port() -> std::io::Result<u16> {
+    Ok(UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port())
+}
+
+fn ground(folder: &tempfile::TempDir, port: u16, tells_repeats: bool) -> Terminal {
+    let mut command = program(Program::Ground);
+    command
+        .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--log", "ground.mcap"])
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .current_dir(folder.path());
+    Terminal::start(&command, SIZE, tells_repeats)
+}
+
+/// Says what a landing vehicle says, until it is told to stop.
+fn speak(socket: &UdpSocket, ground: SocketAddr, stop: &AtomicBool) {
+    let mut encoder = Encoder::new(VEHICLE);
+    for count in 0_u32.. {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        let time_boot_ms = count * 40;
+        let mut messages = vec![
+            MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+                time_boot_ms,
+                q1: 0.7,
+                q3: 0.7 + (count % 50) as f32 * 1e-3,
+                ..ATTITUDE_QUATERNION_DATA::default()
+            }),
+            MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+                time_boot_ms,
+                z: -15.0 + (count % 100) as f32 * 0.1,
+                ..LOCAL_POSITION_NED_DATA::default()
+            }),
+        ];
+        if count % 3 == 0 {
+            messages.push(MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+                time_boot_ms,
+                phase: TdPhase::TD_PHASE_POWERED,
+                ..TD_FLIGHT_STATUS_DATA::default()
+            }));
+        }
+        if count % 25 == 0 {
+            let custom_mode = TdPhase::TD_PHASE_POWERED as u32;
+            messages.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
+        }
+        for message in messages {
+            // A ground that does not listen yet hears the next one.
+            let _ = socket.send_to(encoder.encode(&message).as_bytes(), ground);
+        }
+        std::thread::sleep(Duration::from_millis(40));
+    }
+}
+
+/// Waits for a command of the ground; `None` if it does not come in time.
+fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
+    let mut datagram = [0; 2048];
+    let deadline = now() + GIVEN_UP_AFTER;
+    loop {
+        let left = deadline.saturating_duration_since(now());
+        if left.is_zero() {
+            return Ok(None);
+        }
+        socket.set_read_timeout(Some(left))?;
+        let Ok((count, from)) = socket.recv_from(&mut datagram) else { continue };
+        let heard_at = now();
+        let mut framer = Framer::new();
+        framer.push_datagram(&datagram[..count]);
+        while let Some(frame) = framer.next_frame() {
+            let Some(request) = CommandRequest::from_frame(&frame) else { continue };
+            if request.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16 {
+                let answer = CommandAnswer::to(&request, MavResult::MAV_RESULT_ACCEPTED);
+                // Its sequence is its own; nobody counts it.
+                if let Some(frame) = answer.encode(&mut Encoder::new(VEHICLE)) {
+                    socket.send_to(frame.as_bytes(), from)?;
+                }
+                return Ok(Some(heard_at));
+            }
+        }
+    }
+}
+
+fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
+    let folder = tempfile::tempdir()?;
+    let port = free_port()?;
+    let mut terminal = ground(&folder, port, hand.tells_repeats);
+    let socket = UdpSocket::bind("127.0.0.1:0")?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let speaker = {
+        let (socket, stop) = (socket.try_clone()?, Arc::clone(&stop));
+        let to = SocketAddr::from(([127, 0, 0, 1], port));
+        std::thread::Builder::new().name("vehicle".to_owned()).spawn(move || speak(&socket, to, &stop))?
+    };
+    // Heard, and drawn for a while.
+    std::thread::sleep(Duration::from_secs(3));
+    let mut latencies = Vec::new();
+    for trial in 0..TRIALS {
+        // Spread over the screen's and the clock's periods.
+        std::thread::sleep(Duration::from_millis(u64::from(trial * 37 % 100)));
+        terminal.type_bytes(hand.keys[0]);
+        std::thread::sleep(hand.pause + Duration::from_millis(u64::from(trial * 13 % 20)));
+        let typed_at = now();
+        terminal.type_bytes(hand.keys[1]);
+        let heard_at = hear_abort(&socket)?.ok_or_else(|| format!("{}: no abort came", hand.name))?;
+        latencies.push(heard_at.saturating_duration_since(typed_at));
+        // The answer arrives before the next chord begins.
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    stop.store(true, Ordering::Relaxed);
+    speaker.join().map_err(|_panic| "the vehicle's thread has panicked")?;
+    Ok(latencies)
+}
+
+/// What a program used and wrote over a time.
+#[derive(Default)]
+struct Cost {
+    time: Duration,
+    processor: Duration,
+    bytes: u64,
+}
+
+impl Cost {
+    fn add(&mut self, terminal: &Terminal, (since, processor, bytes): (Instant, Duration, u64)) {
+        self.time += now().saturating_duration_since(since);
+        self.processor += terminal.processor_time().saturating_sub(processor);
+        self.bytes += terminal.written() - bytes;
+    }
+
+    fn print(&self, name: &str) -> std::io::Result<()> {
+        let seconds = self.time.as_secs_f64();
+        writeln!(
+            std::io::stdout(),
+            "{name:<28} {seconds:5.1} s: processor {:.2} %, terminal {:.0} B/s",
+            self.processor.as_secs_f64() / seconds * 100.0,
+            self.bytes as f64 / seconds
+        )
+    }
+}
+
+fn mark(terminal: &Terminal) -> (Instant, Duration, u64) {
+    (now(), terminal.processor_time(), terminal.written())
+}
+
+/// A real flight, armed and started by the hand; what the screen cost on the pad and during the landing.
+fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Failure> {
+    let folder = tempfile::tempdir()?;
+    let port = free_port()?;
+    let mut watch = BareGround::new();
+    let mut terminal = ground(&folder, port, false);
+    let mut vehicle = program(Program::OnboardSim);
+    vehicle.args(["fly", "--stay", "--mavlink", &format!("udpout:127.0.0.1:{port}")]);
+    let _vehicle = Running::start(vehicle.args(["--mavlink", &watch.link()]).current_dir(folder.path()));
+    watch.wait_for("every check passed", |_, message| match message {
+        Some(MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed.is_empty() => Some(()),
+        _ => None,
+    });
+    std::thread::sleep(Duration::from_secs(2));
+    let before = mark(&terminal);
+    std::thread::sleep(watched);
+    idle.add(&terminal, before);
+    terminal.type_bytes(b"AARM\r");
+    watch.wait_for_phase(TdPhase::TD_PHASE_PAD_ARMED);
+    terminal.type_bytes(b"S");
+    std::thread::sleep(Duration::from_millis(200));
+    terminal.type_bytes(b"\r");
+    watch.wait_for_phase(TdPhase::TD_PHASE_POWERED);
+    let before = mark(&terminal);
+    watch.wait_for_phase(TdPhase::TD_PHASE_TOUCHDOWN);
+    landing.add(&terminal, before);
+    Ok(())
+}
+
+fn main() -> Result<(), Failure> {
+    let (mut idle, mut landing) = (Cost::default(), Cost::default());
+    for _ in 0..FLIGHTS {
+        fly(&mut idle, &mut landing, IDLE / FLIGHTS)?;
+    }
+    idle.print("on the pad")?;
+    landing.print("landing")?;
+    for hand in HANDS {
+        let mut latencies = abort_latency(&hand)?;
+        latencies.sort();
+        let at = |percent: usize| latencies[(latencies.len() - 1) * percent / 100];
+        writeln!(
+            std::io::stdout(),
+            "{:<28} {TRIALS} aborts: median {:.1?}, 99 % within {:.1?}, worst {:.1?}",
+            hand.name,
+            at(50),
+            at(99),
+            at(100)
+        )?;
+    }
+    Ok(())
+}
