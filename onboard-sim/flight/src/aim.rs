@@ -14,6 +14,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 
+use crate::memory::remembers;
+
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
 
@@ -91,6 +93,15 @@ pub struct AimLoop {
     nozzle_rad: [f64; 2],
     side: [f64; 2],
 }
+
+// Gains and lengths are the mission's.
+remembers!(AimLoop {
+    under_way_rad_s2,
+    rate_before_rad_s,
+    disturbance_rad_s2,
+    nozzle_rad,
+    side,
+} but { gains, frame_s, latency_frames });
 
 impl AimLoop {
     /// A loop at rest, called every `frame_s`.

@@ -9,6 +9,7 @@
 //!
 //! When no plan can be had it degrades in announced steps, the [`ControlLevel`]s of the planar controller.
 
+mod digest;
 mod homing;
 mod plane;
 mod situation;
