@@ -120,6 +120,22 @@ impl AimLoop {
         }
     }
 
+    /// The same memory under other gains. What is under way is kept as far as it is as long under way.
+    #[must_use]
+    pub fn reconfigured(&self, gains: AimGains) -> Self {
+        let other = Self::new(gains, self.frame_s);
+        if other.latency_frames == self.latency_frames {
+            Self { gains, ..self.clone() }
+        } else {
+            Self {
+                latency_frames: other.latency_frames,
+                under_way_rad_s2: other.under_way_rad_s2,
+                gains,
+                ..self.clone()
+            }
+        }
+    }
+
     /// The acceleration about body y and z that the model does not explain, rad/s^2.
     pub fn disturbance_rad_s2(&self) -> [f64; 2] {
         self.disturbance_rad_s2

@@ -11,10 +11,12 @@
 
 mod digest;
 mod homing;
+mod inspect;
 mod plane;
 mod situation;
 
 pub use homing::Homing;
+pub use inspect::LandingSolved;
 pub use plane::Plane;
 use situation::Ahead;
 pub use situation::PoweredSituation;
