@@ -1,11 +1,11 @@
 //! The flight computer looked at, and its settings changed, from outside the flight: for those who replay it.
 
 use super::known::{Burning, Known};
-use super::{FRAMES_PER_PLAN, Pilot, PilotInput};
+use super::{FRAMES_PER_PLAN, Pilot, PilotInput, PilotOutput};
 use crate::airframe::MassModel;
 use crate::atmosphere::Air;
 use crate::mission::{Mission, MissionError};
-use crate::powered::LandingSolved;
+use crate::powered::{LandingSolved, Plane};
 
 impl Pilot {
     /// The same memory under another mission: another vehicle as it is known, other gains, limits and settings. The length
@@ -24,18 +24,21 @@ impl Pilot {
         })
     }
 
+    /// The plane of its landing, once there is one.
+    pub fn plane(&self) -> Option<&Plane> {
+        self.powered.plane()
+    }
+
     /// The mission it flies.
     pub fn mission(&self) -> &Mission {
         &self.known.mission
     }
 
-    /// The landing that the next frame plans, solved alone, and the pilot after that frame; no landing if the frame plans
-    /// none.
-    pub fn inspect(&self, input: &PilotInput) -> (Option<LandingSolved>, Self) {
-        let mut decided = self.clone();
-        decided.step(input);
-        let solved = decided.landing_planned(self, input);
-        (solved, decided)
+    /// One frame, and the landing that it plans solved alone; none if it plans none.
+    pub fn step_inspected(&mut self, input: &PilotInput) -> (PilotOutput, Option<LandingSolved>) {
+        let before = self.clone();
+        let output = self.step(input);
+        (output, self.landing_planned(&before, input))
     }
 
     /// What `before` planned at this frame, seen from behind it.
