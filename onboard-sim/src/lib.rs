@@ -10,11 +10,13 @@
 //! * [`landability`]: maps of where a landing exists.
 //! * [`paper`]: the landing paper's experiments, its numbers beside ours.
 //! * [`fly`]: the run loop: clock, links, log.
+//! * [`from_apogee`]: a flight from apogee as the records of a log.
 #![warn(missing_docs)]
 
 pub mod commands;
 pub mod endpoint;
 pub mod fly;
+pub mod from_apogee;
 pub mod landability;
 pub mod paper;
 pub mod parameters;

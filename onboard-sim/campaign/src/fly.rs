@@ -32,7 +32,8 @@ pub enum FlyError {
     Sensors(#[from] SensorParamError),
 }
 
-/// One flight in the air.
+/// One flight in the air. A clone flies on exactly as it does.
+#[derive(Debug, Clone)]
 pub struct Flight {
     mission: Mission,
     world: World,
@@ -139,6 +140,16 @@ impl Flight {
     pub fn with_baseline(mut self, baseline: Option<Baseline>) -> Self {
         self.baseline = baseline;
         self
+    }
+
+    /// Another mission from now on, for the flight computer and for the judgement; the world stays what it is.
+    ///
+    /// # Errors
+    /// The mission's motor is not to be had.
+    pub fn reconfigure(&mut self, mission: &Mission) -> Result<(), MissionError> {
+        self.pilot = self.pilot.reconfigured(mission)?;
+        self.mission = mission.clone();
+        Ok(())
     }
 
     /// The flight computer dies, and starts again after a time, s. Servos keep their last command meanwhile.

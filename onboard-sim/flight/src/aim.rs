@@ -14,6 +14,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Deserialize;
 
+use crate::memory::remembers;
+
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
 
@@ -92,6 +94,15 @@ pub struct AimLoop {
     side: [f64; 2],
 }
 
+// Gains and lengths are the mission's.
+remembers!(AimLoop {
+    under_way_rad_s2,
+    rate_before_rad_s,
+    disturbance_rad_s2,
+    nozzle_rad,
+    side,
+} but { gains, frame_s, latency_frames });
+
 impl AimLoop {
     /// A loop at rest, called every `frame_s`.
     pub fn new(gains: AimGains, frame_s: f64) -> Self {
@@ -106,6 +117,22 @@ impl AimLoop {
             disturbance_rad_s2: [0.0; 2],
             nozzle_rad: [0.0; 2],
             side: [0.0; 2],
+        }
+    }
+
+    /// The same memory under other gains. What is under way is kept as far as it is as long under way.
+    #[must_use]
+    pub fn reconfigured(&self, gains: AimGains) -> Self {
+        let other = Self::new(gains, self.frame_s);
+        if other.latency_frames == self.latency_frames {
+            Self { gains, ..self.clone() }
+        } else {
+            Self {
+                latency_frames: other.latency_frames,
+                under_way_rad_s2: other.under_way_rad_s2,
+                gains,
+                ..self.clone()
+            }
         }
     }
 

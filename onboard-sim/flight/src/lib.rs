@@ -36,6 +36,7 @@ pub mod estimator;
 pub mod fins;
 pub mod gate;
 pub mod ignition;
+mod memory;
 pub mod mission;
 pub mod motor_estimate;
 pub mod motors;

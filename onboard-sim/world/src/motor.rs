@@ -31,6 +31,29 @@ impl Motor {
         }
     }
 
+    /// This motor with the curve and scales of `after`; `before` is the truth that its own came from. What broke it stays
+    /// broken, by the same share and delay.
+    pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
+        // What has not changed keeps its bits.
+        let impulse_scale = if after.impulse_scale.to_bits() == before.impulse_scale.to_bits() {
+            self.impulse_scale
+        } else {
+            after.impulse_scale * (self.impulse_scale / before.impulse_scale)
+        };
+        let ignition_delay_s = if after.ignition_delay_s.to_bits() == before.ignition_delay_s.to_bits() {
+            self.ignition_delay_s
+        } else {
+            after.ignition_delay_s + (self.ignition_delay_s - before.ignition_delay_s)
+        };
+        Self {
+            curve: after.curve.clone(),
+            impulse_scale,
+            burn_time_scale: after.burn_time_scale,
+            ignition_delay_s,
+            ..self.clone()
+        }
+    }
+
     /// The igniter is fired; only the first command counts.
     pub(crate) fn ignite(&mut self, time_s: f64) {
         self.commanded_s.get_or_insert(time_s);

@@ -39,6 +39,25 @@ impl Servo {
         }
     }
 
+    /// This servo with the delay, rate, play and stops of `after`; `before` is what its own came from. What broke it stays
+    /// broken, what slowed it slows it by the same share.
+    pub(crate) fn changed(&self, before: &ServoData, after: &Self) -> Self {
+        let was_rad = before.rate_rad_s() * STEP_S;
+        // What has not changed keeps its bits.
+        let step_max_rad = if after.step_max_rad.to_bits() == was_rad.to_bits() {
+            self.step_max_rad
+        } else {
+            after.step_max_rad * (self.step_max_rad / was_rad)
+        };
+        Self {
+            delay_steps: after.delay_steps,
+            step_max_rad,
+            half_slop_rad: after.half_slop_rad,
+            stops_rad: after.stops_rad,
+            ..self.clone()
+        }
+    }
+
     /// Takes a command and turns for one step. A command that is no number is not taken.
     pub(crate) fn step(&mut self, command_rad: f64) {
         let last_rad = self.line_rad[(self.next + LINE_STEPS - 1) % LINE_STEPS];

@@ -1,9 +1,9 @@
 //! How one true vehicle and its day differ from the data: what a campaign draws for each flight.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The true parameters of one flight. [`Truth::default`] is the data as they stand, in still air.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Truth {
     /// True impulse over the motor file's.

@@ -6,6 +6,7 @@
 //! leaves takes angular momentum with it (jet damping: W. T. Thomson, Introduction to Space Dynamics, section 7.7).
 
 mod build;
+mod change;
 mod getters;
 #[cfg(test)]
 mod tests;

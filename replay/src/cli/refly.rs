@@ -19,13 +19,13 @@ pub(super) struct Ask {
     file: PathBuf,
     #[command(flatten)]
     how: FlownHow,
-    /// Begin at this tick instead of the landing's first.
+    /// Begin at this tick (of a flight from apogee this frame) instead of the landing's first.
     #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase"])]
     tick: Option<u64>,
     /// Begin at this vehicle time, s.
     #[arg(long, value_name = "SECONDS", conflicts_with = "phase")]
     at: Option<f64>,
-    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED.
+    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; of a flight from apogee any.
     #[arg(long, value_name = "PHASE", value_parser = phase_named)]
     phase: Option<Phase>,
     /// Write the flight as a log of its own. An existing file is not overwritten.
@@ -41,8 +41,9 @@ pub(super) struct Ask {
 pub(super) struct FlownHow {
     #[command(flatten)]
     pub(super) settings: SettingArguments,
-    /// Another setting of the plant alone, which the controller does not know of: motor.thrust_n=31,
-    /// plant.thrust_scale=0.97. May be given more than once.
+    /// Another setting of the plant alone, which the controller does not know of. Of a planar landing motor.thrust_n=31,
+    /// plant.thrust_scale=0.97 (it has no wind); of a flight from apogee airframe.motor=AeroTech_G12ST,
+    /// truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     plant: Vec<Setting>,
     /// The recorded state to begin from.
@@ -60,7 +61,7 @@ pub(super) struct FlownHow {
 enum Origin {
     /// The simulated plant's, where the log has it.
     Truth,
-    /// What the controller believed.
+    /// What the controller believed; of planar landings only.
     Estimate,
 }
 
@@ -68,8 +69,14 @@ enum Origin {
 enum Controller {
     /// The landing controller, or the upright law if an abort under thrust was latched.
     AsRecorded,
-    /// The upright law alone.
+    /// The upright law alone; of planar landings.
     Stabiliser,
+    /// The pilot itself; of flights from apogee, as those below.
+    Nmpc,
+    /// Ignition and fins timed beforehand.
+    OpenLoop,
+    /// A nose that swings to waste thrust.
+    Oscillating,
 }
 
 impl FlownHow {
@@ -85,6 +92,9 @@ impl FlownHow {
             law: match self.controller {
                 Controller::AsRecorded => Law::AsRecorded,
                 Controller::Stabiliser => Law::Stabiliser,
+                Controller::Nmpc => Law::Nmpc,
+                Controller::OpenLoop => Law::OpenLoop,
+                Controller::Oscillating => Law::Oscillating,
             },
             seed: self.seed,
         })

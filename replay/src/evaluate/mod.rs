@@ -2,22 +2,24 @@
 //!
 //! Every tick is given what it was given in flight, so the vehicle goes where it went, whatever is commanded now. The
 //! answer is what the controller *would have commanded*, beside what it did; what *would have happened* is for the
-//! [closed loop](mod@crate::refly).
+//! [closed loop](mod@crate::refly). A flight computer that decides otherwise is not obeyed either: one that lights its
+//! motor earlier than it did feels no thrust.
 
-use flight::controller::ControlLevel;
-use flight::dynamics::PlanarState;
-use flight::phase::Phase;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
-use protocol::log::v1;
+use flight::verdict::TouchdownLimits;
 use serde::Serialize;
-use tick_log::{TickLogError, state_from_log};
+use tick_log::TickLogError;
 
-use crate::controller::LoggedController;
+pub use crate::controller::Decided;
+use crate::controller::{
+    FrameError, LoggedController, LoggedPilot, PilotStartError, Replayed, settings_in_flight,
+};
 use crate::log::{Recording, RecordingError};
 use crate::settings::{Schedule, Setting, SettingError};
 
-/// Sections that the controller never sees.
+/// Sections that the planar landing's controller never sees.
 const NOT_THE_CONTROLLERS: [&str; 4] = ["plant.", "dispersion.", "arming.", "gate."];
+/// Sections that a flight computer never sees: how its landing is judged, and what chance decided.
+const NOT_THE_PILOTS: [&str; 3] = ["touchdown_limits.", "leg_limits.", "truth."];
 
 /// Why a flight cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
@@ -31,6 +33,18 @@ pub enum EvaluateError {
     /// A recorded input has no meaning in this build.
     #[error(transparent)]
     Input(#[from] TickLogError),
+    /// The flight computer cannot be let go again.
+    #[error(transparent)]
+    PilotStart(#[from] PilotStartError),
+    /// A recorded frame cannot be run again.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The estimator is set up once.
+    #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
+    TimedEstimator {
+        /// The setting.
+        setting: String,
+    },
     /// A setting that the controller does not have.
     #[error(
         "{path} is not the controller's: on recorded inputs it changes nothing; refly flies the flight again with it"
@@ -40,10 +54,10 @@ pub enum EvaluateError {
         path: String,
     },
     /// Other ticks than the recorded ones.
-    #[error(
-        "nmpc.sample_time_s cannot be changed on recorded inputs: there is one input every {recorded_s} s; refly flies the flight again with it"
-    )]
+    #[error("{path} cannot be changed on recorded inputs: there is one input every {recorded_s} s")]
     SampleTime {
+        /// The setting.
+        path: &'static str,
         /// As recorded, s.
         recorded_s: f64,
     },
@@ -64,19 +78,15 @@ pub struct EvaluatedTick {
     pub evaluated: Decided,
 }
 
-/// What a tick decides, in short.
+/// When a phase was entered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Decided {
-    /// Gimbal command, rad.
-    pub gimbal_rad: f64,
-    /// What decided it.
-    pub level: &'static str,
-    /// Cost of the plan.
-    pub cost: f64,
-    /// Newton iterations.
-    pub iterations: u32,
-    /// Whether the plan's end keeps every touchdown limit; `None` without a plan.
-    pub plan_lands: Option<bool>,
+pub struct PhaseEntered {
+    /// The phase.
+    pub phase: &'static str,
+    /// As recorded, vehicle time, s; `None` if it was not.
+    pub recorded_s: Option<f64>,
+    /// With the other settings.
+    pub evaluated_s: Option<f64>,
 }
 
 /// What an evaluation found.
@@ -96,8 +106,12 @@ pub struct EvaluateReport {
     pub gimbal_difference_max_rad: f64,
     /// The tick with it.
     pub gimbal_difference_max_tick: Option<u64>,
+    /// The largest difference of a fin command, rad.
+    pub fins_difference_max_rad: f64,
     /// Ticks on which another level decides.
     pub levels_different: usize,
+    /// When each phase was entered, as recorded and as it would be.
+    pub phases: Vec<PhaseEntered>,
     /// Every tick.
     pub ticks: Vec<EvaluatedTick>,
 }
@@ -107,46 +121,101 @@ pub struct EvaluateReport {
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let recorded_s = recording.profile()?.nmpc.sample_time_s;
-    for setting in settings {
-        let path = &setting.path;
-        if NOT_THE_CONTROLLERS.iter().any(|section| path.starts_with(section)) {
+    let ticks =
+        if recording.is_from_apogee() { frames(recording, settings) } else { ticks(recording, settings) };
+    Ok(summarise(recording, settings, ticks?))
+}
+
+/// The planar landing's ticks.
+fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Vec<EvaluatedTick>, EvaluateError> {
+    let profile = recording.profile()?;
+    let recorded_s = profile.nmpc.sample_time_s;
+    refuse(settings, &NOT_THE_CONTROLLERS, ("nmpc.sample_time_s", recorded_s))?;
+    let schedule = Schedule::new(recording.profile_toml()?, settings)?;
+    let then = LoggedController::new(&profile);
+    let now = LoggedController::scheduled(&schedule).judged_by(TouchdownLimits::from_profile(&profile));
+    side_by_side(then, now, recording.replayable_ticks()?)
+}
+
+/// The frames of a flight computer.
+fn frames(recording: &Recording, settings: &[Setting]) -> Result<Vec<EvaluatedTick>, EvaluateError> {
+    let (start, frames) = recording.replayable_frames()?;
+    let toml = recording.profile_toml()?;
+    let in_flight = settings_in_flight(&recording.head.run)?;
+    let then = LoggedPilot::new(toml, start, &in_flight)?;
+    let recorded_s = then.pilot().mission().estimator.frame_s;
+    refuse(settings, &NOT_THE_PILOTS, ("estimator.frame_s", recorded_s))?;
+    let timed = |setting: &&Setting| setting.at_s.is_some() && setting.path.starts_with("estimator.");
+    if let Some(setting) = settings.iter().find(timed) {
+        return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
+    }
+    let all: Vec<Setting> = in_flight.iter().chain(settings).cloned().collect();
+    side_by_side(then, LoggedPilot::new(toml, start, &all)?, frames)
+}
+
+fn refuse(
+    settings: &[Setting],
+    not_the_controllers: &[&str],
+    (interval, recorded_s): (&'static str, f64),
+) -> Result<(), EvaluateError> {
+    for Setting { path, .. } in settings {
+        if not_the_controllers.iter().any(|section| path.starts_with(section)) {
             return Err(EvaluateError::NotTheControllers { path: path.clone() });
         }
-        if path == "nmpc.sample_time_s" {
-            return Err(EvaluateError::SampleTime { recorded_s });
+        if path == interval {
+            return Err(EvaluateError::SampleTime { path: interval, recorded_s });
         }
     }
-    let schedule = Schedule::new(recording.profile_toml()?, settings)?;
-    let limits = TouchdownLimits::from_profile(&recording.profile()?);
-    let mut controller = LoggedController::scheduled(&schedule);
-    let mut ticks = Vec::new();
-    for tick in recording.replayable_ticks()? {
-        let again = controller.run_again(tick)?;
-        ticks.push(EvaluatedTick {
-            tick: tick.input.tick,
-            time_s: tick.input.time_s,
-            phase: phase_of(tick).map_or("unknown", Phase::name),
-            recorded: decided(&limits, &tick.output),
-            evaluated: decided(&limits, &again.output),
+    Ok(())
+}
+
+/// Runs both on every tick. The recorded decision is the record's; what a record leaves out (cost and iterations of a
+/// flight computer's plan) is that of `then`, which decides it again.
+fn side_by_side<C: Replayed>(
+    mut then: C,
+    mut now: C,
+    ticks: &[C::Tick],
+) -> Result<Vec<EvaluatedTick>, EvaluateError>
+where
+    EvaluateError: From<C::Error>,
+{
+    let mut evaluated = Vec::with_capacity(ticks.len());
+    for tick in ticks {
+        then.run_again(tick)?;
+        let again = now.run_again(tick)?;
+        let moment = C::moment(tick);
+        evaluated.push(EvaluatedTick {
+            tick: moment.tick,
+            time_s: moment.time_s,
+            phase: moment.phase,
+            recorded: then.decided(tick),
+            evaluated: now.decided(&again),
         });
     }
-    Ok(summarise(recording, settings, ticks))
+    Ok(evaluated)
+}
+
+/// The largest difference of two commands' angles, rad.
+fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
 fn summarise(recording: &Recording, settings: &[Setting], ticks: Vec<EvaluatedTick>) -> EvaluateReport {
-    let difference_rad = |tick: &EvaluatedTick| (tick.recorded.gimbal_rad - tick.evaluated.gimbal_rad).abs();
+    let difference_rad =
+        |tick: &EvaluatedTick| apart_rad(&tick.recorded.gimbal_rad, &tick.evaluated.gimbal_rad);
     let landing: Vec<&EvaluatedTick> =
         ticks.iter().filter(|tick| !matches!(tick.phase, "SAFE" | "PAD_IDLE" | "PAD_ARMED")).collect();
     let squares: f64 = landing.iter().map(|tick| difference_rad(tick) * difference_rad(tick)).sum();
     let largest = ticks.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
     let count = |differs: &dyn Fn(&EvaluatedTick) -> bool| ticks.iter().filter(|tick| differs(tick)).count();
+    let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+    let fins_rad = |tick: &EvaluatedTick| apart_rad(&tick.recorded.fins_rad, &tick.evaluated.fins_rad);
     EvaluateReport {
         kind: "open loop: the controller alone on recorded inputs",
         file: recording.name.clone(),
         settings: settings.iter().map(ToString::to_string).collect(),
         commands_different: count(&|tick| {
-            tick.recorded.gimbal_rad.to_bits() != tick.evaluated.gimbal_rad.to_bits()
+            bits(&tick.recorded.gimbal_rad) != bits(&tick.evaluated.gimbal_rad)
         }),
         gimbal_difference_rms_rad: if landing.is_empty() {
             0.0
@@ -155,24 +224,26 @@ fn summarise(recording: &Recording, settings: &[Setting], ticks: Vec<EvaluatedTi
         },
         gimbal_difference_max_rad: largest.map_or(0.0, difference_rad),
         gimbal_difference_max_tick: largest.filter(|tick| difference_rad(tick) > 0.0).map(|tick| tick.tick),
+        fins_difference_max_rad: ticks.iter().map(fins_rad).fold(0.0, f64::max),
         levels_different: count(&|tick| tick.recorded.level != tick.evaluated.level),
+        phases: phases(&ticks),
         ticks,
     }
 }
 
-fn phase_of(tick: &v1::ControllerTick) -> Option<Phase> {
-    u8::try_from(tick.input.phase).ok().and_then(Phase::from_index)
-}
-
-fn decided(limits: &TouchdownLimits, output: &v1::ControllerOutput) -> Decided {
-    let level = u8::try_from(output.level).ok().and_then(ControlLevel::from_index);
-    let planned = !matches!(level, None | Some(ControlLevel::Idle));
-    let end: PlanarState = state_from_log(&output.predicted_touchdown.state);
-    Decided {
-        gimbal_rad: output.gimbal_command_rad,
-        level: level.map_or("unknown", ControlLevel::name),
-        cost: output.solver.cost,
-        iterations: output.solver.iterations,
-        plan_lands: planned.then(|| LandingVerdict::judge_plan(limits, &end).landed()),
+/// Every phase in the order it was first entered.
+fn phases(ticks: &[EvaluatedTick]) -> Vec<PhaseEntered> {
+    let mut phases: Vec<PhaseEntered> = Vec::new();
+    for tick in ticks {
+        for (phase, is_recorded) in [(tick.recorded.phase, true), (tick.evaluated.phase, false)] {
+            let place = phases.iter().position(|known| known.phase == phase).unwrap_or_else(|| {
+                phases.push(PhaseEntered { phase, recorded_s: None, evaluated_s: None });
+                phases.len() - 1
+            });
+            let entered = &mut phases[place];
+            let time_s = if is_recorded { &mut entered.recorded_s } else { &mut entered.evaluated_s };
+            time_s.get_or_insert(tick.time_s);
+        }
     }
+    phases
 }

@@ -5,10 +5,9 @@
 
 use std::path::Path;
 
-use flight::mission::Mission;
 use flight::profile::Profile;
 use foxglove::messages::Log as EventRecord;
-use protocol::log::v1;
+use protocol::log::{flight_v1, v1};
 
 use super::{Entry, FlightLog, Head, LogError};
 
@@ -42,6 +41,17 @@ pub enum RecordingError {
         /// Why some record could not be read, if that is the reason.
         unreadable: Option<String>,
     },
+    /// Nothing to re-execute of a flight from apogee.
+    #[error(
+        "{name}: has no frames of the flight computer behind a record /pilot/start{}",
+        unreadable.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default()
+    )]
+    NoFrames {
+        /// The file.
+        name: String,
+        /// Why some record could not be read, if that is the reason.
+        unreadable: Option<String>,
+    },
     /// Nothing to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile {
@@ -69,6 +79,10 @@ pub struct Recording {
     pub ticks: Vec<v1::ControllerTick>,
     /// How many of them follow each other from tick 0 without a gap or a repetition.
     pub ticks_unbroken: usize,
+    /// How the flight computer of a flight from apogee was let go.
+    pub pilot_start: Option<flight_v1::PilotStart>,
+    /// Its frames, in file order.
+    pub frames: Vec<flight_v1::PilotTick>,
     /// The simulated plant, in file order.
     pub truth: Vec<v1::PlantTruth>,
     /// What a ground station knew, in file order.
@@ -114,11 +128,9 @@ impl Recording {
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
-                Entry::PilotStart(_)
-                | Entry::PilotTick(_)
-                | Entry::RawFrame
-                | Entry::Operator
-                | Entry::Other => {}
+                Entry::PilotStart(start) => recording.pilot_start = Some(*start),
+                Entry::PilotTick(tick) => recording.frames.push(*tick),
+                Entry::RawFrame | Entry::Operator | Entry::Other => {}
             }
             recording.check_length()?;
         }
@@ -134,6 +146,7 @@ impl Recording {
         // The plant is recorded several times a tick.
         let kinds = [
             ("controller ticks", self.ticks.len()),
+            ("frames of the flight computer", self.frames.len()),
             ("records of the plant", self.truth.len() / 10),
             ("records of telemetry", self.telemetry.len()),
             ("events", self.events.len()),
@@ -141,6 +154,26 @@ impl Recording {
         match kinds.into_iter().find(|(_, count)| *count > RECORDS_MAX) {
             Some((kind, _)) => Err(RecordingError::TooLong { name: self.name.clone(), kind }),
             None => Ok(()),
+        }
+    }
+
+    /// Whether the flight computer of a flight from apogee wrote it, not the controller of the planar landing.
+    pub fn is_from_apogee(&self) -> bool {
+        self.pilot_start.is_some() || !self.frames.is_empty()
+    }
+
+    /// The frames of a flight from apogee, and how its computer was let go.
+    ///
+    /// # Errors
+    /// There are none, or nothing to begin from.
+    pub fn replayable_frames(
+        &self,
+    ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
+        match &self.pilot_start {
+            Some(start) if !self.frames.is_empty() => Ok((start, &self.frames)),
+            _ => {
+                Err(RecordingError::NoFrames { name: self.name.clone(), unreadable: self.unreadable.clone() })
+            }
         }
     }
 
@@ -177,16 +210,9 @@ impl Recording {
     /// There is none, or it is not one of this build.
     pub fn profile(&self) -> Result<Profile, RecordingError> {
         let text = self.profile_toml()?;
-        Profile::from_toml(text, "profile.toml").map_err(|error| {
-            let reason = match Mission::from_toml(text, "profile.toml") {
-                Ok(mission) => format!(
-                    "{} is a mission from apogee, and this question knows the planar landing alone; info, verify, \
-                     export and compare know both",
-                    mission.name
-                ),
-                Err(_neither) => error.to_string(),
-            };
-            RecordingError::ProfileUnusable { name: self.name.clone(), reason }
+        Profile::from_toml(text, "profile.toml").map_err(|error| RecordingError::ProfileUnusable {
+            name: self.name.clone(),
+            reason: error.to_string(),
         })
     }
 

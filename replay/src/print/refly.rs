@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::{counted, shown};
 use crate::info::VerdictFacts;
-use crate::refly::{Law, ReflyReport};
+use crate::refly::{Law, Reached, ReflyReport};
 
 /// Writes what came of flying a flight again.
 ///
@@ -32,8 +32,22 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
             writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
         }
     }
-    if report.law == Law::Stabiliser {
-        writeln!(output, "with the upright law instead of the landing controller")?;
+    if let Some(Reached { frames, identical, first_different }) = report.reached {
+        writeln!(
+            output,
+            "flown again from apogee up to there: {identical} of {frames} recorded frames identical"
+        )?;
+        if let Some(frame) = first_different {
+            writeln!(
+                output,
+                "NOT AS RECORDED from frame {frame} on: this build flies another flight, and what follows begins there"
+            )?;
+        }
+    }
+    match report.law {
+        Law::AsRecorded => {}
+        Law::Stabiliser => writeln!(output, "with the upright law instead of the landing controller")?,
+        law => writeln!(output, "with the landing burn flown by {}", law.name())?,
     }
     print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
     let answer = match report.verdict_changed {

@@ -24,18 +24,17 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
     )?;
     writeln!(
         output,
-        "         {:.3} s since ignition, gimbal held {:.3} deg, thrust {:.4} of nominal",
+        "         {:.3} s since ignition, gimbal held {} deg, thrust {:.4} of nominal",
         input.time_since_ignition_s,
-        input.gimbal_applied_rad.to_degrees(),
+        degrees(&input.gimbal_applied_rad),
         input.thrust_scale
     )?;
-    let (then_rad, now_rad) = report.gimbal_rad;
     let same = if report.identical { "identical bit for bit" } else { "NOT IDENTICAL" };
     writeln!(
         output,
-        "command  {:.4} deg as recorded, {:.4} deg now: {same}",
-        then_rad.to_degrees(),
-        now_rad.to_degrees()
+        "command  {} deg as recorded, {} deg now: {same}",
+        degrees(&report.recorded_gimbal_rad),
+        degrees(&report.gimbal_rad)
     )?;
     for (name, solved) in [("warm", &report.warm), ("cold", &report.cold)] {
         match solved {
@@ -67,6 +66,11 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
         writeln!(output, "active   none")?;
     }
     print_path(report, output)
+}
+
+/// One angle, or pitch and yaw.
+fn degrees(rad: &[f64]) -> String {
+    rad.iter().map(|rad| format!("{:.4}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
 }
 
 fn print_solved(name: &str, solved: &Solved, output: &mut impl Write) -> io::Result<()> {

@@ -1,35 +1,41 @@
 //! Closed loop: the flight flown again in simulation from a chosen moment, with other settings.
 //!
-//! The simulated plant is put into the recorded state of that moment (position, motion, servos, time since ignition),
+//! Of a planar landing the simulated plant is put into the recorded state of that moment (position, motion, servos, time since ignition),
 //! the controller into what it remembered then, and both fly on to the ground. Nothing of the record is used after
 //! the moment of the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate) answers what
 //! the controller alone *would have commanded* on the recorded inputs. With nothing changed, a simulated flight comes
 //! out the same bit for bit.
 //!
+//! Of a flight from apogee the recorded truth is not enough (gusts, servos and sensors have memories that no log holds), so
+//! it is flown again from apogee with the recorded draw and seed up to that moment, and compared with the record frame by
+//! frame on the way; from there on the other settings hold, for world and flight computer alike.
+//!
 //! Settings change the controller and the plant alike, those "of the plant" the plant alone, timed ones the
-//! controller alone. Abort under thrust is flown if the record had it at the start.
+//! controller alone. Abort under thrust is flown if the record had it at the start. There is wind in a flight from apogee
+//! only (`truth.wind_m_s`): the planar plant has none.
 
+mod apogee;
+mod planar;
+mod prepared;
 mod simulation;
 mod start;
 mod write;
 
+pub use prepared::Prepared;
 pub use simulation::{ReflownFlight, ReflownTick};
 pub use start::{From, StartAt, StartState};
 pub use write::{ReflyLogError, write_log};
 
-use flight::profile::Profile;
-use flight::verdict::TouchdownLimits;
-use onboard_sim::scatter::draw;
+use campaign::fly::FlyError;
+use flight::mission::MissionError;
 use onboard_sim::vehicle::VehicleError;
-use protocol::log::v1;
 use serde::Serialize;
 use tick_log::TickLogError;
+use world::world::WorldError;
 
-use crate::controller::LoggedController;
 use crate::info::VerdictFacts;
 use crate::log::{Recording, RecordingError};
-use crate::settings::{Schedule, Setting, SettingError, profile_with};
-use simulation::Simulation;
+use crate::settings::{Setting, SettingError};
 
 /// The log's run fact with the settings of the plant alone, in a flight flown again.
 const RUN_PLANT_SETTINGS: &str = "plant_settings";
@@ -41,8 +47,27 @@ pub enum Law {
     /// As recorded: the landing controller, or the upright law if an abort under thrust was latched.
     #[default]
     AsRecorded,
-    /// The upright law alone, as after an abort under thrust.
+    /// The upright law alone, as after an abort under thrust; of the planar landing.
     Stabiliser,
+    /// The pilot itself; of a flight from apogee, as those below.
+    Nmpc,
+    /// Ignition and fins timed beforehand.
+    OpenLoop,
+    /// A nose that swings to waste thrust.
+    Oscillating,
+}
+
+impl Law {
+    /// The name on a command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AsRecorded => "as-recorded",
+            Self::Stabiliser => "stabiliser",
+            Self::Nmpc => "nmpc",
+            Self::OpenLoop => "open-loop",
+            Self::Oscillating => "oscillating",
+        }
+    }
 }
 
 /// What to fly again, and how.
@@ -85,6 +110,35 @@ pub enum ReflyError {
         /// What was asked for and what there is.
         reason: String,
     },
+    /// The flight from apogee cannot be set up.
+    #[error(transparent)]
+    Flight(#[from] FlyError),
+    /// The moment's world cannot be changed so.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The mission's motor is not to be had.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The log does not say how its flight from apogee was flown, or this build does not know it.
+    #[error("{name}: cannot be flown again from apogee: {reason}")]
+    Recipe {
+        /// The file.
+        name: String,
+        /// What is missing or unknown.
+        reason: String,
+    },
+    /// Another kind of flight has this.
+    #[error("{what} is of {of}; {name} is {is}")]
+    OtherKind {
+        /// The file.
+        name: String,
+        /// What was asked for.
+        what: String,
+        /// Which kind has it.
+        of: &'static str,
+        /// Which kind this is.
+        is: &'static str,
+    },
     /// A timed setting of the plant.
     #[error(
         "{setting}: the plant's settings hold from the beginning; only the controller's can change in flight"
@@ -93,6 +147,17 @@ pub enum ReflyError {
         /// The setting.
         setting: String,
     },
+}
+
+/// How the moment of the start was reached, flying again from apogee.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Reached {
+    /// Recorded frames before the start.
+    pub frames: usize,
+    /// Of these, how many came out as recorded, bit for bit.
+    pub identical: usize,
+    /// The first that did not.
+    pub first_different: Option<u64>,
 }
 
 /// What came of it.
@@ -110,7 +175,9 @@ pub struct ReflyReport {
     pub law: Law,
     /// Where it began.
     pub start: StartState,
-    /// True thrust over nominal thrust.
+    /// Of a flight from apogee: how the moment of the start was reached.
+    pub reached: Option<Reached>,
+    /// True thrust over nominal thrust; of a flight from apogee impulse over certified impulse.
     pub thrust_scale: f64,
     /// The recorded verdict.
     pub recorded: Option<VerdictFacts>,
@@ -134,7 +201,7 @@ pub struct ReflyReport {
 /// # Errors
 /// See [`ReflyError`].
 pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
-    Ok(refly_flight(recording, options)?.0)
+    Prepared::new(recording, options)?.fly(options)
 }
 
 /// Flies a recorded flight again and keeps the flight itself.
@@ -145,74 +212,42 @@ pub fn refly_flight(
     recording: &Recording,
     options: &ReflyOptions,
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-    recording.profile()?;
-    let toml = recording.profile_toml()?;
-    let ticks = recording.replayable_ticks()?;
-    let plant_profile = plant_profile(recording, options)?;
-    let schedule = Schedule::new(toml, &options.settings)?;
-    let start = start::find(recording, ticks, options)?;
+    Prepared::new(recording, options)?.fly_kept(options)
+}
 
-    let believed = schedule.base();
-    let mut controller = LoggedController::scheduled(&schedule);
-    let before: Vec<v1::ControllerTick> =
-        ticks.iter().take(start.index).map(|tick| controller.run_again(tick)).collect::<Result<_, _>>()?;
-    let seed = options.seed.or_else(|| recording.seed()).unwrap_or(0);
-    let dispersed = draw(&plant_profile, seed);
-    let limits = TouchdownLimits::from_profile(believed);
-    let mut simulation =
-        Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
-    let flown = ReflownFlight { before, ..simulation.fly(&limits) };
+/// Settings of the plant have no time.
+fn refuse_timed(plant_settings: &[Setting]) -> Result<(), ReflyError> {
+    let timed = plant_settings.iter().find(|setting| setting.at_s.is_some());
+    timed.map_or(Ok(()), |timed| Err(ReflyError::TimedPlant { setting: timed.to_string() }))
+}
 
-    let (commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
-    let recorded = recording.verdict.as_ref().map(VerdictFacts::of);
-    let reflown = flown.verdict.as_ref().map(VerdictFacts::of);
+/// A report of a flight that came out so; what only one kind of flight has is filled in by it.
+fn report(
+    recording: &Recording,
+    options: &ReflyOptions,
+    start: StartState,
+    recorded: Option<VerdictFacts>,
+    reflown: Option<VerdictFacts>,
+) -> ReflyReport {
     let verdict_changed =
         recorded.as_ref().map(|then| Some(then.landed) != reflown.as_ref().map(|now| now.landed));
-    let report = ReflyReport {
+    ReflyReport {
         kind: "closed loop: flown again in simulation",
         file: recording.name.clone(),
         settings: options.settings.iter().map(ToString::to_string).collect(),
         plant_settings: options.plant_settings.iter().map(ToString::to_string).collect(),
         law: options.law,
-        start: start.state,
-        thrust_scale: dispersed.thrust_scale,
+        start,
+        reached: None,
+        thrust_scale: 1.0,
         recorded,
         margin: reflown.as_ref().map(margin),
         reflown,
         verdict_changed,
-        ticks: flown.ticks.len(),
-        commands_identical,
-        gimbal_difference_max_rad,
-    };
-    Ok((report, flown))
-}
-
-/// What is true: the flown profile, what a flight flown again before had its plant changed by, and the settings.
-fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profile, ReflyError> {
-    if let Some(timed) = options.plant_settings.iter().find(|setting| setting.at_s.is_some()) {
-        return Err(ReflyError::TimedPlant { setting: timed.to_string() });
+        ticks: 0,
+        commands_identical: 0,
+        gimbal_difference_max_rad: 0.0,
     }
-    let recorded = recording.head.run.get(RUN_PLANT_SETTINGS).map(String::as_str).unwrap_or_default();
-    let mut settings =
-        recorded.split_whitespace().map(str::parse).collect::<Result<Vec<Setting>, SettingError>>()?;
-    settings.extend(options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned());
-    settings.extend(options.plant_settings.iter().cloned());
-    Ok(profile_with(recording.profile_toml()?, &settings)?)
-}
-
-/// How many ticks command the same as the recorded ones, and by how much the others differ at most, rad.
-fn compare_commands(recorded: &[v1::ControllerTick], flown: &ReflownFlight) -> (usize, f64) {
-    let mut identical = 0;
-    let mut largest_rad = 0.0_f64;
-    for now in &flown.ticks {
-        let then = usize::try_from(now.record.input.tick).ok().and_then(|number| recorded.get(number));
-        if let Some(then) = then {
-            let (then_rad, now_rad) = (then.output.gimbal_command_rad, now.record.output.gimbal_command_rad);
-            identical += usize::from(then_rad.to_bits() == now_rad.to_bits());
-            largest_rad = largest_rad.max((then_rad - now_rad).abs());
-        }
-    }
-    (identical, largest_rad)
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].

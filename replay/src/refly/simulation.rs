@@ -3,6 +3,8 @@
 //! The order of a sample is that of the flight computer: actuators, controller, ignition gate, then the plant in
 //! steps of a millisecond, with the motor weighed once a frame.
 
+use std::collections::BTreeMap;
+
 use flight::controller::{ControllerInput, ControllerOutput};
 use flight::dynamics::PlanarParams;
 use flight::gate::{GateInput, all_passed, gate_checks};
@@ -13,6 +15,7 @@ use flight::verdict::{LandingVerdict, TouchdownLimits};
 use onboard_sim::plant::{Impact, Plant, STEP_S};
 use onboard_sim::scatter::Draw;
 use onboard_sim::vehicle::{DeadlinePolicy, Vehicle, VehicleError};
+use protocol::log::record::Record;
 use protocol::log::v1;
 use tick_log::{state_to_log, tick_to_log, verdict_to_log};
 
@@ -41,6 +44,10 @@ pub struct ReflownFlight {
     pub ticks: Vec<ReflownTick>,
     /// The plant, once a frame.
     pub truth: Vec<v1::PlantTruth>,
+    /// Everything of a flight from apogee, with its vehicle times, s.
+    pub records: Vec<(f64, Record)>,
+    /// What its log says beside what the recorded one says.
+    pub run: BTreeMap<String, String>,
     /// The landing verdict; `None` if it did not come down.
     pub verdict: Option<v1::LandingVerdict>,
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 
-use super::{RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
+use super::{Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
 use crate::log::Recording;
 use crate::settings::{Setting, profile_toml_with};
 
@@ -49,7 +49,7 @@ pub fn write_log(
     let write = |source| ReflyLogError::Write { path: path.to_owned(), source };
     let file = File::options().write(true).create_new(true).open(path).map_err(create)?;
     let mut writer =
-        LogWriter::new(BufWriter::new(file), &header(recording, options, report)).map_err(write)?;
+        LogWriter::new(BufWriter::new(file), &header(recording, options, report, flight)).map_err(write)?;
     for (time_s, record) in records(report, flight) {
         writer.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(write)?;
     }
@@ -57,11 +57,20 @@ pub fn write_log(
     output.flush().map_err(|error| write(mcap::McapError::from(error).into()))
 }
 
-fn header(recording: &Recording, options: &ReflyOptions, report: &ReflyReport) -> LogHeader {
+fn header(
+    recording: &Recording,
+    options: &ReflyOptions,
+    report: &ReflyReport,
+    flight: &ReflownFlight,
+) -> LogHeader {
     let mut run: BTreeMap<String, String> = recording.head.run.clone();
     run.insert("reflown_from".to_owned(), report.file.clone());
     run.insert("reflown_at_tick".to_owned(), report.start.tick.to_string());
     run.insert("reflown_with".to_owned(), report.settings.join(" "));
+    if report.law != Law::AsRecorded {
+        run.insert("reflown_by".to_owned(), report.law.name().to_owned());
+    }
+    run.extend(flight.run.clone());
     let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
     let plant = before.split_whitespace().chain(report.plant_settings.iter().map(String::as_str));
     run.insert(RUN_PLANT_SETTINGS.to_owned(), plant.collect::<Vec<_>>().join(" "));
@@ -71,7 +80,14 @@ fn header(recording: &Recording, options: &ReflyOptions, report: &ReflyReport) -
     }
     let lasting: Vec<Setting> =
         options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-    let profile = recording.profile_toml().ok().and_then(|toml| profile_toml_with(toml, &lasting).ok());
+    let profile = recording.profile_toml().ok().and_then(|toml| {
+        // Of a flight from apogee the mission stays as it was let go with; its settings change in flight.
+        if recording.is_from_apogee() {
+            Some(toml.to_owned())
+        } else {
+            profile_toml_with(toml, &lasting).ok()
+        }
+    });
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
     LogHeader { writer: "replay".to_owned(), start_unix_ns: start.unwrap_or(0), run, profile_toml: profile }
 }
@@ -81,6 +97,7 @@ fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
     let ticks = flight.before.iter().chain(flight.ticks.iter().map(|tick| &tick.record));
     let mut records: Vec<(f64, Record)> =
         ticks.map(|tick| (tick.input.time_s, Record::from(tick.clone()))).collect();
+    records.extend(flight.records.iter().cloned());
     records
         .extend(flight.truth.iter().map(|truth| (truth.time_s, Record::PlantTruth(Box::new(truth.clone())))));
     let began = Event {
@@ -89,7 +106,7 @@ fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
         message: format!("flown again in simulation from tick {}", report.start.tick),
     };
     records.push((report.start.time_s, Record::Event(began)));
-    let end_s = flight.truth.last().map_or(0.0, |truth| truth.time_s);
+    let end_s = records.iter().map(|(time_s, _)| *time_s).fold(0.0, f64::max);
     records.extend(flight.verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict)))));
     records.sort_by(|a, b| a.0.total_cmp(&b.0));
     records

@@ -4,12 +4,15 @@
 //! TOML file of the profile's shape with only the keys to change. A name that no profile has is refused with the
 //! nearest that one has.
 
+mod mission;
 mod names;
 mod schedule;
 
+pub use mission::{known_mission_paths, mission_toml_with, mission_value_of, mission_with, truth_with};
 pub use names::known_paths;
 pub use schedule::Schedule;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
@@ -57,6 +60,14 @@ pub enum SettingError {
         /// Which text.
         origin: String,
         /// The parser's words.
+        reason: String,
+    },
+    /// The mission or the truth with the settings is none.
+    #[error("with {settings}: {reason}")]
+    Mission {
+        /// The settings.
+        settings: String,
+        /// What is wrong.
         reason: String,
     },
     /// The profile with the settings is not a profile.
@@ -125,10 +136,8 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
 /// A name is unknown, or the result is no profile.
 pub fn profile_with(profile_toml: &str, settings: &[Setting]) -> Result<Profile, SettingError> {
     let text = profile_toml_with(profile_toml, settings)?;
-    Profile::from_toml(&text, "profile.toml").map_err(|source| SettingError::Profile {
-        settings: settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "),
-        source,
-    })
+    Profile::from_toml(&text, "profile.toml")
+        .map_err(|source| SettingError::Profile { settings: listed(settings), source })
 }
 
 /// The text of a profile with other settings.
@@ -141,21 +150,41 @@ pub fn profile_toml_with(profile_toml: &str, settings: &[Setting]) -> Result<Str
         return Ok(profile_toml.to_owned());
     }
     let mut table = parsed_table(profile_toml, "profile.toml")?;
-    let mut known = known_paths();
-    collect_leaves("", &table, &mut |path, _| {
+    set(&mut table, settings, known_paths())?;
+    text_of(&table)
+}
+
+/// Puts settings into a table, if each is a known name or in it already.
+fn set(
+    table: &mut toml::Table,
+    settings: &[Setting],
+    mut known: BTreeSet<String>,
+) -> Result<(), SettingError> {
+    collect_leaves("", table, &mut |path, _| {
         known.insert(path);
     });
     for setting in settings {
         names::check(&setting.path, &known)?;
-        insert(&mut table, &setting.path, setting.value.clone());
+        insert(table, &setting.path, setting.value.clone());
     }
-    toml::to_string(&table)
+    Ok(())
+}
+
+fn text_of(table: &toml::Table) -> Result<String, SettingError> {
+    toml::to_string(table)
         .map_err(|error| SettingError::Toml { origin: "profile.toml".to_owned(), reason: error.to_string() })
+}
+
+fn listed(settings: &[Setting]) -> String {
+    settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// The value of a key in a profile's text, if it stands there.
 pub fn value_of(profile_toml: &str, path: &str) -> Option<toml::Value> {
-    let table = profile_toml.parse::<toml::Table>().ok()?;
+    value_in(profile_toml.parse::<toml::Table>().ok()?, path)
+}
+
+fn value_in(table: toml::Table, path: &str) -> Option<toml::Value> {
     let mut value = toml::Value::Table(table);
     for key in path.split('.') {
         value = value.as_table_mut()?.remove(key)?;

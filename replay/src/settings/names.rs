@@ -7,17 +7,25 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 use flight::profile::Profile;
-use serde::Deserialize as _;
+use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
 
 use super::SettingError;
 
+/// The placeholder for what may be a name or a table: a mission's airframe.
+const NAME_OR_TABLE: &str = "mk2";
+
 /// Every key that a profile may have, as in `nmpc.weights.w`.
 pub fn known_paths() -> BTreeSet<String> {
+    paths_of::<Profile>("")
+}
+
+/// Every key that a type may have, behind a prefix.
+pub(super) fn paths_of<'de, T: Deserialize<'de>>(prefix: &str) -> BTreeSet<String> {
     let paths = RefCell::default();
     // Placeholders may not make a value of every type; what was noted until then stays.
-    let _ = Profile::deserialize(Walker { path: String::new(), paths: &paths });
+    let _ = T::deserialize(Walker { path: prefix.to_owned(), paths: &paths });
     paths.into_inner()
 }
 
@@ -83,7 +91,7 @@ impl<'de> Deserializer<'de> for Walker<'_> {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         self.note();
-        visitor.visit_unit()
+        visitor.visit_str(NAME_OR_TABLE)
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {

@@ -1,55 +1,65 @@
-//! Which profile holds when.
+//! Which settings hold when.
 
-use flight::controller::{ControllerConfig, ControllerState};
 use flight::profile::Profile;
 
 use super::{Setting, SettingError, profile_with};
 
 /// A controller's settings over a flight: those of the beginning, and changes at given times.
 #[derive(Debug, Clone)]
-pub struct Schedule {
-    base: Profile,
+pub struct Schedule<T> {
+    base: T,
     /// By time, each with everything that came before it.
-    changes: Vec<(f64, Profile)>,
+    changes: Vec<(f64, T)>,
     next: usize,
 }
 
-impl Schedule {
+impl Schedule<Profile> {
     /// The settings that hold from the beginning, then each timed one from its time on.
     ///
     /// # Errors
     /// A name is unknown, or some stage is no profile.
     pub fn new(profile_toml: &str, settings: &[Setting]) -> Result<Self, SettingError> {
+        Self::of(settings, |so_far| profile_with(profile_toml, so_far))
+    }
+}
+
+impl<T> Schedule<T> {
+    /// What `build` makes of the settings that hold from the beginning, then with each timed one from its time on.
+    ///
+    /// # Errors
+    /// Those of `build`.
+    pub fn of(
+        settings: &[Setting],
+        build: impl Fn(&[Setting]) -> Result<T, SettingError>,
+    ) -> Result<Self, SettingError> {
         let mut timed: Vec<&Setting> = settings.iter().filter(|setting| setting.at_s.is_some()).collect();
         timed.sort_by(|a, b| a.at_s.unwrap_or(0.0).total_cmp(&b.at_s.unwrap_or(0.0)));
         let mut so_far: Vec<Setting> =
             settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-        let base = profile_with(profile_toml, &so_far)?;
-        let mut changes = Vec::new();
+        let base = build(&so_far)?;
+        let mut changes: Vec<(f64, T)> = Vec::new();
         for setting in timed {
             so_far.push(setting.clone());
-            changes.push((setting.at_s.unwrap_or(0.0), profile_with(profile_toml, &so_far)?));
+            let at_s = setting.at_s.unwrap_or(0.0);
+            let stage = build(&so_far)?;
+            match changes.last_mut() {
+                // Of the same moment: one change.
+                Some((before_s, before)) if before_s.to_bits() == at_s.to_bits() => *before = stage,
+                _ => changes.push((at_s, stage)),
+            }
         }
         Ok(Self { base, changes, next: 0 })
     }
 
     /// The settings of the beginning.
-    pub fn base(&self) -> &Profile {
+    pub fn base(&self) -> &T {
         &self.base
     }
 
-    /// Whether anything changes in flight.
-    pub fn is_timed(&self) -> bool {
-        !self.changes.is_empty()
-    }
-
-    /// Changes the controller's settings if a change is due at this vehicle time, s; times must not fall.
-    pub fn apply(&mut self, controller: &mut ControllerState, time_s: f64) {
-        while let Some((at_s, profile)) = self.changes.get(self.next)
-            && *at_s <= time_s
-        {
-            *controller = controller.reconfigured(&ControllerConfig::from_profile(profile));
-            self.next += 1;
-        }
+    /// The settings that begin to hold at this vehicle time, s, if any do; times must not fall.
+    pub fn due(&mut self, time_s: f64) -> Option<&T> {
+        let due = self.changes.iter().skip(self.next).take_while(|(at_s, _)| *at_s <= time_s).count();
+        self.next += due;
+        if due == 0 { None } else { self.changes.get(self.next - 1).map(|(_, stage)| stage) }
     }
 }

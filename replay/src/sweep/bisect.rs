@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::FlightOutcome;
 use crate::log::Recording;
-use crate::refly::{ReflyError, ReflyOptions, refly};
-use crate::settings::{Setting, value_of};
+use crate::refly::{Prepared, ReflyError, ReflyOptions};
+use crate::settings::Setting;
 
 /// Halvings of the interval in which the verdict changes.
 const HALVINGS: u32 = 40;
@@ -107,15 +107,16 @@ impl BisectReport {
 /// See [`BisectError`].
 pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectReport, BisectError> {
     let path = &options.path;
+    let prepared = Prepared::new(flight, &options.refly)?;
     let value = match options.value {
         Some(value) => value,
-        None => number_of(flight, path).ok_or_else(|| BisectError::NoValue { path: path.clone() })?,
+        None => prepared.number_of(path).ok_or_else(|| BisectError::NoValue { path: path.clone() })?,
     };
     let (from, to) = (options.from, options.to);
     if !(from..=to).contains(&value) {
         return Err(BisectError::Outside { path: path.clone(), value, from, to });
     }
-    let mut search = Search { flight, options, flown: 0 };
+    let mut search = Search { flight: prepared, options, flown: 0 };
     let outcome = search.fly(value)?;
     let below = search.first_flip(value, from, outcome)?;
     let above = search.first_flip(value, to, outcome)?;
@@ -134,13 +135,8 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
     })
 }
 
-fn number_of(flight: &Recording, path: &str) -> Option<f64> {
-    let value = value_of(flight.profile_toml().ok()?, path)?;
-    value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
-}
-
 struct Search<'a> {
-    flight: &'a Recording,
+    flight: Prepared<'a>,
     options: &'a BisectOptions,
     flown: usize,
 }
@@ -157,7 +153,7 @@ impl Search<'_> {
         };
         settings.push(setting);
         self.flown += 1;
-        let report = refly(self.flight, &refly_options)?;
+        let report = self.flight.fly(&refly_options)?;
         Ok(FlightOutcome {
             landed: report.reflown.is_some_and(|verdict| verdict.landed),
             margin: report.margin,

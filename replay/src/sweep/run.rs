@@ -6,7 +6,7 @@ use std::sync::mpsc::sync_channel;
 
 use super::{Choice, FlightOutcome, PointOutcome, State, SweepError, SweepReport};
 use crate::log::Recording;
-use crate::refly::{ReflyError, ReflyOptions, refly};
+use crate::refly::{Prepared, ReflyError, ReflyOptions};
 
 /// Results that may wait to be noted.
 const QUEUE: usize = 256;
@@ -36,6 +36,10 @@ pub fn sweep(
     let missing: Vec<usize> = (0..all).filter(|job| state.outcome(*job).is_none()).collect();
     let mut done = all - missing.len();
     progress(Progress { done, jobs: all });
+    let prepared: Vec<Prepared> =
+        flights.iter().map(|flight| Prepared::new(flight, options)).collect::<Result<_, _>>().map_err(
+            |source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) },
+        )?;
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let mut failed: Option<(usize, SweepError)> = None;
@@ -43,11 +47,12 @@ pub fn sweep(
         let (results, inbox) = sync_channel::<(usize, Result<FlightOutcome, ReflyError>)>(QUEUE);
         for _ in 0..jobs.get().min(missing.len()) {
             let (results, missing, next, stop) = (results.clone(), &missing, &next, &stop);
+            let prepared = &prepared;
             scope.spawn(move || {
                 while !stop.load(Ordering::Relaxed)
                     && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
                 {
-                    let outcome = fly(flights, points, options, job);
+                    let outcome = fly(prepared, points, options, job);
                     if results.send((job, outcome)).is_err() {
                         return;
                     }
@@ -86,7 +91,7 @@ pub fn sweep(
 }
 
 fn fly(
-    flights: &[Recording],
+    flights: &[Prepared],
     points: &[Choice],
     options: &ReflyOptions,
     job: usize,
@@ -96,7 +101,7 @@ fn fly(
         options.settings.extend(choice.settings.iter().cloned());
         options.plant_settings.extend(choice.plant_settings.iter().cloned());
     }
-    let report = refly(&flights[job % flights.len()], &options)?;
+    let report = flights[job % flights.len()].fly(&options)?;
     Ok(FlightOutcome { landed: report.reflown.is_some_and(|verdict| verdict.landed), margin: report.margin })
 }
 

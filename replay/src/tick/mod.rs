@@ -3,13 +3,15 @@
 //! The controller is brought to the tick by running every one before it, so that its warm start is the one it had in
 //! flight. Then the same landing problem is solved once more from nothing, and the two are put side by side.
 
-use flight::controller::ControlLevel;
-use flight::nmpc::{Problem, Solution, SolveStatus, solve};
-use protocol::log::v1;
-use serde::Serialize;
-use tick_log::{TickLogError, input_from_log};
+mod pilot;
+mod planar;
 
-use crate::controller::LoggedController;
+use flight::nmpc::{Problem, Solution};
+use serde::Serialize;
+use tick_log::TickLogError;
+use tick_log::pilot::PilotLogError;
+
+use crate::controller::{FrameError, PilotStartError};
 use crate::log::{Recording, RecordingError};
 
 /// A condition or limit closer than this to being broken is active, in its own unit (m, rad, m/s or rad/s).
@@ -27,13 +29,24 @@ pub enum TickError {
     /// A recorded input has no meaning in this build.
     #[error(transparent)]
     Input(#[from] TickLogError),
+    /// The flight computer cannot be let go again.
+    #[error(transparent)]
+    PilotStart(#[from] PilotStartError),
+    /// A recorded frame has no meaning in this build.
+    #[error(transparent)]
+    FrameInput(#[from] PilotLogError),
+    /// A recorded frame cannot be run again.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// No such tick.
-    #[error("{name}: no tick {tick} that can be re-executed; there are 0 to {last}")]
+    #[error("{name}: no tick {tick} that can be re-executed; there are {first} to {last}")]
     NoTick {
         /// The file.
         name: String,
         /// What was asked for.
         tick: u64,
+        /// The first there is.
+        first: u64,
         /// The last there is.
         last: u64,
     },
@@ -84,8 +97,10 @@ pub struct TickReport {
     pub input: InputFacts,
     /// What decided.
     pub level: &'static str,
-    /// The gimbal command as recorded and as decided now, rad.
-    pub gimbal_rad: (f64, f64),
+    /// The gimbal command as recorded, rad: one angle, or pitch and yaw.
+    pub recorded_gimbal_rad: Vec<f64>,
+    /// As decided now, rad.
+    pub gimbal_rad: Vec<f64>,
     /// Whether the whole output and the memory are the recorded ones, bit for bit, but for the recorded plan.
     pub identical: bool,
     /// The solve as in flight; `None` if this tick solved nothing.
@@ -101,12 +116,13 @@ pub struct TickReport {
 /// What the tick was given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputFacts {
-    /// State components in order: x, z, theta, u, w, q.
+    /// State components in order: x, z, theta, u, w, q. Of a flight from apogee those in the plane of the landing, with
+    /// velocities through the air.
     pub state: [f64; 6],
     /// Time since ignition, s.
     pub time_since_ignition_s: f64,
-    /// The gimbal angle held, rad.
-    pub gimbal_applied_rad: f64,
+    /// The gimbal angles held, rad.
+    pub gimbal_applied_rad: Vec<f64>,
     /// Estimated thrust over nominal thrust.
     pub thrust_scale: f64,
 }
@@ -127,56 +143,7 @@ pub struct PathPoint {
 /// # Errors
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
-    let profile = recording.profile()?;
-    let ticks = recording.replayable_ticks()?;
-    let place = usize::try_from(number).ok().filter(|place| *place < ticks.len()).ok_or_else(|| {
-        TickError::NoTick { name: recording.name.clone(), tick: number, last: ticks.len() as u64 - 1 }
-    })?;
-    let mut controller = LoggedController::new(&profile);
-    for before in ticks.iter().take(place) {
-        controller.run_again(before)?;
-    }
-    let recorded = &ticks[place];
-    let input = input_from_log(&recorded.input)?;
-    let again = controller.run_again(recorded)?;
-    let solved = again.output.solver.status != u32::from(SolveStatus::NotRun.index());
-    let problem = controller.state().last_problem();
-    let kept = controller.state().kept_solution().filter(|_| solved && is_kept(&again));
-    let cold = solved.then(|| solve(problem, None));
-    let level = u8::try_from(again.output.level).ok().and_then(ControlLevel::from_index);
-    Ok(TickReport {
-        file: recording.name.clone(),
-        tick: number,
-        time_s: input.time_s,
-        phase: input.phase.name(),
-        input: InputFacts {
-            state: input.state.to_array(),
-            time_since_ignition_s: input.time_since_ignition_s,
-            gimbal_applied_rad: input.gimbal_applied_rad,
-            thrust_scale: input.thrust_scale,
-        },
-        level: level.map_or("unknown", ControlLevel::name),
-        gimbal_rad: (recorded.output.gimbal_command_rad, again.output.gimbal_command_rad),
-        identical: identical(recorded, &again),
-        warm: kept.map(solved_facts),
-        cold: cold.as_ref().map(solved_facts),
-        active: kept.map(|solution| active_constraints(problem, solution)).unwrap_or_default(),
-        path: path(&again.output.plan),
-    })
-}
-
-/// The controller keeps what it flies or rehearses.
-fn is_kept(tick: &v1::ControllerTick) -> bool {
-    let level = u8::try_from(tick.output.level).ok().and_then(ControlLevel::from_index);
-    matches!(level, Some(ControlLevel::Rehearsal | ControlLevel::Converged | ControlLevel::BestFeasible))
-}
-
-/// Compares all but the plan, which is not held of a recording; the digest of the memory stands for it.
-fn identical(recorded: &v1::ControllerTick, again: &v1::ControllerTick) -> bool {
-    let mut again = again.clone();
-    again.output.plan.states = Vec::new();
-    again.output.plan.gimbal_rad = Vec::new();
-    prost::Message::encode_to_vec(recorded) == prost::Message::encode_to_vec(&again)
+    if recording.is_from_apogee() { pilot::frame(recording, number) } else { planar::tick(recording, number) }
 }
 
 fn solved_facts(solution: &Solution) -> Solved {
@@ -227,18 +194,4 @@ fn active_constraints(problem: &Problem, solution: &Solution) -> Vec<ActiveConst
         }
     }
     active
-}
-
-fn path(plan: &v1::Plan) -> Vec<PathPoint> {
-    let inputs = plan.gimbal_rad.iter().copied().map(Some).chain(std::iter::repeat(None));
-    plan.states
-        .iter()
-        .zip(inputs)
-        .enumerate()
-        .map(|(node, (state, gimbal_rad))| PathPoint {
-            time_s: plan.starts_in_s + node as f64 * plan.step_s,
-            state: [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s],
-            gimbal_rad,
-        })
-        .collect()
 }

@@ -16,7 +16,6 @@
 mod consequence;
 mod difference;
 mod growth;
-mod pilot;
 mod report;
 mod tally;
 mod verifier;
@@ -24,7 +23,6 @@ mod verifier;
 pub use consequence::Consequence;
 pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
 pub use growth::{Growth, GrowthStep};
-pub use pilot::{FrameError, PilotVerifier};
 pub use report::{Divergence, Obstacle, Outcome, VerifyReport};
 pub use verifier::Verifier;
 
@@ -35,6 +33,7 @@ use flight::profile::Profile;
 
 use tally::Tally;
 
+use crate::controller::{LoggedController, LoggedPilot, PilotStartError, settings_in_flight};
 use crate::log::{Entry, FlightLog, Head, LogError, Ordered, Recording, TickOrder};
 
 /// Verifies a log file.
@@ -80,7 +79,7 @@ pub fn verify_log<R: Read>(
                 }
                 if verifier.is_none() {
                     match profile_of(log, &whole_head)? {
-                        Ok(profile) => verifier = Some(Verifier::new(&profile)),
+                        Ok(profile) => verifier = Some(Verifier::new(LoggedController::new(&profile))),
                         Err(obstacle) => found.obstacle = Some(obstacle),
                     }
                 }
@@ -90,12 +89,15 @@ pub fn verify_log<R: Read>(
                 found.advance(&mut order, verifier.as_mut(), false);
             }
             Entry::PilotStart(start) => match text_of(log, &whole_head)? {
-                Ok(mission) => match PilotVerifier::new(&mission, &start) {
-                    Ok(verifier) => pilot = Some(verifier),
-                    Err(error) => {
-                        found.obstacle = Some(Obstacle::ProfileUnreadable { reason: error.to_string() });
+                Ok(mission) => {
+                    let in_flight = settings_in_flight(&log.head().run).map_err(PilotStartError::from);
+                    match in_flight.and_then(|settings| LoggedPilot::new(&mission, &start, &settings)) {
+                        Ok(controller) => pilot = Some(Verifier::new(controller)),
+                        Err(error) => {
+                            found.obstacle = Some(Obstacle::ProfileUnreadable { reason: error.to_string() });
+                        }
                     }
-                },
+                }
                 Err(obstacle) => found.obstacle = Some(obstacle),
             },
             Entry::PilotTick(tick) => {
@@ -129,7 +131,12 @@ struct Found {
 
 impl Found {
     /// Compares every tick whose turn it is.
-    fn advance(&mut self, order: &mut TickOrder, verifier: Option<&mut Verifier>, at_end: bool) {
+    fn advance(
+        &mut self,
+        order: &mut TickOrder,
+        verifier: Option<&mut Verifier<LoggedController>>,
+        at_end: bool,
+    ) {
         let Some(verifier) = verifier else {
             return;
         };

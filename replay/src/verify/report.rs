@@ -6,8 +6,8 @@ use tick_log::TickLogError;
 use super::consequence::Consequence;
 use super::difference::FieldDifference;
 use super::growth::Growth;
-use super::pilot::FrameError;
 use super::tally::Tally;
+use crate::controller::FrameError;
 use crate::log::BuildComparison;
 
 /// The answer.

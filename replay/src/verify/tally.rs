@@ -6,6 +6,7 @@ use prost_reflect::MessageDescriptor;
 use super::difference::{FieldDifference, differences};
 use super::growth::{Growth, GrowthStep};
 use super::report::Divergence;
+use crate::controller::Moment;
 
 /// Fields of the first diverged tick that are kept.
 const FIELDS_KEPT: usize = 32;
@@ -22,14 +23,6 @@ pub(super) struct Tally {
     pub(super) growth: Growth,
     recorded: Vec<u8>,
     recomputed: Vec<u8>,
-}
-
-/// A tick, its vehicle time and its phase.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    pub(super) tick: u64,
-    pub(super) time_s: f64,
-    pub(super) phase: &'static str,
 }
 
 impl Tally {

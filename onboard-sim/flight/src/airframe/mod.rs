@@ -86,6 +86,11 @@ impl Airframe {
         Self::from_toml(text)
     }
 
+    /// The TOML text of the built-in airframe of a name.
+    pub fn builtin_toml(name: &str) -> Option<&'static str> {
+        builtin::BUILTIN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
     /// The names of the built-in airframes.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
         builtin::BUILTIN.iter().map(|(name, _)| *name)

@@ -7,6 +7,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::memory::remembers;
+
 /// Length of the error state.
 pub(super) const N: usize = 22;
 pub(super) const POSITION: usize = 0;
@@ -30,6 +32,8 @@ const SMALLEST_VARIANCE: f64 = 1e-14;
 pub(super) struct Covariance {
     rows: [Row; N],
 }
+
+remembers!(Covariance { rows });
 
 /// How the error moves over one interval.
 #[derive(Debug, Clone, Copy, PartialEq)]

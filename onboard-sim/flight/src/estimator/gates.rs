@@ -1,5 +1,7 @@
 //! Innovation gates: what does not fit is left out and counted; what keeps not fitting is the filter's fault.
 
+use crate::memory::remembers;
+
 /// What one gate has seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GateCounters {
@@ -47,6 +49,8 @@ impl GateCounters {
 pub(super) struct Surprise {
     mean: f64,
 }
+
+remembers!(Surprise { mean });
 
 /// Share of the newest in the running mean of the normalised innovation squared.
 const NEWEST: f64 = 0.1;

@@ -4,6 +4,7 @@
 //! their slow offset, and the lidar. The second is the barometer's last sample with its estimated errors taken out.
 
 use super::EstimatorConfig;
+use crate::memory::remembers;
 
 /// A barometer sample older than this is no height, s.
 const BAROMETER_KEEPS_S: f64 = 0.25;
@@ -43,6 +44,16 @@ pub(super) struct HeightChannel {
     barometric_m: f64,
     barometer_age_s: f64,
 }
+
+remembers!(HeightChannel {
+    height_m,
+    offset_m,
+    height_m2,
+    offset_m2,
+    cross_m2,
+    barometric_m,
+    barometer_age_s,
+});
 
 impl HeightChannel {
     pub(super) fn new(height_m: f64, height_sigma_m: f64, offset_sigma_m: f64) -> Self {

@@ -7,6 +7,8 @@
 
 use nalgebra::Vector3;
 
+use crate::memory::remembers;
+
 /// Frames kept: 320 ms at 200 Hz.
 const LENGTH: usize = 64;
 
@@ -18,6 +20,8 @@ struct Sums {
     /// Its integral, m.
     position_m: Vector3<f64>,
 }
+
+remembers!(Sums { time_s, velocity_m_s, position_m });
 
 /// How far back a measurement is, and what happened since.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +40,8 @@ pub(super) struct History {
     filled: usize,
     newest: usize,
 }
+
+remembers!(History { ring, filled, newest });
 
 impl History {
     pub(super) fn new(time_s: f64) -> Self {

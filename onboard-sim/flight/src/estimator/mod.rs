@@ -17,6 +17,7 @@
 pub mod alignment;
 mod config;
 mod covariance;
+mod digest;
 mod gates;
 mod health;
 mod heights;

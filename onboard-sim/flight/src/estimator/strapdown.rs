@@ -7,6 +7,7 @@ use super::covariance::{
     Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
+use crate::memory::remembers;
 use crate::rigid::RigidState;
 
 /// The covariance follows every so many frames, and before every correction.
@@ -106,6 +107,8 @@ pub(super) struct Pending {
     world_from_body_s: Matrix3<f64>,
     wind_factor: f64,
 }
+
+remembers!(Pending { frames, felt_m_s, world_from_body_s, wind_factor });
 
 impl Default for Pending {
     fn default() -> Self {

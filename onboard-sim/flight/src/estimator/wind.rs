@@ -8,6 +8,7 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
 use super::{Estimator, VehicleNow};
+use crate::memory::remembers;
 
 /// Frames whose sideways force is averaged for one update.
 const FRAMES: u32 = 4;
@@ -22,6 +23,8 @@ pub(super) struct Sideways {
     sum_m_s2: Vector2<f64>,
     frames: u32,
 }
+
+remembers!(Sideways { sum_m_s2, frames });
 
 impl Sideways {
     pub(super) fn clear(&mut self) {

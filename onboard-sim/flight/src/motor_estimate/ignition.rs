@@ -1,6 +1,7 @@
 //! The instant the motor catches, finer than a frame.
 
 use super::NominalThrust;
+use crate::memory::remembers;
 
 /// Thrust is there when it is above this share of the peak, in two frames in a row.
 const CAUGHT_SHARE: f64 = 0.1;
@@ -17,6 +18,8 @@ pub(super) struct Detector {
     /// When the thrust went through the mark, if the last frame was above it, s.
     crossed_s: Option<f64>,
 }
+
+remembers!(Detector { last, crossed_s });
 
 impl Detector {
     /// The last frame was above the mark: the next one decides.

@@ -7,6 +7,7 @@
 //! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the air force `A` reckoned with, and its scale
 //! `d`. An extended Kalman filter over `(s, b, t0, d)` finds all four; `d` while the vehicle still falls unlit.
 
+mod digest;
 mod ignition;
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@
 //! The vehicle lights a motor on the way down, which staging electronics forbid for good reason, so the table is
 //! explicit and conservative: the landing motor is lit by one line of it, once, behind every interlock.
 
+mod digest;
 mod event;
 mod transition;
 

@@ -1,31 +1,84 @@
 //! A number for everything a pilot remembers.
 
-use core::fmt::{self, Write as _};
-
-use super::Pilot;
-
-/// FNV-1a, 64 bits (Fowler, Noll and Vo), over the text of what is written to it.
-struct Fnv(u64);
-
-impl fmt::Write for Fnv {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-        Ok(())
-    }
-}
+use super::known::Known;
+use super::{Outlook, Pilot};
+use crate::ignition::IgnitionOutlook;
+use crate::memory::{Memory, remembers};
+use crate::vertical::Band;
 
 impl Pilot {
     /// A number that differs whenever what is remembered differs, to compare a replay with a log.
     ///
-    /// It is taken of the derived text of every field, in which each number has as many digits as tell it from its
-    /// neighbours: nothing that is added to a pilot can be forgotten here. It takes some ten microseconds to a
-    /// millisecond, so it is for logs, not for the flight.
+    /// It is taken of the bits of everything that decides what the pilot does next. What the mission says is not
+    /// remembered but known, and the room that a solve works in holds nothing that the next one reads.
     pub fn digest(&self) -> u64 {
-        let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-        // Writing to it cannot fail.
-        let _ = write!(hash, "{self:?}");
-        hash.0
+        Memory::digest_of(self)
+    }
+}
+
+remembers!(Pilot {
+    known,
+    estimator,
+    estimate,
+    mode,
+    ignited_at_s,
+    outlook,
+    powered,
+    aim_loop,
+    fin_share,
+    fins_rad,
+    gimbal_rad,
+    gate_refusal,
+});
+
+// The mission, its motor and its masses are what a log's profile says; they do not change in flight.
+remembers!(Known { motor, caution } but { mission, curve, mass });
+
+remembers!(Outlook { ignition, commit_height_m, height_m, predicted_speed_m_s, touchdown_distance_m });
+remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
+remembers!(Band { low_m, high_m });
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::estimator::{ImuSample, Measurements, StartUncertainty};
+    use crate::mission::Mission;
+    use crate::pilot::{PilotInput, Sensed};
+    use crate::rigid::RigidState;
+
+    fn falling() -> Pilot {
+        let mission = Mission::builtin("mk2").unwrap().unwrap();
+        Pilot::at_apogee(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee()).unwrap()
+    }
+
+    fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
+        let imu = ImuSample {
+            gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
+            specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
+        };
+        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
+        PilotInput {
+            frame,
+            time_s: 0.005 * frame as f64,
+            sensed: Sensed::Measured(measured),
+            fins_rad: [0.0; 4],
+            contact: false,
+            igniter_continuity: true,
+            abort: false,
+        }
+    }
+
+    #[test]
+    fn the_last_bit_of_an_input_is_remembered() {
+        let digest_after = |gyro_rad_s: f64| {
+            let mut pilot = falling();
+            pilot.step(&input(1, gyro_rad_s));
+            pilot.digest()
+        };
+        let rate_rad_s = 0.01_f64;
+        assert_eq!(digest_after(rate_rad_s), digest_after(rate_rad_s));
+        assert_ne!(digest_after(rate_rad_s), digest_after(f64::from_bits(rate_rad_s.to_bits() + 1)));
     }
 }

@@ -6,6 +6,7 @@
 
 mod digest;
 mod fly;
+mod inspect;
 mod known;
 mod outlook;
 mod restart;

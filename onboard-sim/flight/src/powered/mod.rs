@@ -9,11 +9,14 @@
 //!
 //! When no plan can be had it degrades in announced steps, the [`ControlLevel`]s of the planar controller.
 
+mod digest;
 mod homing;
+mod inspect;
 mod plane;
 mod situation;
 
 pub use homing::Homing;
+pub use inspect::LandingSolved;
 pub use plane::Plane;
 use situation::Ahead;
 pub use situation::PoweredSituation;

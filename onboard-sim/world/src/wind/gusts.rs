@@ -107,6 +107,11 @@ impl Transverse {
 }
 
 impl Gusts {
+    /// These gusts with the strength of others.
+    pub(crate) fn as_strong_as(&self, other: &Self) -> Self {
+        Self { wind_at_20_ft_m_s: other.wind_at_20_ft_m_s, ..self.clone() }
+    }
+
     /// Gusts for a wind at 20 ft, m/s, by seed.
     pub fn new(wind_at_20_ft_m_s: f64, seed: u64) -> Self {
         let mut normals = Normals::new(ChaCha8Rng::seed_from_u64(seed));

@@ -43,6 +43,15 @@ impl Wind {
         }
     }
 
+    /// This wind with the mean and the gust intensity of another; the gusts themselves go on.
+    pub(crate) fn changed(&self, other: &Self) -> Self {
+        Self {
+            gusts: self.gusts.as_strong_as(&other.gusts),
+            now_m_s: self.now_m_s,
+            ..other.clone()
+        }
+    }
+
     /// Mean wind at a height above ground, in the world, m/s.
     pub fn mean_m_s(&self, height_m: f64) -> Vector3<f64> {
         self.along * mean_m_s(self.reference_m_s, height_m)

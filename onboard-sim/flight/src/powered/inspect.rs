@@ -1,0 +1,67 @@
+//! The guidance looked at, and its settings changed, from outside the flight: for those who replay it.
+
+use super::situation::Ahead;
+use super::{PoweredGuidance, PoweredSettings, PoweredSituation, UPRIGHT_DEARER, largest_tilt_rad};
+use crate::nmpc::Problem;
+use crate::nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, Motor as _, solve_free_time};
+use crate::rigid::RigidState;
+
+/// A landing, planned again alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LandingSolved {
+    /// The problem at the final time that the warm plan chose: its conditions, limits and motor.
+    pub problem: Problem,
+    /// As in flight, from the plan before.
+    pub warm: FreeTimeSolution,
+    /// The same from nothing.
+    pub cold: FreeTimeSolution,
+}
+
+impl PoweredGuidance {
+    /// The same memory under other settings.
+    #[must_use]
+    pub(crate) fn reconfigured(&self, settings: PoweredSettings) -> Self {
+        Self { settings, ..self.clone() }
+    }
+
+    /// The landing that [`plan`](Self::plan) is about to solve, solved alone; `None` if it solves none here. `self` is as
+    /// it was before the plan, `decided` as it is afterwards.
+    pub(crate) fn inspect(
+        &self,
+        decided: &Self,
+        time_s: f64,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+    ) -> Option<LandingSolved> {
+        let plane = decided.plane?;
+        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
+            return None;
+        }
+        let wind_m_s = situation.wind_m_s.dot(&plane.along);
+        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
+        let along_m_s = state.velocity_m_s.dot(&plane.along);
+        let mut posed = self.pose(initial, along_m_s, wind_m_s, situation)?;
+        let ahead = Ahead(situation);
+        let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
+        let mut warm = solve_free_time(&posed, &ahead, earlier);
+        if largest_tilt_rad(&warm) > self.settings.tilt_max_deg.to_radians() {
+            posed.landing.state_weights[2] *= UPRIGHT_DEARER;
+            warm = solve_free_time(&posed, &ahead, None);
+        }
+        let cold = solve_free_time(&posed, &ahead, None);
+        Some(LandingSolved { problem: at_final_time(&posed, &ahead, warm.final_time_s), warm, cold })
+    }
+}
+
+/// The problem of one final time.
+fn at_final_time(posed: &FreeTimeProblem, ahead: &Ahead<'_, '_>, final_time_s: f64) -> Problem {
+    let step_s = final_time_s / posed.intervals as f64;
+    let bounds = |k: usize| (k as f64 * step_s, (k + 1) as f64 * step_s);
+    let mut problem = posed.landing.clone();
+    problem.step_s = step_s;
+    problem.thrust_n =
+        (0..posed.intervals).map(bounds).map(|(from_s, to_s)| ahead.mean_thrust_n(from_s, to_s)).collect();
+    problem.mass_kg =
+        (0..posed.intervals).map(bounds).map(|(from_s, to_s)| ahead.mean_mass_kg(from_s, to_s)).collect();
+    problem
+}

@@ -1,0 +1,343 @@
+//! A flight from apogee, flown again up to a moment with the recorded draw, and from there on with what is other.
+
+use std::collections::BTreeMap;
+
+use campaign::baseline::{Baseline, Controller};
+use campaign::dispersion::Dispersion;
+use campaign::draw::draw;
+use campaign::fault::{Injector, TimedFault};
+use campaign::fly::Flight;
+use flight::mission::Mission;
+use flight::phase::Phase;
+use onboard_sim::from_apogee;
+use prost::Message as _;
+use protocol::log::flight_v1;
+use protocol::log::record::Record;
+use tick_log::pilot::tick_to_log;
+use world::Truth;
+
+use super::start::{From, StartAt, StartState};
+use super::{Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report};
+use crate::controller::{LoggedPilot, Moment, Replayed as _, SETTINGS_IN_FLIGHT};
+use crate::info::VerdictFacts;
+use crate::log::Recording;
+use crate::settings::{Schedule, Setting, mission_with, truth_with};
+
+/// Length of a frame, s.
+const FRAME_S: f64 = 0.005;
+
+/// Number and time of what is kept of a flight.
+type Kept = Vec<(f64, Record)>;
+
+/// A flight on its way, with what still breaks and changes in it.
+#[derive(Debug, Clone)]
+struct Rerun {
+    flight: Flight,
+    injector: Injector,
+    schedule: Option<Schedule<Mission>>,
+}
+
+/// A recorded flight, flown again up to the moment of the start.
+#[derive(Debug)]
+pub(super) struct AtStart<'a> {
+    recording: &'a Recording,
+    pilot_start: &'a flight_v1::PilotStart,
+    frames: &'a [flight_v1::PilotTick],
+    dispersion: Dispersion,
+    number: u64,
+    truth: Truth,
+    rerun: Rerun,
+    first_frame: u64,
+    state: StartState,
+    reached: Reached,
+    recorded: Option<VerdictFacts>,
+}
+
+impl Rerun {
+    /// `false` when there is no more to fly.
+    fn step(&mut self) -> Result<bool, ReflyError> {
+        let time_s = (self.flight.frame() + 1) as f64 * FRAME_S;
+        // As the flight computer of a log is changed: before the frame in whose time the change falls.
+        if let Some(mission) = self.schedule.as_mut().and_then(|schedule| schedule.due(time_s)) {
+            self.flight.reconfigure(mission)?;
+        }
+        self.injector.step(&mut self.flight);
+        Ok(self.flight.step())
+    }
+}
+
+impl<'a> AtStart<'a> {
+    /// Flies up to the start.
+    pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
+        let (pilot_start, frames) = recording.replayable_frames()?;
+        let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
+        let run = &recording.head.run;
+        if let Some(original) = run.get("reflown_from") {
+            return Err(lacking(format!("it was flown again from {original}; fly that one again")));
+        }
+        if options.from == From::Estimate {
+            return Err(lacking(
+                "the world at the start is the true one; --from estimate is for planar landings".to_owned(),
+            ));
+        }
+        let number_of = |fact: &str| {
+            let number = run.get(fact).and_then(|text| text.parse::<u64>().ok());
+            number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
+        };
+        let (seed, number) = (number_of("seed")?, number_of("flight")?);
+        let dispersion = from_apogee::dispersion_of(run).map_err(|error| lacking(error.to_string()))?;
+        let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
+        let controller = from_apogee::controller_of(run).ok_or_else(unknown)?;
+        let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
+        let faults: Vec<TimedFault> = faults
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .map_err(|error: campaign::fault::FaultError| lacking(error.to_string()))?;
+        let mission = LoggedPilot::schedule(recording.profile_toml()?, pilot_start, &[])?.base().clone();
+        let drawn = draw(&mission, &dispersion, seed, number);
+        let flight =
+            Flight::new(&mission, &dispersion, &drawn)?.with_baseline(Baseline::new(controller, &mission)?);
+        let mut rerun = Rerun { flight, injector: Injector::new(&faults), schedule: None };
+
+        let place = find(recording, frames, &options.start)?;
+        let first_frame = frames[place].input.frame;
+        let mut reached = Reached { frames: 0, identical: 0, first_different: None };
+        let mut recorded = frames[..place].iter();
+        while rerun.flight.frame() + 1 < first_frame && rerun.step()? {
+            let flight = &rerun.flight;
+            if let (Some(input), Some(piloted)) = (flight.input(), flight.piloted())
+                && let Some(then) = recorded.next()
+            {
+                reached.frames += 1;
+                let now = tick_to_log(input, piloted, flight.pilot().digest());
+                if now.encode_to_vec() == then.encode_to_vec() {
+                    reached.identical += 1;
+                } else {
+                    reached.first_different.get_or_insert(then.input.frame);
+                }
+            }
+        }
+        let recorded = match &recording.verdict {
+            Some(verdict) => Some(VerdictFacts::of(verdict)),
+            // An older log: what the flight comes to as it was.
+            None => {
+                let mut as_it_was = rerun.clone();
+                while as_it_was.step()? {}
+                from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+            }
+        };
+        let world = rerun.flight.world();
+        let place_m = world.state().position_m;
+        let before = place
+            .checked_sub(1)
+            .map_or("DEPLOY", |before| phase_of(&frames[before]).map_or("unknown", Phase::name));
+        let state = StartState {
+            tick: first_frame,
+            time_s: frames[place].input.time_s,
+            phase: before,
+            from: From::Truth,
+            x_m: libm::hypot(place_m.x, place_m.y),
+            z_m: world.height_m(),
+        };
+        Ok(Self {
+            recording,
+            pilot_start,
+            frames,
+            dispersion,
+            number,
+            truth: *world.truth(),
+            first_frame,
+            state,
+            reached,
+            recorded,
+            rerun,
+        })
+    }
+
+    /// What chance decided about the recorded flight.
+    pub(super) fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// Flies on; what happens is kept if there is a place for it.
+    pub(super) fn fly(
+        &self,
+        options: &ReflyOptions,
+        mut kept: Option<&mut Kept>,
+    ) -> Result<(ReflyReport, Option<protocol::log::v1::LandingVerdict>), ReflyError> {
+        let mut rerun = self.changed(options)?;
+        let (mut ticks, mut commands_identical, mut gimbal_difference_max_rad) = (0, 0, 0.0_f64);
+        let mut phase = rerun.flight.pilot().mode().phase;
+        loop {
+            let goes_on = rerun.step()?;
+            let flight = &rerun.flight;
+            if let (Some(_), Some(piloted)) = (flight.input(), flight.piloted()) {
+                ticks += 1;
+                if let Ok(place) = self.frames.binary_search_by_key(&flight.frame(), |tick| tick.input.frame)
+                {
+                    let then = &self.frames[place].output.gimbal_rad;
+                    let pairs = || then.iter().zip(&piloted.gimbal_rad);
+                    commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
+                    let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    gimbal_difference_max_rad = gimbal_difference_max_rad.max(apart_rad);
+                }
+            }
+            if let Some(kept) = &mut kept {
+                let time_s = flight.frame() as f64 * FRAME_S;
+                kept.extend(from_apogee::frame(flight, phase).into_iter().map(|record| (time_s, record)));
+            }
+            phase = flight.pilot().mode().phase;
+            if !goes_on {
+                break;
+            }
+        }
+        let verdict = from_apogee::verdict(&rerun.flight);
+        let reflown = verdict.as_ref().map(VerdictFacts::of);
+        let report = ReflyReport {
+            reached: Some(self.reached),
+            thrust_scale: rerun.flight.world().truth().impulse_scale,
+            ticks,
+            commands_identical,
+            gimbal_difference_max_rad,
+            ..report(self.recording, options, self.state, self.recorded.clone(), reflown)
+        };
+        Ok((report, verdict))
+    }
+
+    /// Flies on and keeps everything, behind what was recorded up to the start.
+    pub(super) fn fly_kept(
+        &self,
+        options: &ReflyOptions,
+    ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+        let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(*self.pilot_start)))];
+        let before = self.frames.iter().take_while(|tick| tick.input.frame < self.first_frame);
+        records.extend(before.map(|tick| (tick.input.time_s, Record::PilotTick(Box::new(tick.clone())))));
+        let (report, verdict) = self.fly(options, Some(&mut records))?;
+        let run = self.run_facts(options)?;
+        Ok((report, ReflownFlight { records, run, verdict, ..ReflownFlight::default() }))
+    }
+
+    /// What a log of this flight says beside what the recorded one says.
+    fn run_facts(&self, options: &ReflyOptions) -> Result<BTreeMap<String, String>, ReflyError> {
+        let (in_flight, _) = self.in_flight(options)?;
+        let lines: Vec<String> = in_flight.iter().map(ToString::to_string).collect();
+        Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
+    }
+
+    /// The settings as timed ones, those that hold from the start on half a frame before its first frame's end; and
+    /// another controller of the landing burn, if one is asked for, with the height it lights at among the settings.
+    fn in_flight(
+        &self,
+        options: &ReflyOptions,
+    ) -> Result<(Vec<Setting>, Option<Option<Baseline>>), ReflyError> {
+        let controller = match options.law {
+            Law::AsRecorded => None,
+            Law::Nmpc => Some(Controller::Nmpc),
+            Law::OpenLoop => Some(Controller::OpenLoop),
+            Law::Oscillating => Some(Controller::Oscillating),
+            Law::Stabiliser => {
+                return Err(ReflyError::OtherKind {
+                    name: self.recording.name.clone(),
+                    what: format!("controller {}", options.law.name()),
+                    of: "a planar landing",
+                    is: "a flight from apogee",
+                });
+            }
+        };
+        let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
+        let timed = |setting: &Setting| Setting { at_s: setting.at_s.or(Some(start_s)), ..setting.clone() };
+        let mut in_flight: Vec<Setting> = options.settings.iter().map(timed).collect();
+        let Some(controller) = controller else { return Ok((in_flight, None)) };
+        let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
+        let baseline = Baseline::new(controller, &mission)?;
+        let fixed = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
+        if let (Some(baseline), None) = (&baseline, fixed) {
+            in_flight.push(Setting {
+                path: "ignition.fixed_height_m".to_owned(),
+                value: toml::Value::Float(baseline.ignition_height_m()),
+                at_s: Some(start_s),
+            });
+        }
+        Ok((in_flight, Some(baseline)))
+    }
+
+    /// The flight at the start, with what is other from there on.
+    fn changed(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
+        refuse_timed(&options.plant_settings)?;
+        let toml = self.recording.profile_toml()?;
+        let estimator = |setting: &&Setting| setting.path.starts_with("estimator.");
+        if let Some(setting) = options.settings.iter().find(estimator) {
+            let reason = format!("{setting}: the estimator is set up at apogee; evaluate takes it");
+            return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
+        }
+        let mut rerun = self.rerun.clone();
+        let (in_flight, baseline) = self.in_flight(options)?;
+        rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
+        if let Some(baseline) = baseline {
+            rerun.flight = rerun.flight.with_baseline(baseline);
+        }
+
+        // Of the world: the airframe by every lasting setting, chance by its own.
+        let lasting = lasting(options);
+        let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
+            options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
+        let all: Vec<Setting> = lasting.iter().chain(&of_mission).cloned().collect();
+        let true_mission = mission_with(toml, &all)?;
+        let other_draw =
+            options.seed.map(|seed| draw(&true_mission, &self.dispersion, seed, self.number).truth);
+        let truth = truth_with(&other_draw.unwrap_or(self.truth), &of_truth)?;
+        let world = rerun.flight.world();
+        if truth != *world.truth() || true_mission.airframe != *world.airframe() {
+            let changed = world.changed(&true_mission.airframe, &true_mission.motor()?, &truth)?;
+            *rerun.flight.world_mut() = changed;
+        }
+        Ok(rerun)
+    }
+}
+
+/// The settings without a time.
+fn lasting(options: &ReflyOptions) -> Vec<Setting> {
+    options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect()
+}
+
+fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
+    u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
+}
+
+/// The place of the frame to start with. Of a phase it is the frame behind the one that entered it: what is other can
+/// change nothing before.
+fn find(
+    recording: &Recording,
+    frames: &[flight_v1::PilotTick],
+    start: &StartAt,
+) -> Result<usize, ReflyError> {
+    let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
+        let entered = frames.iter().position(|tick| phase_of(tick).is_some_and(wanted))?;
+        Some(entered + 1).filter(|place| *place < frames.len())
+    };
+    let found = match start {
+        StartAt::Landing => in_phase(&Phase::is_landing),
+        StartAt::Tick(number) => frames.iter().position(|tick| tick.input.frame == *number),
+        StartAt::Time(time_s) => frames.iter().position(|tick| tick.input.time_s >= *time_s),
+        StartAt::Phase(phase) => in_phase(&|found| found == *phase),
+    };
+    found.ok_or_else(|| {
+        let first = frames.first().map(LoggedPilot::moment);
+        let last = frames.last().map(LoggedPilot::moment);
+        let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
+        let reason = match start {
+            StartAt::Landing => "no frame of a landing to start from".to_owned(),
+            StartAt::Tick(asked) => {
+                format!("no frame {asked}; there are {} to {}", number(first), number(last))
+            }
+            StartAt::Time(time_s) => {
+                format!(
+                    "no frame at or after {time_s} s; the last is at {:.3} s",
+                    last.map_or(0.0, |moment| moment.time_s)
+                )
+            }
+            StartAt::Phase(phase) => format!("no frame in phase {}", phase.name()),
+        };
+        ReflyError::Start { name: recording.name.clone(), reason }
+    })
+}

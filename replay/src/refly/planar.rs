@@ -1,0 +1,85 @@
+//! A planar landing, flown again from a recorded state.
+
+use flight::profile::Profile;
+use flight::verdict::TouchdownLimits;
+use onboard_sim::scatter::draw;
+use protocol::log::v1;
+
+use super::simulation::Simulation;
+use super::{
+    Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report,
+    start,
+};
+use crate::controller::{LoggedController, Replayed as _};
+use crate::info::VerdictFacts;
+use crate::log::Recording;
+use crate::settings::{Schedule, Setting, SettingError, profile_with};
+
+pub(super) fn fly(
+    recording: &Recording,
+    options: &ReflyOptions,
+) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+    if !matches!(options.law, Law::AsRecorded | Law::Stabiliser) {
+        return Err(ReflyError::OtherKind {
+            name: recording.name.clone(),
+            what: format!("controller {}", options.law.name()),
+            of: "a flight from apogee",
+            is: "a planar landing",
+        });
+    }
+    recording.profile()?;
+    let toml = recording.profile_toml()?;
+    let ticks = recording.replayable_ticks()?;
+    let plant_profile = plant_profile(recording, options)?;
+    let schedule = Schedule::new(toml, &options.settings)?;
+    let start = start::find(recording, ticks, options)?;
+
+    let believed = schedule.base();
+    let mut controller = LoggedController::scheduled(&schedule);
+    let before: Vec<v1::ControllerTick> =
+        ticks.iter().take(start.index).map(|tick| controller.run_again(tick)).collect::<Result<_, _>>()?;
+    let seed = options.seed.or_else(|| recording.seed()).unwrap_or(0);
+    let dispersed = draw(&plant_profile, seed);
+    let limits = TouchdownLimits::from_profile(believed);
+    let mut simulation =
+        Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
+    let flown = ReflownFlight { before, ..simulation.fly(&limits) };
+
+    let (commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
+    let recorded = recording.verdict.as_ref().map(VerdictFacts::of);
+    let reflown = flown.verdict.as_ref().map(VerdictFacts::of);
+    let report = ReflyReport {
+        thrust_scale: dispersed.thrust_scale,
+        ticks: flown.ticks.len(),
+        commands_identical,
+        gimbal_difference_max_rad,
+        ..report(recording, options, start.state, recorded, reflown)
+    };
+    Ok((report, flown))
+}
+
+/// What is true: the flown profile, what a flight flown again before had its plant changed by, and the settings.
+fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profile, ReflyError> {
+    refuse_timed(&options.plant_settings)?;
+    let recorded = recording.head.run.get(RUN_PLANT_SETTINGS).map(String::as_str).unwrap_or_default();
+    let mut settings =
+        recorded.split_whitespace().map(str::parse).collect::<Result<Vec<Setting>, SettingError>>()?;
+    settings.extend(options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned());
+    settings.extend(options.plant_settings.iter().cloned());
+    Ok(profile_with(recording.profile_toml()?, &settings)?)
+}
+
+/// How many ticks command the same as the recorded ones, and by how much the others differ at most, rad.
+fn compare_commands(recorded: &[v1::ControllerTick], flown: &ReflownFlight) -> (usize, f64) {
+    let mut identical = 0;
+    let mut largest_rad = 0.0_f64;
+    for now in &flown.ticks {
+        let then = usize::try_from(now.record.input.tick).ok().and_then(|number| recorded.get(number));
+        if let Some(then) = then {
+            let (then_rad, now_rad) = (then.output.gimbal_command_rad, now.record.output.gimbal_command_rad);
+            identical += usize::from(then_rad.to_bits() == now_rad.to_bits());
+            largest_rad = largest_rad.max((then_rad - now_rad).abs());
+        }
+    }
+    (identical, largest_rad)
+}

@@ -1,0 +1,65 @@
+//! A recorded flight made ready to be flown again many times from the same moment.
+
+use super::{ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
+use crate::log::Recording;
+use crate::settings::{mission_value_of, value_of};
+
+/// A recorded flight at the moment it is flown again from.
+#[derive(Debug)]
+pub struct Prepared<'a> {
+    recording: &'a Recording,
+    /// Of a flight from apogee: flown up to there.
+    at_start: Option<Box<apogee::AtStart<'a>>>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Makes a flight ready; of the options the start counts.
+    ///
+    /// # Errors
+    /// See [`ReflyError`].
+    pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
+        let at_start = if recording.is_from_apogee() {
+            Some(Box::new(apogee::AtStart::new(recording, options)?))
+        } else {
+            None
+        };
+        Ok(Self { recording, at_start })
+    }
+
+    /// The flight.
+    pub fn recording(&self) -> &'a Recording {
+        self.recording
+    }
+
+    /// Flies it again; the start must be the one it was made ready for.
+    ///
+    /// # Errors
+    /// See [`ReflyError`].
+    pub fn fly(&self, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
+        match &self.at_start {
+            Some(at_start) => Ok(at_start.fly(options, None)?.0),
+            None => Ok(planar::fly(self.recording, options)?.0),
+        }
+    }
+
+    /// Flies it again and keeps the flight itself.
+    ///
+    /// # Errors
+    /// See [`ReflyError`].
+    pub fn fly_kept(&self, options: &ReflyOptions) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+        match &self.at_start {
+            Some(at_start) => at_start.fly_kept(options),
+            None => planar::fly(self.recording, options),
+        }
+    }
+
+    /// The number that a setting has in the recorded flight.
+    pub fn number_of(&self, path: &str) -> Option<f64> {
+        let toml = self.recording.profile_toml().ok()?;
+        let value = match &self.at_start {
+            Some(at_start) => mission_value_of(toml, at_start.truth(), path)?,
+            None => value_of(toml, path)?,
+        };
+        value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
+    }
+}
