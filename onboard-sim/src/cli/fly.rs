@@ -201,6 +201,9 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
     match &summary.outcome {
+        Outcome::Landed if summary.judged.is_some_and(|judged| !judged.landed) => {
+            writeln!(out, "LANDED within what the legs take, outside a limit of Table 2")?;
+        }
         Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
         Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
         Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,

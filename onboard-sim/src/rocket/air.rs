@@ -124,7 +124,7 @@ impl Rocket {
             && let Some(touchdown) = world.touchdown()
         {
             let outcome = air.sortie.flight().outcome();
-            let state = planar_at_touchdown(touchdown, world.cg_above_feet_m());
+            let state = planar_at_touchdown(touchdown);
             let impact = Impact { time_s: air.released_at_s + touchdown.time_s, state };
             let verdict = LandingVerdict::judge(&self.limits, &state);
             let landed = outcome.strict;

@@ -50,9 +50,8 @@ impl Rehearsal {
         let row = sortie.row();
         let plans = row.plans_converged + row.plans_best_feasible + row.plans_shifted + row.plans_stabiliser;
         let world = sortie.flight().world();
-        let landing = world.touchdown().map(|touchdown| {
-            LandingVerdict::judge(legs, &planar_at_touchdown(touchdown, world.cg_above_feet_m()))
-        });
+        let landing =
+            world.touchdown().map(|touchdown| LandingVerdict::judge(legs, &planar_at_touchdown(touchdown)));
         *self = Self::Over(Box::new(Rehearsed {
             warm: row.legs && row.plans_converged > 0,
             found: match row.failure.as_str() {

@@ -23,12 +23,13 @@ use crate::craft::{
 const CARRIED_M_S: f64 = 10.0;
 
 /// A touchdown in the terms of the landing paper's Table 2: distance, tilt, axial and lateral speed, rate across the axis.
-pub(super) fn planar_at_touchdown(touchdown: &Touchdown, cg_above_feet_m: f64) -> PlanarState {
+/// The altitude is that of the foot that touches: nought, which is what makes it the touchdown.
+pub(super) fn planar_at_touchdown(touchdown: &Touchdown) -> PlanarState {
     let body_m_s = touchdown.state.velocity_in_body_m_s();
     let place_m = &touchdown.state.position_m;
     PlanarState {
         x_m: libm::hypot(place_m.x, place_m.y),
-        z_m: place_m.z - cg_above_feet_m,
+        z_m: 0.0,
         theta_rad: FRAC_PI_2 - touchdown.tilt_rad,
         u_m_s: body_m_s.x,
         w_m_s: libm::hypot(body_m_s.y, body_m_s.z),
