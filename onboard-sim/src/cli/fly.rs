@@ -176,16 +176,14 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
 
 fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    if let Some(Judged { impact, verdict, .. }) = &summary.judged {
-        writeln!(out, "touchdown at {:.3} s:", impact.time_s)?;
-        for limit in &verdict.results {
-            let mark = if limit.passed { "ok  " } else { "FAIL" };
-            writeln!(
-                out,
-                "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
-                limit.name, limit.value, limit.unit, limit.lowest, limit.highest
-            )?;
-        }
+    if let Some(judged) = &summary.judged {
+        let by = if summary.judged_by_table_2.is_some() { ", by what the legs take" } else { "" };
+        writeln!(out, "touchdown at {:.3} s{by}:", judged.impact.time_s)?;
+        print_limits(&mut out, judged)?;
+    }
+    if let Some(judged) = &summary.judged_by_table_2 {
+        writeln!(out, "by the landing paper's Table 2:")?;
+        print_limits(&mut out, judged)?;
     }
     if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
         writeln!(
@@ -201,7 +199,7 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
     match &summary.outcome {
-        Outcome::Landed if summary.judged.is_some_and(|judged| !judged.landed) => {
+        Outcome::Landed if summary.judged_by_table_2.is_some_and(|judged| !judged.landed) => {
             writeln!(out, "LANDED within what the legs take, outside a limit of Table 2")?;
         }
         Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
@@ -209,6 +207,18 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,
         Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
         Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
+    }
+    Ok(())
+}
+
+fn print_limits(out: &mut impl std::io::Write, judged: &Judged) -> std::io::Result<()> {
+    for limit in &judged.verdict.results {
+        let mark = if limit.passed { "ok  " } else { "FAIL" };
+        writeln!(
+            out,
+            "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
+            limit.name, limit.value, limit.unit, limit.lowest, limit.highest
+        )?;
     }
     Ok(())
 }

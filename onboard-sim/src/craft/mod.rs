@@ -109,11 +109,13 @@ pub trait Craft {
     /// What of this frame belongs into a log beside the events. `changed`: the phase has just changed.
     fn log(&self, changed: bool) -> Vec<Record>;
 
-    /// Whether it landed, once that is judged.
-    fn landed(&self) -> Option<bool>;
-
     /// The touchdown limits with the values found, once it is judged.
     fn judged(&self) -> Option<Judged>;
+
+    /// The landing by the landing paper's Table 2, where [`Craft::judged`] goes by what the legs take.
+    fn judged_by_table_2(&self) -> Option<Judged> {
+        None
+    }
 
     /// What the radio does to what is sent and heard.
     fn radio(&self) -> Radio {

@@ -162,7 +162,7 @@ pub struct Prediction {
     pub violations: u16,
 }
 
-/// A plan's path in its plane: horizontal and vertical positions, m.
+/// A plan's path seen from the side: horizontal and vertical positions, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Path {
     /// The points; the first `count` hold.

@@ -177,6 +177,8 @@ pub struct FlightSummary {
     pub outcome: Outcome,
     /// Contact and its judgement, if there was one.
     pub judged: Option<Judged>,
+    /// The same by the landing paper's Table 2, where the former goes by what the legs take.
+    pub judged_by_table_2: Option<Judged>,
     /// Last phase.
     pub phase: Phase,
     /// Simulated time, s.
@@ -280,7 +282,7 @@ pub async fn fly_observed(
         }
     };
     links.close(craft.time_s());
-    let outcome = match (craft.landed(), pilot.refused) {
+    let outcome = match (craft.judged().map(|judged| judged.landed), pilot.refused) {
         // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
         _ if craft.aborted() => Outcome::Aborted,
         (Some(true), _) => Outcome::Landed,
@@ -293,6 +295,7 @@ pub async fn fly_observed(
     Ok(FlightSummary {
         outcome,
         judged: craft.judged(),
+        judged_by_table_2: craft.judged_by_table_2(),
         phase: craft.phase(),
         time_s: craft.time_s(),
         solve_times,

@@ -7,10 +7,8 @@ use flight::controller::ControlLevel;
 use flight::phase::{Effect, Event, Mode, Phase};
 use flight::pilot::{FRAMES_PER_PLAN, Sensed};
 use flight::powered::PoweredReport;
-use flight::verdict::LandingVerdict;
 use world::RestOutcome;
 
-use super::snapshot::planar_at_touchdown;
 use super::{Air, FRAME_S, Rocket};
 use crate::craft::{Craft as _, DEGRADED, Judged, Severity, VehicleEvent, words_of};
 use crate::plant::Impact;
@@ -124,12 +122,16 @@ impl Rocket {
             && let Some(touchdown) = world.touchdown()
         {
             let outcome = air.sortie.flight().outcome();
-            let state = planar_at_touchdown(touchdown);
-            let impact = Impact { time_s: air.released_at_s + touchdown.time_s, state };
-            let verdict = LandingVerdict::judge(&self.limits, &state);
-            let landed = outcome.strict;
+            let time_s = air.released_at_s + touchdown.time_s;
+            let judged = |(state, verdict), landed| {
+                let impact = Impact { time_s, state };
+                Judged { impact, verdict, landed }
+            };
+            let by_legs = judged(self.limits.by_legs(touchdown), outcome.legs);
+            let by_table_2 = judged(self.limits.by_table_2(touchdown), outcome.strict);
             let words = outcome_in_words(&outcome, world.rest().map(|rest| rest.outcome));
-            air.judged = Some((Judged { impact, verdict, landed }, outcome));
+            air.judged = Some((by_legs, by_table_2));
+            let Judged { impact, verdict, landed } = by_legs;
             self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict), landed });
             self.say(Severity::Notice, words);
         }
@@ -160,7 +162,7 @@ fn outcome_in_words(outcome: &campaign::outcome::Outcome, rest: Option<RestOutco
     };
     let held = |kept: bool| if kept { "kept" } else { "broken" };
     let why = outcome.failure.map_or_else(String::new, |failure| format!(" ({})", failure.name()));
-    format!("it {stands}; Table 2 {}, limits of the legs {}{why}", held(outcome.strict), held(outcome.legs))
+    format!("it {stands}; limits of the legs {}{why}, Table 2 {}", held(outcome.legs), held(outcome.strict))
 }
 
 /// What the phase table must have done between two frames: the flight computer keeps its effects to itself.

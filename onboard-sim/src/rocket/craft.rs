@@ -6,7 +6,6 @@ use campaign::sortie::Sortie;
 use flight::arming::{ArmingInput, Check, arming_checks};
 use flight::phase::{Event, Mode, Phase, Refusal, StartPoint, transition};
 use flight::profile::StateWeights;
-use flight::verdict::TouchdownLimits;
 use protocol::log::record::Record;
 
 use super::{Air, FRAME_S, Rocket};
@@ -149,13 +148,13 @@ impl Craft for Rocket {
         }
     }
 
-    /// By what the legs take; the stricter Table 2 stands beside it in [`Craft::judged`].
-    fn landed(&self) -> Option<bool> {
-        self.outcome().map(|outcome| outcome.legs)
+    /// By what the legs take.
+    fn judged(&self) -> Option<Judged> {
+        Some(self.air.as_ref()?.judged?.0)
     }
 
-    fn judged(&self) -> Option<Judged> {
-        self.air.as_ref()?.judged.as_ref().map(|(judged, _)| *judged)
+    fn judged_by_table_2(&self) -> Option<Judged> {
+        Some(self.air.as_ref()?.judged?.1)
     }
 
     fn radio(&self) -> Radio {
@@ -184,7 +183,7 @@ impl Rocket {
                 TestStep::Command(_) | TestStep::Wait => {}
             }
         } else {
-            self.rehearsal.step(&self.leg_limits());
+            self.rehearsal.step(&self.limits);
         }
         if self.mode.phase == Phase::PadIdle
             && self.rehearsal.over().is_some()
@@ -213,18 +212,6 @@ impl Rocket {
             self.air = Some(Air::new(sortie, time_s));
             let words = format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
             self.say(Severity::Notice, words);
-        }
-    }
-
-    /// What the legs take, in the form of touchdown limits: the arming check asks for a landing that the vehicle survives.
-    fn leg_limits(&self) -> TouchdownLimits {
-        let legs = &self.flight.order.mission.leg_limits;
-        TouchdownLimits {
-            pitch_error_rad: legs.tilt_deg.to_radians(),
-            u_m_s: legs.vertical_m_s,
-            w_m_s: legs.lateral_m_s,
-            pitch_rate_rad_s: legs.rate_deg_s.to_radians(),
-            ..self.limits
         }
     }
 }

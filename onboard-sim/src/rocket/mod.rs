@@ -9,6 +9,7 @@
 
 mod air;
 mod craft;
+mod limits;
 mod pad;
 mod rehearsal;
 mod sensed;
@@ -19,17 +20,16 @@ mod tests;
 use campaign::draw::draw;
 use campaign::fly::FlyError;
 use campaign::order::Order;
-use campaign::outcome::Outcome;
 use campaign::sortie::Sortie;
 use flight::airframe::MassModel;
 use flight::controller::ControlLevel;
 use flight::phase::Mode;
 use flight::powered::PoweredReport;
 use flight::thrust_curve::ThrustCurve;
-use flight::verdict::TouchdownLimits;
 use world::STEP_S;
 use world::sensors::FRAME_MS;
 
+use self::limits::Limits;
 use self::pad::Pad;
 use self::rehearsal::Rehearsal;
 use self::sensed::SensorWatch;
@@ -52,7 +52,7 @@ pub struct Rocket {
     flight: RocketFlight,
     curve: ThrustCurve,
     mass: MassModel,
-    limits: TouchdownLimits,
+    limits: Limits,
     frame: u64,
     mode: Mode,
     log: LogState,
@@ -79,7 +79,8 @@ struct Air {
     report: PoweredReport,
     reported_at_s: f64,
     took_s: f64,
-    judged: Option<(Judged, Outcome)>,
+    /// By what the legs take, and by Table 2.
+    judged: Option<(Judged, Judged)>,
     given_up: bool,
 }
 
@@ -98,7 +99,7 @@ impl Rocket {
             rehearsal: Rehearsal::new(order)?,
             mass: MassModel::new(&mission.airframe.mass, curve.propellant_mass_kg()),
             curve,
-            limits: TouchdownLimits::from(&mission.touchdown_limits),
+            limits: Limits::of(mission),
             frame: 0,
             mode: Mode::power_up(0.0),
             log: LogState { running: false, space_bytes: 0 },
@@ -108,11 +109,5 @@ impl Rocket {
             events: Vec::new(),
             flight: flight.clone(),
         })
-    }
-
-    /// What became of the flight, judged by what the legs take and by the landing paper's Table 2; `None` until it lies
-    /// still.
-    pub fn outcome(&self) -> Option<&Outcome> {
-        self.air.as_ref()?.judged.as_ref().map(|(_, outcome)| outcome)
     }
 }

@@ -8,9 +8,9 @@ use campaign::fly::FlyError;
 use campaign::order::Order;
 use campaign::sortie::Sortie;
 use flight::powered::PoweredReport;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::verdict::LandingVerdict;
 
-use super::snapshot::planar_at_touchdown;
+use super::limits::Limits;
 
 /// Frames rehearsed in a frame on the pad: a flight takes a second or two.
 const FRAMES_AT_ONCE: u32 = 20;
@@ -42,7 +42,7 @@ impl Rehearsal {
     }
 
     /// Some frames of it.
-    pub(super) fn step(&mut self, legs: &TouchdownLimits) {
+    pub(super) fn step(&mut self, limits: &Limits) {
         let Self::Flying(sortie) = self else { return };
         if (0..FRAMES_AT_ONCE).all(|_| sortie.step()) {
             return;
@@ -50,8 +50,7 @@ impl Rehearsal {
         let row = sortie.row();
         let plans = row.plans_converged + row.plans_best_feasible + row.plans_shifted + row.plans_stabiliser;
         let world = sortie.flight().world();
-        let landing =
-            world.touchdown().map(|touchdown| LandingVerdict::judge(legs, &planar_at_touchdown(touchdown)));
+        let landing = world.touchdown().map(|touchdown| limits.by_legs(touchdown).1);
         *self = Self::Over(Box::new(Rehearsed {
             warm: row.legs && row.plans_converged > 0,
             found: match row.failure.as_str() {

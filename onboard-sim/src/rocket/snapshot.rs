@@ -1,7 +1,5 @@
 //! The rocket's state at one instant, for telemetry: what its flight computer believes.
 
-use core::f64::consts::FRAC_PI_2;
-
 use flight::burn::Burn;
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
@@ -11,7 +9,6 @@ use flight::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::powered::PoweredReport;
 use flight::verdict::LandingVerdict;
 use nalgebra::{Vector2, Vector3};
-use world::Touchdown;
 
 use super::{Air, FRAME_S, Rocket};
 use crate::craft::{
@@ -21,21 +18,6 @@ use crate::craft::{
 
 /// Under a parachute that carries the fall is slower than this, m/s: canopies are sized for 6, an open fall is 20 to 40.
 const CARRIED_M_S: f64 = 10.0;
-
-/// A touchdown in the terms of the landing paper's Table 2: distance, tilt, axial and lateral speed, rate across the axis.
-/// The altitude is that of the foot that touches: nought, which is what makes it the touchdown.
-pub(super) fn planar_at_touchdown(touchdown: &Touchdown) -> PlanarState {
-    let body_m_s = touchdown.state.velocity_in_body_m_s();
-    let place_m = &touchdown.state.position_m;
-    PlanarState {
-        x_m: libm::hypot(place_m.x, place_m.y),
-        z_m: 0.0,
-        theta_rad: FRAC_PI_2 - touchdown.tilt_rad,
-        u_m_s: body_m_s.x,
-        w_m_s: libm::hypot(body_m_s.y, body_m_s.z),
-        q_rad_s: touchdown.cross_rate_rad_s,
-    }
-}
 
 impl Rocket {
     pub(super) fn state_now(&self) -> Snapshot {
@@ -78,7 +60,7 @@ impl Rocket {
             solve_time_s: 0.0,
             deadline_s: FRAME_S,
             thrust_scale: 1.0,
-            limits: self.limits,
+            limits: self.limits.legs,
             gimbal_limit_rad: self.flight.order.mission.airframe.gimbal.limit_rad(),
             judged: self.judged(),
             descent: None,
@@ -113,7 +95,7 @@ impl Rocket {
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
             controller: Some(facts(flight.frame() / FRAMES_PER_PLAN, output.level, &air.report)),
             prediction: planned.and_then(|_| self.prediction(air, pilot, estimate, standing.time_s)),
-            path: planned.and_then(|(states, _)| Path::through(states)),
+            path: planned.and_then(|(states, _)| self.path(pilot, estimate, states)),
             solve_time_s: air.took_s,
             thrust_scale: motor.impulse_scale(),
             descent: Some(self.descent(pilot, estimate, feet_m)),
@@ -157,6 +139,18 @@ impl Rocket {
         }
     }
 
+    /// The plan's path as it looks from the east, where the path that is flown is seen from too: its plane stands as it
+    /// happens to.
+    fn path(&self, pilot: &Pilot, estimate: &Estimate, states: &[PlanarState]) -> Option<Path> {
+        let plane = pilot.powered().plane()?;
+        let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
+        let mut path = Path::through(states)?;
+        for (north_m, _) in &mut path.points_m {
+            *north_m = *north_m * plane.along.x + beside_north_m;
+        }
+        Some(path)
+    }
+
     /// The plan's end over the ground; the plan itself moves with the wind.
     fn prediction(&self, air: &Air, pilot: &Pilot, estimate: &Estimate, time_s: f64) -> Option<Prediction> {
         let plane = pilot.powered().plane()?;
@@ -165,7 +159,7 @@ impl Rocket {
         Some(Prediction {
             time_to_go_s: air.report.touchdown_in_s - (time_s - air.reported_at_s),
             state,
-            violations: violations(&LandingVerdict::judge_plan(&self.limits, &state)),
+            violations: violations(&LandingVerdict::judge_plan(&self.limits.legs, &state)),
         })
     }
 }

@@ -84,9 +84,10 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
         let events = run_until(&mut rocket, Rocket::is_over);
         let row = sortie::fly(&flight.order, flight.number).unwrap();
         assert!(row.legs, "{row:?}");
-        assert_eq!(rocket.landed(), Some(row.legs));
         let judged = rocket.judged().unwrap();
-        assert_eq!(judged.landed, row.strict);
+        assert!(judged.landed && judged.verdict.landed());
+        assert_eq!(rocket.judged_by_table_2().unwrap().landed, row.strict);
+        assert_eq!(judged.impact.state.u_m_s.to_bits(), row.touchdown_vertical_m_s.unwrap().to_bits());
         let distance_m = libm::hypot(row.touchdown_x_m.unwrap(), row.touchdown_y_m.unwrap());
         assert_eq!(judged.impact.state.x_m.to_bits(), distance_m.to_bits());
         let flown_s = judged.impact.time_s - rocket.air.as_ref().unwrap().released_at_s;
@@ -179,8 +180,8 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown, Phase::Safed]);
         assert!(said(&events, "parachute deployed") && said(&events, "landing motor inhibited"));
         assert!(rocket.aborted());
-        assert_eq!(rocket.landed(), Some(false), "under the parachute it is not a landing");
         let judged = rocket.judged().unwrap();
+        assert!(!judged.landed, "under the parachute it is not a landing");
         assert!(judged.impact.state.u_m_s.abs() < 10.0, "{judged:?}");
         assert_eq!(rocket.snapshot().descent.unwrap().chute, Chute::Open);
     }

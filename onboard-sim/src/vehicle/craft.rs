@@ -122,10 +122,6 @@ impl Craft for Vehicle {
         }
     }
 
-    fn landed(&self) -> Option<bool> {
-        self.verdict.map(|judged| judged.landed)
-    }
-
     fn judged(&self) -> Option<Judged> {
         self.verdict
     }
