@@ -7,7 +7,7 @@ use std::io;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use onboard_sim::fly::{self, FlyOptions, LoadedProfile};
+use onboard_sim::fly::{self, FlyOptions, LoadedFlight};
 use onboard_sim::vehicle::DeadlinePolicy;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
@@ -23,7 +23,7 @@ const STOP_WITHIN: Duration = Duration::from_secs(3);
 #[derive(Debug, Clone)]
 pub struct DemoOptions {
     /// What flies.
-    pub profile: LoadedProfile,
+    pub profile: LoadedFlight,
     /// Seed of its dispersions.
     pub seed: u64,
     /// Speed of simulated time.
@@ -31,7 +31,7 @@ pub struct DemoOptions {
 }
 
 impl DemoOptions {
-    /// Reads the profile, once for the flight and its log.
+    /// Reads the profile or mission, once for the flight and its log.
     ///
     /// # Errors
     /// There is no such profile, or it is wrong.

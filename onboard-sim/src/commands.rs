@@ -7,7 +7,7 @@ use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::dialect::{AUTOPILOT_VERSION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult};
 
-use crate::vehicle::{Answer, Request, Result};
+use crate::craft::{Answer, Request, Result};
 
 /// What a command asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -21,9 +21,9 @@ use protocol::signing::Rejection;
 use protocol::text;
 
 use crate::commands::{self, Command};
-use crate::streams::Streams;
+use crate::craft::{Craft, Severity, Snapshot, VehicleEvent};
+use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
-use crate::vehicle::{Severity, Snapshot, Vehicle, VehicleEvent};
 
 /// Unsent telemetry may save up this much of the budget for a burst.
 const BURST_BYTES: f64 = 400.0;
@@ -62,12 +62,17 @@ impl Default for VehicleEndpoint {
 }
 
 impl VehicleEndpoint {
-    /// With the standard messages at their default rates.
+    /// With the standard messages of the planar vehicle at their default rates.
     pub fn new() -> Self {
+        Self::sending(&STANDARD)
+    }
+
+    /// With these messages at their default rates.
+    pub fn sending(standard: &'static [Standard]) -> Self {
         Self {
             encoder: Encoder::new(VEHICLE),
             signature_len: 0,
-            streams: Streams::standard(),
+            streams: Streams::of(standard),
             urgent: Vec::new(),
             requested: VecDeque::new(),
             next_parameter: None,
@@ -81,12 +86,13 @@ impl VehicleEndpoint {
     }
 
     /// The same where every frame will be signed, and is longer for it.
-    pub fn signed() -> Self {
-        Self { signature_len: SIGNATURE_LEN, streams: Streams::signed(), ..Self::new() }
+    pub fn sending_signed(standard: &'static [Standard]) -> Self {
+        let streams = Streams::signed(standard);
+        Self { signature_len: SIGNATURE_LEN, streams, ..Self::sending(standard) }
     }
 
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
-    pub fn on_frame(&mut self, frame: &Frame, vehicle: &mut Vehicle) {
+    pub fn on_frame(&mut self, frame: &Frame, vehicle: &mut dyn Craft) {
         if frame.source() == VEHICLE {
             if !self.warned_of_twin {
                 self.warned_of_twin = true;
@@ -154,12 +160,12 @@ impl VehicleEndpoint {
                 self.streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
             }
             VehicleEvent::Verdict { .. } => self.streams.hurry(TD_LANDING_VERDICT_DATA::ID),
-            VehicleEvent::Tick(_) => {}
+            VehicleEvent::Tick(_) | VehicleEvent::Planned { .. } => {}
         }
     }
 
     /// What is to be sent now.
-    pub fn poll(&mut self, vehicle: &Vehicle, snapshot: &Snapshot) -> Vec<Frame> {
+    pub fn poll(&mut self, vehicle: &dyn Craft, snapshot: &Snapshot) -> Vec<Frame> {
         let now_s = snapshot.time_s;
         let earned = f64::from(RADIO_BUDGET_BYTES_S) * (now_s - self.last_poll_s).max(0.0);
         self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
@@ -194,7 +200,7 @@ impl VehicleEndpoint {
         frames.iter().map(|frame| frame.as_bytes().len() + self.signature_len).sum()
     }
 
-    fn on_command(&mut self, request: &CommandRequest, vehicle: &mut Vehicle) {
+    fn on_command(&mut self, request: &CommandRequest, vehicle: &mut dyn Craft) {
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
             Ok(Command::Vehicle(asked)) => {
@@ -214,7 +220,7 @@ impl VehicleEndpoint {
         }
     }
 
-    fn send_message(&mut self, message_id: u32, of: u32, vehicle: &Vehicle) -> (MavResult, Option<String>) {
+    fn send_message(&mut self, message_id: u32, of: u32, vehicle: &dyn Craft) -> (MavResult, Option<String>) {
         let messages: Vec<MavMessage> = match message_id {
             // 0 asks for all of them, k for the k-th.
             AVAILABLE_MODES_DATA::ID if of as usize > Phase::ALL.len() => {

@@ -1,4 +1,5 @@
-//! A flight from apogee as the records of a log, for whoever flies one: the campaign, or a replay.
+//! A flight from apogee for whoever flies one, the campaign or a replay: the facts its log names, its records and its
+//! verdict. `pilot_log` words the records.
 
 use std::collections::BTreeMap;
 
@@ -10,35 +11,16 @@ use campaign::outcome::Failure;
 use flight::phase::Phase;
 use flight::powered::Plane;
 use nalgebra::Vector3;
-use protocol::log::flight_v1::{PilotStart, TruthSample};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
-use tick_log::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
 use world::Touchdown;
 
-/// The log's run fact with the text of the dispersions.
-pub const RUN_DISPERSION_TOML: &str = "dispersion_toml";
+use crate::pilot_log::{self, RUN_DISPERSION_TOML};
 
 /// A flight of a campaign has no day: its log begins at the epoch, so that the same flight gives the same log.
 pub fn header(order: &Order, number: u64) -> LogHeader {
-    let faults = order.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-    let run = [
-        ("profile", order.mission.name.clone()),
-        ("dispersion", order.dispersion_name.clone()),
-        (RUN_DISPERSION_TOML, order.dispersion_toml.clone()),
-        ("seed", order.seed.to_string()),
-        ("flight", number.to_string()),
-        ("controller", order.controller.name().to_owned()),
-        ("faults", faults),
-        ("start_unix_ns", "0".to_owned()),
-    ];
-    LogHeader {
-        writer: "onboard-sim campaign".to_owned(),
-        start_unix_ns: 0,
-        run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
-        profile_toml: Some(order.mission_toml.clone()),
-    }
+    pilot_log::header("onboard-sim campaign", order, number, 0)
 }
 
 /// The dispersions that a log's run facts name: their text, or of a log without it the built-in of the name.
@@ -53,34 +35,14 @@ pub fn dispersion_of(run: &BTreeMap<String, String>) -> Result<Dispersion, Dispe
     }
 }
 
-/// What a flight is recorded with before its first frame.
-pub fn start(flight: &Flight) -> Record {
-    let mission = flight.mission();
-    Record::PilotStart(Box::new(PilotStart {
-        time_s: 0.0,
-        believed: state_to_log(flight.believed_at_apogee()),
-        steered: mission.steered,
-        fixed_ignition_height_m: mission.ignition.fixed_height_m,
-    }))
-}
-
 /// Nanoseconds since apogee at the end of the last frame.
 pub fn time_ns(flight: &Flight) -> u64 {
     flight.frame() * u64::from(world::sensors::FRAME_MS) * 1_000_000
 }
 
-/// The last frame: what the flight computer was given and decided, what it believes, what is true, and a change of phase
-/// since `phase`.
+/// The last frame's records, and a change of phase since `phase`.
 pub fn frame(flight: &Flight, phase: Phase) -> Vec<Record> {
-    let mut records = Vec::new();
-    if let (Some(input), Some(piloted)) = (flight.input(), flight.piloted()) {
-        let tick = tick_to_log(input, piloted, flight.pilot().digest());
-        records.push(Record::PilotTick(Box::new(tick)));
-        if let Some(estimate) = flight.pilot().estimate() {
-            records.push(Record::Estimate(Box::new(estimate_to_log(estimate))));
-        }
-    }
-    records.push(Record::TruthSample(Box::new(truth(flight))));
+    let mut records = pilot_log::frame(flight);
     let now = flight.pilot().mode().phase;
     if now != phase {
         records.push(Record::Event(Event {
@@ -90,25 +52,6 @@ pub fn frame(flight: &Flight, phase: Phase) -> Vec<Record> {
         }));
     }
     records
-}
-
-fn truth(flight: &Flight) -> TruthSample {
-    let world = flight.world();
-    let commanded = flight.output();
-    TruthSample {
-        time_s: world.time_s(),
-        state: state_to_log(world.state()),
-        height_m: world.height_m(),
-        thrust_n: world.thrust_n(),
-        mass_kg: world.mass().mass_kg,
-        wind_m_s: vector_to_log(&world.wind_m_s()),
-        gimbal_commanded_rad: commanded.map_or_else(Vec::new, |output| output.gimbal_rad.to_vec()),
-        gimbal_actual_rad: world.gimbal_rad().to_vec(),
-        fins_commanded_rad: commanded.map_or_else(Vec::new, |output| output.fins_rad.to_vec()),
-        fins_actual_rad: world.fins_rad().to_vec(),
-        parachute_open_share: world.parachute_open_share(),
-        in_contact: world.touchdown().is_some(),
-    }
 }
 
 /// The verdict on a flight that is over, by what its legs take; `None` if it did not come down. What else went wrong

@@ -2,7 +2,10 @@
 //!
 //! * [`plant`]: the simulated vehicle, which the controller never sees: planar motion, motor, servos, ground.
 //! * [`scatter`]: seeded differences between the plant and what the controller believes.
+//! * [`craft`]: what every simulated vehicle is to its run loop, its radio and its log.
 //! * [`vehicle`]: the flight computer: phases, checks, controller ticks, around one plant. Pure.
+//! * [`rocket`]: the flight computer from apogee, with its pad, in the world in space. Pure.
+//! * [`pilot_log`]: a flight from apogee as log records.
 //! * [`commands`]: what the radio may ask for and how it is answered. Pure.
 //! * [`telemetry`], [`streams`] and [`endpoint`]: the vehicle as MAVLink messages, scheduled within a radio's
 //!   budget. Pure.
@@ -14,13 +17,16 @@
 #![warn(missing_docs)]
 
 pub mod commands;
+pub mod craft;
 pub mod endpoint;
 pub mod fly;
 pub mod from_apogee;
 pub mod landability;
 pub mod paper;
 pub mod parameters;
+pub mod pilot_log;
 pub mod plant;
+pub mod rocket;
 pub mod scatter;
 pub mod solve_times;
 pub mod streams;

@@ -9,15 +9,10 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand};
-use flight::profile::BUILTIN;
-use onboard_sim::fly::{FlightSummary, FlyOptions, Outcome, Speed, fly_observed, load_profile, log_header};
+use onboard_sim::fly::{builtins, load_planar, load_profile};
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
-use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
 use protocol::key_file::KeyFile;
-use protocol::log::recorder::Recorder;
-use protocol::transport::Endpoint;
-use tokio::sync::watch;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]
@@ -33,9 +28,9 @@ enum Command {
     ///
     /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
     ///
-    /// Exit codes: 0 landed inside every limit; 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
+    /// Exit codes: 0 landed inside every limit (from apogee: inside what the legs take); 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
     /// 5 stopped before its end.
-    Fly(FlyArguments),
+    Fly(cli::fly::FlyArguments),
     /// Map where a landing inside the touchdown limits exists, over two quantities.
     Landability(LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and day.
@@ -83,38 +78,6 @@ struct LandabilityArguments {
     jobs: Option<usize>,
 }
 
-#[derive(clap::Args)]
-struct FlyArguments {
-    /// Built-in profile or TOML file.
-    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
-    profile: String,
-    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
-    /// serial:DEVICE:BAUD; may be given more than once.
-    #[arg(long, value_name = "LINK")]
-    mavlink: Vec<Endpoint>,
-    /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-    /// Log to write (MCAP). An existing file is not overwritten.
-    #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
-    /// Seed of the profile's dispersions.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Speed of simulated time: a factor, or max.
-    #[arg(long, default_value = "1")]
-    speed: Speed,
-    /// Arm and start without a ground station, also with --mavlink.
-    #[arg(long)]
-    auto_start: bool,
-    /// Keep serving the links after the flight, until interrupted.
-    #[arg(long)]
-    stay: bool,
-    /// Do not apply a controller output that took longer than its sample, as hardware would not.
-    #[arg(long)]
-    enforce_deadline: bool,
-}
-
 fn main() -> ExitCode {
     match run(Arguments::parse()) {
         Ok(code) => code,
@@ -136,15 +99,12 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Profiles { show } => profiles(show.as_deref()),
-        Command::Fly(arguments) => {
-            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-            runtime.block_on(fly(arguments))
-        }
+        Command::Fly(arguments) => cli::fly::run(arguments),
     }
 }
 
 fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> {
-    let profile = load_profile(&arguments.profile)?.profile;
+    let profile = load_planar(&arguments.profile)?.profile;
     let (x, y) = (arguments.x, arguments.y);
     anyhow::ensure!(x.quantity != y.quantity, "both axes vary {}; choose two quantities", x.quantity.name());
     let jobs =
@@ -198,125 +158,11 @@ fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
-        out.write_all(load_profile(name)?.toml.as_bytes())?;
+        out.write_all(load_profile(name)?.toml().as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
-    for (name, _) in BUILTIN {
-        writeln!(out, "{name:<20} {}", load_profile(name)?.profile.summary)?;
+    for (name, _) in builtins() {
+        writeln!(out, "{name:<20} {}", load_profile(name)?.summary())?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
-    let profile = load_profile(&arguments.profile)?;
-    let recorder = match &arguments.log {
-        None => None,
-        Some(path) => {
-            let header = log_header("onboard-sim", &profile, arguments.seed, unix_ns());
-            Some(Recorder::create(path, &header)?)
-        }
-    };
-    let options = FlyOptions {
-        profile,
-        auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
-        links: arguments.mavlink,
-        key_file: arguments.key,
-        recorder: recorder.clone(),
-        seed: arguments.seed,
-        speed: arguments.speed,
-        exit_when_safed: !arguments.stay,
-        deadline_policy: if arguments.enforce_deadline {
-            DeadlinePolicy::Enforce
-        } else {
-            DeadlinePolicy::Observe
-        },
-        log_clock: None,
-    };
-    let (stop, stopped) = watch::channel(false);
-    tokio::spawn(async move {
-        interrupted().await;
-        let _ = stop.send(true);
-    });
-    let flown = Box::pin(fly_observed(options, stopped, report_event)).await;
-    let log_path = recorder.as_ref().map(Recorder::finish).transpose();
-    let summary = flown?;
-    print_summary(&summary)?;
-    if let Some(path) = log_path.context("the flight is over, but its log is not whole")? {
-        writeln!(std::io::stdout(), "log {}", path.display())?;
-    }
-    Ok(exit_code(&summary.outcome))
-}
-
-/// Waits for Ctrl-C or a request to terminate.
-async fn interrupted() {
-    use tokio::signal::unix::{SignalKind, signal};
-    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-        let _ = tokio::signal::ctrl_c().await;
-        return;
-    };
-    tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        _ = terminate.recv() => {}
-    }
-}
-
-fn report_event(time_s: f64, event: &VehicleEvent) {
-    let words = match event {
-        VehicleEvent::Text { text, .. } => text.clone(),
-        VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
-        VehicleEvent::Tick(_) | VehicleEvent::Verdict { .. } => return,
-    };
-    // A closed pipe must not end a flight.
-    let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");
-}
-
-fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    if let Some((impact, verdict)) = &summary.verdict {
-        writeln!(out, "touchdown at {:.3} s:", impact.time_s)?;
-        for limit in &verdict.results {
-            let mark = if limit.passed { "ok  " } else { "FAIL" };
-            writeln!(
-                out,
-                "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
-                limit.name, limit.value, limit.unit, limit.lowest, limit.highest
-            )?;
-        }
-    }
-    if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
-        writeln!(
-            out,
-            "controller ticks: median {:.3} ms, p99 {:.3} ms, worst {:.3} ms, {} over their deadline",
-            1e3 * median_s,
-            1e3 * p99_s,
-            1e3 * worst_s,
-            summary.solve_times.missed()
-        )?;
-    }
-    if let Some([median, p99, worst]) = summary.lateness.quantiles() {
-        writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
-    }
-    match &summary.outcome {
-        Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
-        Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
-        Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,
-        Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
-        Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
-    }
-    Ok(())
-}
-
-fn exit_code(outcome: &Outcome) -> ExitCode {
-    ExitCode::from(match outcome {
-        Outcome::Landed => 0,
-        Outcome::OutsideLimits => 3,
-        Outcome::Aborted | Outcome::Refused(_) => 4,
-        Outcome::Stopped => 5,
-    })
-}
-
-#[expect(clippy::disallowed_methods, reason = "a log says when it was begun")]
-fn unix_ns() -> u64 {
-    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    since_epoch.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
 }

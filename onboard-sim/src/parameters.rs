@@ -4,31 +4,33 @@
 //! weights may be read: they come from the profile, which the log holds, so that a replay computes with the same
 //! ones. Limits that keep anybody safe are no parameters. The list never changes in flight.
 
-use flight::profile::Profile;
+use flight::profile::StateWeights;
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::parameter::{ParamId, ParamKey, is_real32, value_message};
 
-use crate::streams::{STANDARD, Streams};
+use crate::streams::Streams;
 
 /// A weight of the landing cost, by its parameter's name.
 struct Weight {
     name: &'static str,
-    of: fn(&Profile) -> f64,
+    of: fn(&StateWeights) -> f64,
 }
 
-/// The weights of the landing cost (the profile's `nmpc.weights`).
+/// The weights of the landing cost (a profile's `nmpc.weights`, a mission's `powered.weights`).
 const WEIGHTS: [Weight; 7] = [
-    Weight { name: "NMPC_W_X", of: |profile| profile.nmpc.weights.x },
-    Weight { name: "NMPC_W_Z", of: |profile| profile.nmpc.weights.z },
-    Weight { name: "NMPC_W_THETA", of: |profile| profile.nmpc.weights.theta },
-    Weight { name: "NMPC_W_U", of: |profile| profile.nmpc.weights.u },
-    Weight { name: "NMPC_W_W", of: |profile| profile.nmpc.weights.w },
-    Weight { name: "NMPC_W_Q", of: |profile| profile.nmpc.weights.q },
-    Weight { name: "NMPC_W_DELTA", of: |profile| profile.nmpc.weights.delta },
+    Weight { name: "NMPC_W_X", of: |weights| weights.x },
+    Weight { name: "NMPC_W_Z", of: |weights| weights.z },
+    Weight { name: "NMPC_W_THETA", of: |weights| weights.theta },
+    Weight { name: "NMPC_W_U", of: |weights| weights.u },
+    Weight { name: "NMPC_W_W", of: |weights| weights.w },
+    Weight { name: "NMPC_W_Q", of: |weights| weights.q },
+    Weight { name: "NMPC_W_DELTA", of: |weights| weights.delta },
 ];
 
 /// How many parameters there are; their places are 0 to this, less one. Rates first, then weights.
-pub const COUNT: u16 = (STANDARD.len() + WEIGHTS.len()) as u16;
+pub fn count(streams: &Streams) -> u16 {
+    (streams.messages().len() + WEIGHTS.len()) as u16
+}
 
 /// Why a parameter keeps its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,28 +42,30 @@ pub struct Refusal {
 }
 
 /// The place of a parameter in the list, if it is there.
-pub fn place_of(key: ParamKey) -> Option<u16> {
+pub fn place_of(key: ParamKey, streams: &Streams) -> Option<u16> {
+    let count = count(streams);
     match key {
-        ParamKey::Index(index) => u16::try_from(index).ok().filter(|index| *index < COUNT),
-        ParamKey::Name(id) => (0..COUNT).find(|place| id.is(name(*place))),
+        ParamKey::Index(index) => u16::try_from(index).ok().filter(|index| *index < count),
+        ParamKey::Name(id) => (0..count).find(|place| id.is(name(*place, streams))),
     }
 }
 
-fn name(place: u16) -> &'static str {
-    let place = usize::from(place);
-    match STANDARD.get(place) {
+fn name(place: u16, streams: &Streams) -> &'static str {
+    let (place, messages) = (usize::from(place), streams.messages());
+    match messages.get(place) {
         Some(stream) => stream.parameter,
-        None => WEIGHTS[place - STANDARD.len()].name,
+        None => WEIGHTS[place - messages.len()].name,
     }
 }
 
-/// PARAM_VALUE of the parameter at a place below [`COUNT`].
-pub fn value(place: u16, streams: &Streams, profile: &Profile) -> MavMessage {
-    let found = match STANDARD.get(usize::from(place)) {
+/// PARAM_VALUE of the parameter at a place below [`count`].
+pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessage {
+    let messages = streams.messages();
+    let found = match messages.get(usize::from(place)) {
         Some(stream) => streams.rate_hz(stream.message_id),
-        None => (WEIGHTS[usize::from(place) - STANDARD.len()].of)(profile),
+        None => (WEIGHTS[usize::from(place) - messages.len()].of)(weights),
     };
-    value_message(name(place), found as f32, place, COUNT)
+    value_message(name(place, streams), found as f32, place, count(streams))
 }
 
 /// Sets a parameter; `may_change` says whether the vehicle stands disarmed on the pad. Returns the parameter's place,
@@ -77,20 +81,20 @@ pub fn set(
     streams: &mut Streams,
     now_s: f64,
 ) -> Result<(u16, Option<Refusal>), Refusal> {
-    let Some(place) = place_of(ParamKey::Name(id)) else {
+    let Some(place) = place_of(ParamKey::Name(id), streams) else {
         let reason = format!("parameter {}: there is none of this name", id.printable());
         return Err(Refusal { error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, reason });
     };
-    let name = name(place);
+    let name = name(place, streams);
     let refuse = |error, why: &str| Some(Refusal { error, reason: format!("{name} not set: {why}") });
-    let refusal = match STANDARD.get(usize::from(place)) {
+    let refusal = match streams.messages().get(usize::from(place)) {
         _ if !is_real32(value_type) => refuse(
             MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH,
             "its type is REAL32 (MAV_PARAM_TYPE 9), as every parameter's here",
         ),
         None => refuse(
             MavParamError::MAV_PARAM_ERROR_READ_ONLY,
-            "it comes from the profile (nmpc.weights); fly another profile",
+            "it comes from the profile (weights of the landing cost); fly another profile",
         ),
         Some(_) if !may_change => {
             refuse(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED, "only while disarmed on the pad")
@@ -110,24 +114,37 @@ pub fn set(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::streams::{FROM_APOGEE, STANDARD};
+
+    fn every() -> [Streams; 2] {
+        [Streams::of(&STANDARD), Streams::of(&FROM_APOGEE)]
+    }
 
     #[test]
     fn names_fit_their_field_and_are_told_apart() {
-        for place in 0..COUNT {
-            assert!((1..=ParamId::MAX_LEN).contains(&name(place).len()), "{}", name(place));
-            assert_eq!(place_of(ParamKey::Name(ParamId::new(name(place)))), Some(place));
-            assert_eq!(place_of(ParamKey::Index(place.cast_signed())), Some(place));
-        }
-        assert!((0..COUNT).any(|place| name(place).len() == ParamId::MAX_LEN), "one has no terminator");
-        for outside in [-2, COUNT.cast_signed(), i16::MAX, i16::MIN] {
-            assert_eq!(place_of(ParamKey::Index(outside)), None);
+        for streams in every() {
+            let count = count(&streams);
+            let name = |place| name(place, &streams);
+            let place_of = |key| place_of(key, &streams);
+            for place in 0..count {
+                assert!((1..=ParamId::MAX_LEN).contains(&name(place).len()), "{}", name(place));
+                assert_eq!(place_of(ParamKey::Name(ParamId::new(name(place)))), Some(place));
+                assert_eq!(place_of(ParamKey::Index(place.cast_signed())), Some(place));
+            }
+            assert!((0..count).any(|place| name(place).len() == ParamId::MAX_LEN), "one has no terminator");
+            for outside in [-2, count.cast_signed(), i16::MAX, i16::MIN] {
+                assert_eq!(place_of(ParamKey::Index(outside)), None);
+            }
         }
     }
 
     #[test]
     fn no_limit_is_a_parameter() {
-        for place in 0..COUNT {
-            assert!(name(place).starts_with("RATE_") || name(place).starts_with("NMPC_W_"));
+        for streams in every() {
+            for place in 0..count(&streams) {
+                let name = name(place, &streams);
+                assert!(name.starts_with("RATE_") || name.starts_with("NMPC_W_"));
+            }
         }
     }
 }

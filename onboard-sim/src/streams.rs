@@ -2,10 +2,12 @@
 
 use mavlink::MessageData as _;
 use protocol::dialect::{
-    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA,
-    HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA,
-    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA,
+    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
+    LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
+    VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
@@ -34,7 +36,7 @@ const fn standard(parameter: &'static str, message_id: u32, payload_len: usize, 
     Standard { message_id, parameter, payload_len, rate_hz }
 }
 
-/// What is sent unasked. In the order in which it is given up when the budget runs short: last first.
+/// What the planar vehicle sends unasked. In the order in which it is given up when the budget runs short: last first.
 pub const STANDARD: [Standard; 16] = [
     standard("RATE_HEARTBEAT", HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
     standard("RATE_FLIGHT_STAT", TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
@@ -61,6 +63,37 @@ pub const STANDARD: [Standard; 16] = [
     standard("RATE_MODE", CURRENT_MODE_DATA::ID, CURRENT_MODE_DATA::ENCODED_LEN, 0.0),
 ];
 
+/// What the rocket from apogee sends unasked, in the same order.
+pub const FROM_APOGEE: [Standard; 20] = [
+    standard("RATE_HEARTBEAT", HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_FLIGHT_STAT", TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
+    standard("RATE_VERDICT", TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
+    // Without its optional offset quaternion, which is never set and therefore cut.
+    standard("RATE_ATTITUDE", ATTITUDE_QUATERNION_DATA::ID, 32, 8.0),
+    standard("RATE_POSITION", LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 8.0),
+    standard("RATE_DESCENT", TD_DESCENT_DATA::ID, TD_DESCENT_DATA::ENCODED_LEN, 4.0),
+    standard("RATE_GIMBAL", TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 8.0),
+    standard("RATE_CONTROLLER", TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 4.0),
+    standard("RATE_FINS", TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 4.0),
+    standard(
+        "RATE_PREDICTION",
+        TD_TOUCHDOWN_PREDICTION_DATA::ID,
+        TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN,
+        2.0,
+    ),
+    standard("RATE_PATH", TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_SYS_STATUS", SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_EXT_STATE", EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_ESTIMATOR", ESTIMATOR_STATUS_DATA::ID, ESTIMATOR_STATUS_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_VFR_HUD", VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
+    standard("RATE_LIMITS", TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+    // Off until asked for.
+    standard("RATE_IMU", HIGHRES_IMU_DATA::ID, HIGHRES_IMU_DATA::ENCODED_LEN, 0.0),
+    standard("RATE_BATTERY", BATTERY_STATUS_DATA::ID, BATTERY_STATUS_DATA::ENCODED_LEN, 0.0),
+    standard("RATE_ACTUATORS", ACTUATOR_OUTPUT_STATUS_DATA::ID, ACTUATOR_PAYLOAD_LEN, 0.0),
+    standard("RATE_MODE", CURRENT_MODE_DATA::ID, CURRENT_MODE_DATA::ENCODED_LEN, 0.0),
+];
+
 #[derive(Debug, Clone, Copy)]
 struct Stream {
     message_id: u32,
@@ -78,22 +111,30 @@ impl Stream {
     }
 }
 
-/// Every stream, in the order of [`STANDARD`].
-pub struct Streams(Vec<Stream>);
+/// Every stream of a craft, in the order of its messages.
+pub struct Streams {
+    messages: &'static [Standard],
+    streams: Vec<Stream>,
+}
 
 impl Streams {
-    /// Every standard message at its default rate.
-    pub fn standard() -> Self {
-        Self::of(0, f64::INFINITY)
+    /// Every message at its default rate.
+    pub fn of(messages: &'static [Standard]) -> Self {
+        Self::at_most(messages, 0, f64::INFINITY)
     }
 
     /// The same where every frame carries a signature: the fastest are slowed down, so that the radio's budget holds.
-    pub fn signed() -> Self {
-        Self::of(SIGNATURE_LEN, SIGNED_RATE_MAX_HZ)
+    pub fn signed(messages: &'static [Standard]) -> Self {
+        Self::at_most(messages, SIGNATURE_LEN, SIGNED_RATE_MAX_HZ)
     }
 
-    fn of(signature_len: usize, rate_max_hz: f64) -> Self {
-        let streams = STANDARD.iter().enumerate().map(|(place, standard)| {
+    /// What is sent.
+    pub fn messages(&self) -> &'static [Standard] {
+        self.messages
+    }
+
+    fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64) -> Self {
+        let streams = messages.iter().enumerate().map(|(place, standard)| {
             let interval_s = (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
             Stream {
                 message_id: standard.message_id,
@@ -104,18 +145,18 @@ impl Streams {
                 due_s: 0.02 * place as f64,
             }
         });
-        Self(streams.collect())
+        Self { messages, streams: streams.collect() }
     }
 
     /// The messages whose time has come, most important first.
     pub fn due(&self, now_s: f64) -> Vec<u32> {
         let due = |stream: &&Stream| stream.interval_s.is_some() && now_s >= stream.due_s;
-        self.0.iter().filter(due).map(|stream| stream.message_id).collect()
+        self.streams.iter().filter(due).map(|stream| stream.message_id).collect()
     }
 
     /// A message was sent, or there was nothing to say in it.
     pub fn on_sent(&mut self, message_id: u32, now_s: f64) {
-        for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
+        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
             let Some(interval_s) = stream.interval_s else { continue };
             // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
             // or held back is not sent twice.
@@ -126,14 +167,14 @@ impl Streams {
 
     /// Sends a message at the next opportunity.
     pub fn hurry(&mut self, message_id: u32) {
-        for stream in self.0.iter_mut().filter(|stream| stream.message_id == message_id) {
+        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.due_s = f64::NEG_INFINITY;
         }
     }
 
     /// Bytes per second of all of them, at their longest.
     pub fn bytes_s(&self) -> f64 {
-        self.0.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
+        self.streams.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
     }
 
     /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
@@ -143,7 +184,7 @@ impl Streams {
         interval_us: f32,
         now_s: f64,
     ) -> (MavResult, Option<String>) {
-        let Some(place) = self.0.iter().position(|stream| stream.message_id == message_id) else {
+        let Some(place) = self.streams.iter().position(|stream| stream.message_id == message_id) else {
             return (
                 MavResult::MAV_RESULT_FAILED,
                 Some(format!("message {message_id} is not sent by this vehicle")),
@@ -151,7 +192,7 @@ impl Streams {
         };
         let wanted = match interval_us {
             -1.0 => None,
-            0.0 => self.0[place].default_interval_s,
+            0.0 => self.streams[place].default_interval_s,
             us if us >= 1.0 && f64::from(us) * 1e-6 <= MAX_INTERVAL_S => Some(f64::from(us) * 1e-6),
             _ => {
                 let reason =
@@ -159,27 +200,27 @@ impl Streams {
                 return (MavResult::MAV_RESULT_DENIED, Some(reason));
             }
         };
-        let default_s = self.0[place].default_interval_s;
+        let default_s = self.streams[place].default_interval_s;
         let vital = matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID);
         if vital && wanted.is_none_or(|interval_s| default_s.is_none_or(|default_s| interval_s > default_s)) {
             let reason = format!("message {message_id}: the crew lives by it; it is not slowed down");
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
         let others: f64 = self
-            .0
+            .streams
             .iter()
             .enumerate()
             .filter(|(other, _)| *other != place)
             .map(|(_, stream)| stream.bytes_s(stream.interval_s))
             .sum();
-        let total = others + self.0[place].bytes_s(wanted);
+        let total = others + self.streams[place].bytes_s(wanted);
         if wanted.is_some() && total > f64::from(RADIO_BUDGET_BYTES_S) {
             let reason = format!(
                 "message {message_id}: {total:.0} B/s in all, the link's budget is {RADIO_BUDGET_BYTES_S}"
             );
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
-        let stream = &mut self.0[place];
+        let stream = &mut self.streams[place];
         stream.interval_s = wanted;
         // A new rate counts from now, also after a long interval.
         if let Some(interval_s) = wanted {
@@ -190,13 +231,13 @@ impl Streams {
 
     /// How often a message is sent, Hz; 0 if it is off or none of ours.
     pub fn rate_hz(&self, message_id: u32) -> f64 {
-        let stream = self.0.iter().find(|stream| stream.message_id == message_id);
+        let stream = self.streams.iter().find(|stream| stream.message_id == message_id);
         stream.and_then(|stream| stream.interval_s).map_or(0.0, |interval_s| 1.0 / interval_s)
     }
 
     /// MESSAGE_INTERVAL of a message.
     pub fn interval_of(&self, message_id: u32) -> MavMessage {
-        let stream = self.0.iter().find(|stream| stream.message_id == message_id);
+        let stream = self.streams.iter().find(|stream| stream.message_id == message_id);
         let interval_us = match stream.map(|stream| stream.interval_s) {
             Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
             Some(None) => -1,

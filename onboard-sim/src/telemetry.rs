@@ -1,10 +1,14 @@
 //! A vehicle's state as MAVLink messages.
 //!
-//! Frames: the pitch plane is north-down of NED; pitch from the horizontal is a rotation about NED's y (east)
-//! axis, so an upright rocket has 90 degrees of pitch. Values are narrowed to the fields' types here and only
-//! here; what does not fit saturates.
+//! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are narrowed to the
+//! fields' types here and only here; what does not fit saturates.
+//!
+//! What is not modelled is told as MAVLink's "unknown", never invented: there is no battery in any craft.
+//!
+//! [`Motion`]: crate::craft::Motion
 
-use flight::dynamics::PlanarState;
+mod space;
+
 use flight::phase::{Interlocks, Phase};
 use mavlink::MessageData as _;
 use mavlink::types::CharArray;
@@ -20,10 +24,8 @@ use protocol::dialect::{
     TdControlLevel, TdInterlock, TdLimit, TdPhase, TdSolverStatus, VFR_HUD_DATA,
 };
 
-use crate::vehicle::{AbortEffect, Snapshot};
+use crate::craft::{AbortEffect, PATH_POINTS, Snapshot};
 
-/// Points of the predicted path in one message.
-const PATH_POINTS: usize = 12;
 /// Deprecated late in 2025, but still what some clients begin with.
 const PROTOCOL_VERSION_ID: u32 = 300;
 
@@ -48,7 +50,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
         TD_PREDICTED_PATH_DATA::ID => predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => landing_verdict(snapshot),
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(touchdown_limits(snapshot)),
-        _ => None,
+        _ => space::message(message_id, snapshot),
     }
 }
 
@@ -89,10 +91,12 @@ fn heartbeat(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn sys_status(snapshot: &Snapshot) -> MavMessage {
+    let (sensors, silent) = space::sensors(snapshot);
     let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
-        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS;
-    let mut healthy = present;
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        | sensors;
+    let mut healthy = present - silent;
     healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
@@ -128,36 +132,43 @@ fn extended_sys_state(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn attitude(snapshot: &Snapshot) -> MavMessage {
-    let half_rad = 0.5 * snapshot.state.theta_rad;
+    let [q1, q2, q3, q4] = snapshot.motion.ned_from_body.map(|part| part as f32);
+    let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        q1: libm::cos(half_rad) as f32,
-        q3: libm::sin(half_rad) as f32,
-        pitchspeed: snapshot.state.q_rad_s as f32,
+        q1,
+        q2,
+        q3,
+        q4,
+        rollspeed,
+        pitchspeed,
+        yawspeed,
         ..ATTITUDE_QUATERNION_DATA::default()
     })
 }
 
 fn position(snapshot: &Snapshot) -> MavMessage {
-    let (x_m_s, up_m_s) = snapshot.state.ground_velocity_m_s();
+    let [x, y, z] = snapshot.motion.position_m.map(|metres| metres as f32);
+    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed| speed as f32);
     MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        x: snapshot.state.x_m as f32,
-        y: 0.0,
-        z: -snapshot.state.z_m as f32,
-        vx: x_m_s as f32,
-        vy: 0.0,
-        vz: -up_m_s as f32,
+        x,
+        y,
+        z,
+        vx,
+        vy,
+        vz,
     })
 }
 
 fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
-    let (x_m_s, up_m_s) = snapshot.state.ground_velocity_m_s();
+    let motion = &snapshot.motion;
+    let [north_m_s, east_m_s, down_m_s] = motion.velocity_m_s;
     MavMessage::VFR_HUD(VFR_HUD_DATA {
-        airspeed: snapshot.state.speed_m_s() as f32,
-        groundspeed: x_m_s.abs() as f32,
-        alt: snapshot.state.z_m as f32,
-        climb: up_m_s as f32,
+        airspeed: motion.airspeed_m_s as f32,
+        groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
+        alt: -motion.position_m[2] as f32,
+        climb: -down_m_s as f32,
         heading: 0,
         throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
     })
@@ -201,7 +212,9 @@ fn actuators(snapshot: &Snapshot) -> MavMessage {
     for (output, angle_rad) in actuator.iter_mut().zip(snapshot.fins_rad.1) {
         *output = (angle_rad / core::f64::consts::FRAC_PI_2) as f32;
     }
-    actuator[4] = (snapshot.gimbal_rad.1 / snapshot.gimbal_limit_rad) as f32;
+    for (output, (_, actual_rad)) in actuator[4..].iter_mut().zip(snapshot.gimbal_rad) {
+        *output = (actual_rad / snapshot.gimbal_limit_rad) as f32;
+    }
     MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA {
         time_usec: (1e6 * snapshot.time_s) as u64,
         active: 0b11_1111,
@@ -269,31 +282,31 @@ fn fins(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn gimbal(snapshot: &Snapshot) -> MavMessage {
-    let (commanded, measured) = snapshot.gimbal_rad;
+    let [pitch, yaw] = snapshot.gimbal_rad;
     MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        pitch_commanded: centidegrees(commanded),
-        pitch_measured: centidegrees(measured),
-        yaw_commanded: 0,
-        yaw_measured: 0,
+        pitch_commanded: centidegrees(pitch.0),
+        pitch_measured: centidegrees(pitch.1),
+        yaw_commanded: centidegrees(yaw.0),
+        yaw_measured: centidegrees(yaw.1),
     })
 }
 
 fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
-    let output = snapshot.output.as_ref()?;
+    let controller = snapshot.controller.as_ref()?;
     let microseconds = |s: f64| (1e6 * s).round();
     Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        tick: output.tick as u32,
-        cost: output.solver.cost as f32,
-        kkt_stationarity: output.solver.kkt_stationarity as f32,
-        kkt_feasibility: output.solver.kkt_feasibility as f32,
+        tick: controller.tick as u32,
+        cost: controller.cost as f32,
+        kkt_stationarity: controller.kkt_stationarity as f32,
+        kkt_feasibility: controller.kkt_feasibility as f32,
         thrust_scale: snapshot.thrust_scale as f32,
         solve_time_us: microseconds(snapshot.solve_time_s) as u32,
         deadline_margin_us: microseconds(snapshot.deadline_s - snapshot.solve_time_s) as i32,
-        iterations: u16::try_from(output.solver.iterations).unwrap_or(u16::MAX),
-        level: td_level(output.level),
-        solver_status: td_status(output.solver.status),
+        iterations: u16::try_from(controller.iterations).unwrap_or(u16::MAX),
+        level: td_level(controller.level),
+        solver_status: td_status(controller.status),
     }))
 }
 
@@ -323,41 +336,37 @@ fn td_status(status: flight::nmpc::SolveStatus) -> TdSolverStatus {
 }
 
 fn touchdown_prediction(snapshot: &Snapshot) -> Option<MavMessage> {
-    let output = snapshot.output.as_ref().filter(|output| output.plan.len > 0)?;
-    let end = &output.predicted_touchdown.state;
+    let prediction = snapshot.prediction.as_ref()?;
+    let end = &prediction.state;
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        time_to_go_ms: (1000.0 * output.predicted_touchdown.time_from_now_s).round() as i32,
+        time_to_go_ms: (1000.0 * prediction.time_to_go_s).round() as i32,
         x_m: end.x_m as f32,
         altitude_m: end.z_m as f32,
         pitch_rad: end.theta_rad as f32,
         u_m_s: end.u_m_s as f32,
         w_m_s: end.w_m_s as f32,
         q_rad_s: end.q_rad_s as f32,
-        limits_violated: TdLimit::from_bits_truncate(snapshot.predicted_violations),
+        limits_violated: TdLimit::from_bits_truncate(prediction.violations),
     }))
 }
 
 fn predicted_path(snapshot: &Snapshot) -> Option<MavMessage> {
-    let states = snapshot.output.as_ref()?.plan.used_states();
-    let last = states.len().checked_sub(1)?;
-    let count = states.len().min(PATH_POINTS);
-    let mut path = TD_PREDICTED_PATH_DATA {
+    let path = snapshot.path.as_ref()?;
+    let along = path.points_m.map(|(along_m, _)| centimetres(along_m));
+    let altitude = path.points_m.map(|(_, up_m)| centimetres(up_m));
+    let [x, altitude]: [[i16; PATH_POINTS]; 2] = [along, altitude];
+    Some(MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        count: count as u8,
-        ..TD_PREDICTED_PATH_DATA::default()
-    };
-    for point in 0..count {
-        // Evenly spread, both ends kept.
-        let state: &PlanarState = &states[last * point / (count - 1).max(1)];
-        path.x[point] = centimetres(state.x_m);
-        path.altitude[point] = centimetres(state.z_m);
-    }
-    Some(MavMessage::TD_PREDICTED_PATH(path))
+        x,
+        altitude,
+        count: path.count as u8,
+    }))
 }
 
 fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
-    let (impact, verdict) = snapshot.verdict.as_ref()?;
+    let judged = snapshot.judged.as_ref()?;
+    let impact = &judged.impact;
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
         time_boot_ms: boot_ms(impact.time_s),
         x_m: impact.state.x_m as f32,
@@ -366,8 +375,8 @@ fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
         u_m_s: impact.state.u_m_s as f32,
         w_m_s: impact.state.w_m_s as f32,
         q_rad_s: impact.state.q_rad_s as f32,
-        limits_violated: TdLimit::from_bits_truncate(crate::vehicle::violations(verdict)),
-        landed: u8::from(verdict.landed()),
+        limits_violated: TdLimit::from_bits_truncate(judged.violations()),
+        landed: u8::from(judged.landed),
     }))
 }
 
@@ -411,6 +420,7 @@ mod tests {
     use flight::profile::Profile;
 
     use super::*;
+    use crate::craft::Craft as _;
     use crate::scatter::draw;
     use crate::vehicle::{DeadlinePolicy, Vehicle};
 

@@ -33,6 +33,8 @@ pub enum Breakage {
     AccelerometerBiasStep(f64),
     /// The radio is silent: nothing on board depends on it.
     LinkLoss,
+    /// What is sent arrives so much later, s, both ways.
+    LinkDelay(f64),
     /// The flight computer is dead for this long, s, and starts again with what it keeps.
     Reboot(f64),
     /// The operator asks for an abort.
@@ -71,6 +73,9 @@ type Build = fn(Option<f64>) -> Option<Breakage>;
 /// Names, what their value is (empty if they take none), and what they make of it.
 const NAMES: &[(&str, &str, Build)] = &[
     ("link-loss", "", |value| value.is_none().then_some(Breakage::LinkLoss)),
+    ("link-delay", "s, 0 to 60", |value| {
+        value.filter(|delay_s| (0.0..=60.0).contains(delay_s)).map(Breakage::LinkDelay)
+    }),
     ("gnss-out", "", |value| value.is_none().then_some(Breakage::GnssOut)),
     ("barometer-out", "", |value| value.is_none().then_some(Breakage::BarometerOut)),
     ("lidar-out", "", |value| value.is_none().then_some(Breakage::LidarOut)),
@@ -193,6 +198,7 @@ impl fmt::Display for TimedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.breakage {
             Breakage::LinkLoss => write!(f, "link-loss"),
+            Breakage::LinkDelay(delay_s) => write!(f, "link-delay:{delay_s}"),
             Breakage::GnssOut => write!(f, "gnss-out"),
             Breakage::BarometerOut => write!(f, "barometer-out"),
             Breakage::LidarOut => write!(f, "lidar-out"),
@@ -226,6 +232,7 @@ mod tests {
             "late-light:0.2@0",
             "reboot:0.5@descent+4",
             "link-loss@0",
+            "link-delay:1.5@descent",
             "accelerometer-bias:50@armed",
         ] {
             assert_eq!(text.parse::<TimedFault>().unwrap().to_string(), text);
@@ -238,6 +245,8 @@ mod tests {
             ("gnss-out", "no `@`"),
             ("gnss@5", "no fault is named `gnss`"),
             ("gnss-out:1@5", "takes no value"),
+            ("link-delay@0", "must be s, 0 to 60"),
+            ("link-delay:-1@0", "must be s, 0 to 60"),
             ("fin-stuck:4@5", "must be 0 to 3"),
             ("fin-stuck:1.5@5", "must be 0 to 3"),
             ("weak-motor@5", "must be thrust over nominal"),

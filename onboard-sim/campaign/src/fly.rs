@@ -1,5 +1,7 @@
 //! One flight, from apogee until it lies still.
 
+use std::time::Duration;
+
 use flight::estimator::{Estimate, Health, HeightSources, Measurements, Sigmas, StartUncertainty};
 use flight::mission::{Mission, MissionError};
 use flight::phase::Phase;
@@ -32,6 +34,15 @@ pub enum FlyError {
     Sensors(#[from] SensorParamError),
 }
 
+/// What the radio between vehicle and ground does, both ways. Nothing on board waits for it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Radio {
+    /// Nothing gets through.
+    pub silent: bool,
+    /// What gets through arrives so much later, s.
+    pub delay_s: f64,
+}
+
 /// One flight in the air. A clone flies on exactly as it does.
 #[derive(Debug, Clone)]
 pub struct Flight {
@@ -43,6 +54,8 @@ pub struct Flight {
     baseline: Option<Baseline>,
     /// Frames that the flight computer is still dead for.
     frames_down: u64,
+    radio: Radio,
+    pilot_took: Duration,
     command: Actuators,
     input: Option<PilotInput>,
     /// What the pilot itself wanted at the last frame.
@@ -93,6 +106,8 @@ impl Flight {
             pilot,
             baseline: None,
             frames_down: 0,
+            radio: Radio::default(),
+            pilot_took: Duration::ZERO,
             input: None,
             piloted: None,
             believed,
@@ -158,6 +173,21 @@ impl Flight {
         self.frames_down = libm::ceil(down_s / frame_s).max(1.0) as u64;
     }
 
+    /// The radio. A campaign has nobody at its other end; a flight on the wire has.
+    pub fn radio(&self) -> &Radio {
+        &self.radio
+    }
+
+    /// The radio, to break it.
+    pub fn radio_mut(&mut self) -> &mut Radio {
+        &mut self.radio
+    }
+
+    /// How long the flight computer took over the last frame, by the stopwatch that [`Flight::step_timed`] was given.
+    pub fn pilot_took(&self) -> Duration {
+        self.pilot_took
+    }
+
     /// What the flight computer was given at the last frame; `None` before the first and while it is dead.
     pub fn input(&self) -> Option<&PilotInput> {
         self.input.as_ref()
@@ -190,6 +220,11 @@ impl Flight {
 
     /// Flies one frame. `false` when there is no more to fly.
     pub fn step(&mut self) -> bool {
+        self.step_timed(&mut || Duration::ZERO)
+    }
+
+    /// The same with a clock of which only differences are used, to time the flight computer.
+    pub fn step_timed(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> bool {
         let mut measured: Option<Measurements> = None;
         for _ in 0..FRAME_MS {
             self.world.step(&self.command);
@@ -221,7 +256,9 @@ impl Flight {
             igniter_continuity: true,
             abort: core::mem::take(&mut self.abort),
         };
+        let began = stopwatch();
         let mut output = self.pilot.step(&input);
+        self.pilot_took = stopwatch().saturating_sub(began);
         self.piloted = Some(output);
         if let Some(baseline) = &mut self.baseline {
             baseline.fly(input.time_s, &self.pilot, &mut output);
@@ -247,7 +284,8 @@ impl Flight {
         self.goes_on()
     }
 
-    fn goes_on(&self) -> bool {
+    /// Whether there is more to fly: it is not at rest, and not to be given up.
+    pub fn goes_on(&self) -> bool {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
     }
 
@@ -277,6 +315,15 @@ impl Flight {
             },
             health: Health::Good,
         }
+    }
+
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` where the truth is
+    /// what the pilot was given, and while its computer is dead.
+    ///
+    /// [`Estimator::nees_of_motion`]: flight::estimator::Estimator::nees_of_motion
+    pub fn nees_of_motion(&self) -> Option<f64> {
+        let measured = matches!(self.input.as_ref()?.sensed, Sensed::Measured(_));
+        measured.then(|| self.pilot.estimator().nees_of_motion(self.world.state())).flatten()
     }
 
     /// Errors of the estimate at this moment.

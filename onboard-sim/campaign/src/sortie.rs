@@ -1,5 +1,7 @@
 //! One flight of a campaign: drawn, flown with its faults by its controller, and written down as a row.
 
+use std::time::Duration;
+
 use flight::controller::ControlLevel;
 use flight::nmpc::SolveStatus;
 use flight::phase::Phase;
@@ -76,10 +78,20 @@ impl Sortie {
         &self.flight
     }
 
+    /// Asks for an abort at the next frame.
+    pub fn abort(&mut self) {
+        self.flight.abort();
+    }
+
     /// Flies one frame. `false` when there is no more to fly.
     pub fn step(&mut self) -> bool {
+        self.step_timed(&mut || Duration::ZERO)
+    }
+
+    /// The same with a clock of which only differences are used, to time the flight computer.
+    pub fn step_timed(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> bool {
         self.injector.step(&mut self.flight);
-        let goes_on = self.flight.step();
+        let goes_on = self.flight.step_timed(stopwatch);
         self.count();
         goes_on
     }

@@ -12,13 +12,20 @@ use crate::estimator::EstimatorConfig;
 use crate::ignition::IgnitionSettings;
 use crate::motors::{self, MotorError};
 use crate::powered::PoweredSettings;
-use crate::profile::{GateLimits, TouchdownBox};
+use crate::profile::{ArmingLimits, GateLimits, TouchdownBox};
 use crate::thrust_curve::ThrustCurve;
+
+/// Length of the countdown, s, where a mission does not say, and at most.
+const COUNTDOWN_S: f64 = 5.0;
+const COUNTDOWN_MAX_S: f64 = 600.0;
 
 /// Where a mission begins: at apogee, nose up.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApogeeStart {
+    /// From the crew's start command to the start, s, 0 to 600.
+    #[serde(default = "countdown_s")]
+    pub countdown_s: f64,
     /// Height of the centre of gravity above the pad, m.
     pub height_m: f64,
     /// Horizontal distance from the pad, m.
@@ -85,6 +92,9 @@ pub struct Mission {
     pub powered: PoweredSettings,
     /// The gimbal loop.
     pub aim: AimGains,
+    /// Limits of the pad checks before arming.
+    #[serde(default)]
+    pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
     /// What counts as a landing: the landing paper's Table 2.
@@ -113,6 +123,14 @@ pub enum MissionError {
         #[source]
         source: AirframeError,
     },
+    /// The countdown is no time to wait.
+    #[error("{origin}: start.countdown_s = {found}: must be 0 to {COUNTDOWN_MAX_S}")]
+    Countdown {
+        /// Where the text came from.
+        origin: String,
+        /// The value found.
+        found: f64,
+    },
     /// The motor is not to be had.
     #[error(transparent)]
     Motor(#[from] MotorError),
@@ -133,8 +151,18 @@ impl Mission {
             .airframe
             .validate()
             .map_err(|source| MissionError::Airframe { origin: origin.to_owned(), source })?;
+        let countdown_s = mission.start.countdown_s;
+        if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
+            return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });
+        }
         mission.motor()?;
         Ok(mission)
+    }
+
+    /// Whether a text is meant as a mission rather than a [profile](crate::profile): a mission names an airframe or
+    /// holds one.
+    pub fn is_meant(text: &str) -> bool {
+        toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
     }
 
     /// The built-in mission of a name.
@@ -149,6 +177,10 @@ impl Mission {
     pub fn motor(&self) -> Result<ThrustCurve, MissionError> {
         Ok(motors::builtin(&self.airframe.motor)?)
     }
+}
+
+fn countdown_s() -> f64 {
+    COUNTDOWN_S
 }
 
 /// An airframe's name, or the airframe itself.

@@ -3,7 +3,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use crate::dynamics::PlanarState;
-use crate::profile::Profile;
+use crate::profile::{Profile, TouchdownBox};
 
 /// What counts as a landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,12 @@ pub struct TouchdownLimits {
 impl TouchdownLimits {
     /// The limits of a profile.
     pub fn from_profile(profile: &Profile) -> Self {
-        let limits = &profile.touchdown_limits;
+        Self::from(&profile.touchdown_limits)
+    }
+}
+
+impl From<&TouchdownBox> for TouchdownLimits {
+    fn from(limits: &TouchdownBox) -> Self {
         Self {
             x_m: limits.x_m,
             altitude_min_m: limits.altitude_min_m,

@@ -165,7 +165,7 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
 }
 
 /// The text of a built-in, or of a file.
-fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
+pub(super) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
     if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
         return Ok((*text).to_owned());
     }

@@ -2,4 +2,5 @@
 
 pub(crate) mod campaign;
 mod cost;
+pub(crate) mod fly;
 mod single;

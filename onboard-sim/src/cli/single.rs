@@ -9,7 +9,7 @@ use campaign::fault::Expected;
 use campaign::order::Order;
 use campaign::row::{COLUMNS, Row, Value};
 use campaign::sortie::Sortie;
-use onboard_sim::from_apogee;
+use onboard_sim::{from_apogee, pilot_log};
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
 
@@ -56,7 +56,7 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
 
 fn fly_logged(order: &Order, number: u64, sortie: &mut Sortie, path: &Path) -> anyhow::Result<()> {
     let recorder = Recorder::create(path, &from_apogee::header(order, number))?;
-    recorder.record(from_apogee::start(sortie.flight()), 0);
+    recorder.record(pilot_log::start(sortie.flight()), 0);
     let mut phase = sortie.flight().pilot().mode().phase;
     loop {
         let goes_on = sortie.step();

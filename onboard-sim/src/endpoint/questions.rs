@@ -7,12 +7,12 @@ use protocol::identity::VEHICLE;
 use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::{MAX_REQUESTED, VehicleEndpoint};
+use crate::craft::{Craft, Severity};
 use crate::parameters;
-use crate::vehicle::{Severity, Vehicle};
 
 impl VehicleEndpoint {
     /// Answers a question about parameters or files; says whether the frame was one.
-    pub(super) fn on_question(&mut self, frame: &Frame, vehicle: &Vehicle) -> bool {
+    pub(super) fn on_question(&mut self, frame: &Frame, vehicle: &dyn Craft) -> bool {
         if let Some(request) = FileRequest::from_frame(frame) {
             if VEHICLE.accepts(request.target) {
                 self.queue(request.decline());
@@ -27,9 +27,9 @@ impl VehicleEndpoint {
         match request.question {
             // From the beginning, also while an earlier list is on its way.
             ParamQuestion::List => self.next_parameter = Some(0),
-            ParamQuestion::Read(key) => match parameters::place_of(key) {
+            ParamQuestion::Read(key) => match parameters::place_of(key, &self.streams) {
                 Some(place) => {
-                    let answer = parameters::value(place, &self.streams, vehicle.profile());
+                    let answer = parameters::value(place, &self.streams, vehicle.weights());
                     self.queue(answer);
                 }
                 None => {
@@ -41,7 +41,7 @@ impl VehicleEndpoint {
                 let now_s = self.last_poll_s;
                 match parameters::set(id, value, value_type, may_change, &mut self.streams, now_s) {
                     Ok((place, refusal)) => {
-                        let answer = parameters::value(place, &self.streams, vehicle.profile());
+                        let answer = parameters::value(place, &self.streams, vehicle.weights());
                         self.answer(&answer);
                         if let Some(refusal) = refusal {
                             self.say(Severity::Warning, &refusal.reason);
@@ -65,12 +65,12 @@ impl VehicleEndpoint {
     }
 
     /// What was asked for and is to be sent next: single messages first, then the list of parameters.
-    pub(super) fn next_requested(&mut self, vehicle: &Vehicle) -> Option<MavMessage> {
+    pub(super) fn next_requested(&mut self, vehicle: &dyn Craft) -> Option<MavMessage> {
         if let Some(message) = self.requested.pop_front() {
             return Some(message);
         }
-        let place = self.next_parameter.filter(|place| *place < parameters::COUNT);
+        let place = self.next_parameter.filter(|place| *place < parameters::count(&self.streams));
         self.next_parameter = place.map(|place| place + 1);
-        place.map(|place| parameters::value(place, &self.streams, vehicle.profile()))
+        place.map(|place| parameters::value(place, &self.streams, vehicle.weights()))
     }
 }

@@ -10,9 +10,9 @@ use protocol::identity::GROUND;
 use protocol::text::Reassembler;
 
 use super::*;
+use crate::craft::LogState;
 use crate::scatter::draw;
-use crate::streams::STANDARD;
-use crate::vehicle::{DeadlinePolicy, LogState};
+use crate::vehicle::{DeadlinePolicy, Vehicle};
 
 struct Bench {
     vehicle: Vehicle,
@@ -81,7 +81,7 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_kept() {
-    let total: f64 = Streams::standard().bytes_s();
+    let total: f64 = Streams::of(&STANDARD).bytes_s();
     assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
     let mut bench = Bench::new();
     let sent = bench.run(10.0);
@@ -111,9 +111,9 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
 
 #[test]
 fn signatures_fit_the_radio_too() {
-    let total = Streams::signed().bytes_s();
+    let total = Streams::signed(&STANDARD).bytes_s();
     assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
-    let mut bench = Bench { endpoint: VehicleEndpoint::signed(), ..Bench::new() };
+    let mut bench = Bench { endpoint: VehicleEndpoint::sending_signed(&STANDARD), ..Bench::new() };
     bench.run(1.0);
     let sent = bench.run(10.0);
     let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + SIGNATURE_LEN).sum();
@@ -278,7 +278,7 @@ fn a_flood_of_requests_does_not_silence_telemetry() {
 fn a_new_phase_is_told_at_once_and_once() {
     let mut bench = Bench::new();
     bench.run(1.03);
-    bench.vehicle.request(crate::vehicle::Request::Arm);
+    bench.vehicle.request(crate::craft::Request::Arm);
     let sent = bench.run(0.1);
     assert_eq!(count(&sent, HEARTBEAT_DATA::ID), 1);
     assert_eq!(count(&sent, TD_FLIGHT_STATUS_DATA::ID), 1);

@@ -3,7 +3,7 @@
 use flight::arming;
 use flight::phase::Phase;
 
-use crate::vehicle::{Request, Vehicle};
+use crate::craft::{Craft, Request};
 
 /// Arms and starts once the checks pass.
 pub(super) struct AutoPilot {
@@ -12,16 +12,13 @@ pub(super) struct AutoPilot {
 }
 
 impl AutoPilot {
-    /// The first controller tick has run by then, or never will.
-    const PATIENCE_S: f64 = 3.0;
-
-    pub(super) fn act(&mut self, vehicle: &mut Vehicle) {
+    pub(super) fn act(&mut self, vehicle: &mut dyn Craft) {
         if !self.wanted || self.refused.is_some() || vehicle.phase() != Phase::PadIdle {
             return;
         }
         let refusal = arming::first_refusal(&vehicle.arming_checks());
         match refusal {
-            Some(reason) if vehicle.time_s() > Self::PATIENCE_S => self.refused = Some(reason),
+            Some(reason) if vehicle.time_s() > vehicle.ready_within_s() => self.refused = Some(reason),
             Some(_) => {}
             None => {
                 let answers = [vehicle.request(Request::Arm), vehicle.request(Request::Start)];

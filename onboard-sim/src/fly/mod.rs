@@ -1,34 +1,35 @@
-//! The run loop: a vehicle, its clock, its links and its log.
+//! The run loop: a craft, its clock, its links and its log.
 
 mod autopilot;
 mod links;
+mod load;
 mod pace;
+mod radio;
 mod recording;
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use flight::mission::MissionError;
 use flight::phase::Phase;
-use flight::profile::{BUILTIN, Profile, ProfileError};
-use flight::verdict::LandingVerdict;
+use flight::profile::ProfileError;
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
-use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
 
 use self::autopilot::AutoPilot;
 use self::links::{Heard, Links};
+pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
 pub use self::pace::Lateness;
 use self::pace::Pace;
+use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
+use crate::craft::{Craft, Judged};
 use crate::endpoint::VehicleEndpoint;
-use crate::plant::Impact;
-use crate::scatter::draw;
 use crate::solve_times::SolveTimes;
-use crate::vehicle::{DeadlinePolicy, Vehicle, VehicleError, VehicleEvent};
+use crate::vehicle::{DeadlinePolicy, VehicleError, VehicleEvent};
 
 /// How fast simulated time runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +57,7 @@ impl std::str::FromStr for Speed {
 /// What to fly.
 pub struct FlyOptions {
     /// What flies.
-    pub profile: LoadedProfile,
+    pub profile: LoadedFlight,
     /// Links to serve; none is allowed.
     pub links: Vec<Endpoint>,
     /// The key that every frame is to be signed with; none is allowed.
@@ -101,7 +102,7 @@ impl LogClock {
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
     /// No such profile.
-    #[error("no profile `{given}`: not a file, and the built-in ones are {}", builtin_names())]
+    #[error("no profile `{given}`: not a file, and the built-in ones are {}", load::builtin_names())]
     NoProfile {
         /// What was asked for.
         given: String,
@@ -117,6 +118,27 @@ pub enum FlyError {
     /// The profile is wrong.
     #[error(transparent)]
     Profile(#[from] ProfileError),
+    /// The mission is wrong.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The mission flies from apogee, where only a start at ignition will do.
+    #[error(
+        "{name} flies from apogee; this takes a profile that starts at ignition: {}",
+        load::planar_names()
+    )]
+    FromApogee {
+        /// The mission.
+        name: String,
+    },
+    /// Late outputs are not dropped in flights from apogee.
+    #[error("{name}: deadlines are enforced in profiles that start at ignition only")]
+    DeadlinePolicy {
+        /// The mission.
+        name: String,
+    },
+    /// The flight from apogee cannot be set up.
+    #[error(transparent)]
+    Rocket(#[from] campaign::fly::FlyError),
     /// The profile cannot be simulated.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
@@ -133,14 +155,10 @@ pub enum FlyError {
     },
 }
 
-fn builtin_names() -> String {
-    BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
-}
-
 /// How a flight ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// Inside every limit.
+    /// Inside every limit; from apogee: inside what the legs take.
     Landed,
     /// On the ground, outside a limit.
     OutsideLimits,
@@ -158,7 +176,9 @@ pub struct FlightSummary {
     /// How it ended.
     pub outcome: Outcome,
     /// Contact and its judgement, if there was one.
-    pub verdict: Option<(Impact, LandingVerdict)>,
+    pub judged: Option<Judged>,
+    /// The same by the landing paper's Table 2, where the former goes by what the legs take.
+    pub judged_by_table_2: Option<Judged>,
     /// Last phase.
     pub phase: Phase,
     /// Simulated time, s.
@@ -169,41 +189,6 @@ pub struct FlightSummary {
     pub lateness: Lateness,
     /// Bytes sent on every link.
     pub tx_bytes: u64,
-}
-
-/// A profile and the text it was read from. The log's header and the flight both come from one reading.
-#[derive(Debug, Clone)]
-pub struct LoadedProfile {
-    /// The profile.
-    pub profile: Profile,
-    /// Its text, for the log.
-    pub toml: String,
-}
-
-/// Reads a profile by built-in name or path.
-///
-/// # Errors
-/// There is no such profile, or it is wrong: the message names the key.
-pub fn load_profile(name_or_path: &str) -> Result<LoadedProfile, FlyError> {
-    let toml = match Profile::builtin_toml(name_or_path) {
-        Some(text) => text.to_owned(),
-        None if !Path::new(name_or_path).exists() => {
-            return Err(FlyError::NoProfile { given: name_or_path.to_owned() });
-        }
-        None => std::fs::read_to_string(name_or_path)
-            .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?,
-    };
-    Ok(LoadedProfile { profile: Profile::from_toml(&toml, name_or_path)?, toml })
-}
-
-/// The header of a flight's log.
-pub fn log_header(writer: &str, loaded: &LoadedProfile, seed: u64, start_unix_ns: u64) -> LogHeader {
-    let run = BTreeMap::from([
-        ("profile".to_owned(), loaded.profile.name.clone()),
-        ("seed".to_owned(), seed.to_string()),
-        ("start_unix_ns".to_owned(), start_unix_ns.to_string()),
-    ]);
-    LogHeader { writer: writer.to_owned(), start_unix_ns, run, profile_toml: Some(loaded.toml.clone()) }
 }
 
 /// Flies, reporting nothing but the summary. See [`fly_observed`].
@@ -226,60 +211,67 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let profile = &options.profile.profile;
-    let mut vehicle = Vehicle::new(profile, draw(profile, options.seed), options.deadline_policy)?;
-    vehicle.pull_pin();
+    let mut craft = options.profile.craft(options.seed, options.deadline_policy)?;
+    let craft: &mut dyn Craft = craft.as_mut();
+    craft.pull_pin();
     let mut links =
         Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
-    let mut endpoint =
-        if options.key_file.is_some() { VehicleEndpoint::signed() } else { VehicleEndpoint::new() };
+    let mut endpoint = match options.key_file {
+        Some(_) => VehicleEndpoint::sending_signed(craft.standard()),
+        None => VehicleEndpoint::sending(craft.standard()),
+    };
+    let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
-    let mut pace = Pace::new(options.speed, vehicle.frame_s());
+    let mut pace = Pace::new(options.speed, craft.frame_s());
     let mut log_state_due_s = 0.0;
     let mut dropped = 0;
 
     let stopped = loop {
-        if vehicle.time_s() >= log_state_due_s {
-            vehicle.set_log_state(log_state(options.recorder.as_ref()));
+        if craft.time_s() >= log_state_due_s {
+            craft.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
         }
-        for heard in links.receive(vehicle.time_s()) {
+        let arrived = links.receive(craft.time_s());
+        for heard in heard.pass(arrived, craft.time_s(), craft.radio()) {
             match heard {
-                Heard::Frame(frame) => endpoint.on_frame(&frame, &mut vehicle),
+                Heard::Frame(frame) => endpoint.on_frame(&frame, craft),
                 Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
-        pilot.act(&mut vehicle);
+        pilot.act(craft);
         let stopwatch = pace.clock();
-        let events = vehicle.advance_frame(&mut || stopwatch.elapsed());
-        let time_s = vehicle.time_s();
+        let events = craft.advance_frame(&mut || stopwatch.elapsed());
+        let time_s = craft.time_s();
         if let Some(clock) = &options.log_clock {
             clock.set(nanoseconds(time_s));
         }
         for event in &events {
             endpoint.on_event(event);
             observe(time_s, event);
-            if let VehicleEvent::Tick(tick) = event {
-                solve_times.add(tick.solve_time_s, tick.deadline_s);
+            match event {
+                VehicleEvent::Tick(tick) => solve_times.add(tick.solve_time_s, tick.deadline_s),
+                VehicleEvent::Planned { took_s, deadline_s } => solve_times.add(*took_s, *deadline_s),
+                _ => {}
             }
         }
-        let snapshot = vehicle.snapshot();
+        let snapshot = craft.snapshot();
         if let Some(recorder) = &options.recorder {
-            record(recorder, &snapshot, &events);
+            record(recorder, craft, &events);
         }
-        for frame in endpoint.poll(&vehicle, &snapshot) {
+        let leaving = endpoint.poll(craft, &snapshot);
+        for frame in sent.pass(leaving, time_s, craft.radio()) {
             links.send(&frame, time_s);
         }
         if links.dropped() > dropped {
             dropped = links.dropped();
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
-        let over = vehicle.is_over() || pilot.refused.is_some();
+        let over = craft.is_over() || pilot.refused.is_some();
         if over && options.exit_when_safed && pace.has_lingered(!options.links.is_empty()) {
             break false;
         }
-        let waiting = over || (vehicle.phase().on_pad() && vehicle.mode().countdown_end_s.is_none());
+        let waiting = over || (craft.phase().on_pad() && craft.mode().countdown_end_s.is_none());
         let crewed = !options.links.is_empty() && !options.auto_start;
         tokio::select! {
             () = pace.wait(waiting && (crewed || over)) => {}
@@ -289,24 +281,23 @@ pub async fn fly_observed(
             }
         }
     };
-    links.close(vehicle.time_s());
-    let verdict = vehicle.verdict().copied();
-    let outcome = match (&verdict, pilot.refused) {
+    links.close(craft.time_s());
+    let outcome = match (craft.judged().map(|judged| judged.landed), pilot.refused) {
         // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
-        _ if vehicle.aborted() => Outcome::Aborted,
-        (Some((_, verdict)), _) if verdict.landed() => Outcome::Landed,
-        (Some(_), _) => Outcome::OutsideLimits,
+        _ if craft.aborted() => Outcome::Aborted,
+        (Some(true), _) => Outcome::Landed,
+        (Some(false), _) => Outcome::OutsideLimits,
         (None, Some(reason)) => Outcome::Refused(reason),
-        (None, None) => {
-            debug_assert!(stopped, "a flight that is over has a verdict, a refusal or an abort");
-            Outcome::Stopped
-        }
+        (None, None) if stopped => Outcome::Stopped,
+        // Given up: it never came down.
+        (None, None) => Outcome::OutsideLimits,
     };
     Ok(FlightSummary {
         outcome,
-        verdict,
-        phase: vehicle.phase(),
-        time_s: vehicle.time_s(),
+        judged: craft.judged(),
+        judged_by_table_2: craft.judged_by_table_2(),
+        phase: craft.phase(),
+        time_s: craft.time_s(),
         solve_times,
         lateness: pace.into_lateness(),
         tx_bytes: links.tx_bytes,

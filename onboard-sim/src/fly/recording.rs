@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use flight::phase::Phase;
 use protocol::frame::Frame;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::log::v1;
 
-use crate::vehicle::{LogState, Severity, Snapshot, VehicleEvent};
+use crate::craft::{Craft, LogState, Severity, VehicleEvent};
 
 pub(super) fn nanoseconds(time_s: f64) -> u64 {
     (1e9 * time_s) as u64
@@ -36,8 +34,8 @@ pub(super) fn note(recorder: Option<&Recorder>, time_s: f64, words: &str) {
     }
 }
 
-pub(super) fn record(recorder: &Recorder, snapshot: &Snapshot, events: &[VehicleEvent]) {
-    let time_ns = nanoseconds(snapshot.time_s);
+pub(super) fn record(recorder: &Recorder, craft: &dyn Craft, events: &[VehicleEvent]) {
+    let time_ns = nanoseconds(craft.time_s());
     for event in events {
         let record = match event {
             VehicleEvent::Tick(tick) => Record::from(tick_log::tick_to_log(
@@ -47,9 +45,12 @@ pub(super) fn record(recorder: &Recorder, snapshot: &Snapshot, events: &[Vehicle
                 tick.solve_time_s,
                 tick.deadline_s,
             )),
-            VehicleEvent::Verdict { impact, verdict } => Record::LandingVerdict(Box::new(
-                tick_log::verdict_to_log(impact.time_s, &impact.state, verdict),
-            )),
+            VehicleEvent::Verdict { impact, verdict, landed } => {
+                let mut record = tick_log::verdict_to_log(impact.time_s, &impact.state, verdict);
+                record.landed = *landed;
+                Record::LandingVerdict(Box::new(record))
+            }
+            VehicleEvent::Planned { .. } => continue,
             VehicleEvent::Text { severity, text } => Record::Event(Event {
                 level: match severity {
                     Severity::Info | Severity::Notice => EventLevel::Info,
@@ -71,26 +72,9 @@ pub(super) fn record(recorder: &Recorder, snapshot: &Snapshot, events: &[Vehicle
             recorder.sync_soon();
         }
     }
-    // The waiting vehicle does not move: once a second and at every change of phase is enough to see that.
-    let moving = !snapshot.phase.on_pad() && snapshot.phase != Phase::Safed;
     let changed = events.iter().any(|event| matches!(event, VehicleEvent::PhaseChanged { .. }));
-    if moving || changed || (snapshot.time_s.fract() < 0.015) {
-        recorder.record(Record::PlantTruth(Box::new(truth(snapshot))), time_ns);
-    }
-}
-
-fn truth(snapshot: &Snapshot) -> v1::PlantTruth {
-    v1::PlantTruth {
-        time_s: snapshot.time_s,
-        phase: u32::from(snapshot.phase.index()),
-        state: tick_log::state_to_log(&snapshot.state),
-        gimbal_commanded_rad: snapshot.gimbal_rad.0,
-        gimbal_actual_rad: snapshot.gimbal_rad.1,
-        fin_commanded_rad: snapshot.fins_rad.0.to_vec(),
-        fin_actual_rad: snapshot.fins_rad.1.to_vec(),
-        thrust_n: snapshot.thrust_n,
-        mass_kg: snapshot.mass_kg,
-        in_contact: snapshot.in_contact,
+    for record in craft.log(changed) {
+        recorder.record(record, time_ns);
     }
 }
 

@@ -10,9 +10,9 @@ use flight::thrust_estimate::ThrustSample;
 use flight::verdict::LandingVerdict;
 
 use super::{
-    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, SELF_TEST_LIMIT_S, SELF_TEST_RAD, SelfTest, Severity,
-    THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
+    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
 };
+use crate::craft::{Craft as _, Judged, TestStep, self_test_failed};
 use crate::plant::Impact;
 
 impl Vehicle {
@@ -70,46 +70,26 @@ impl Vehicle {
         }
     }
 
-    /// Tells the crew on the pad what stands in the way of arming, when that changes.
     fn complain_of_readiness(&mut self) {
-        if self.mode.phase != Phase::PadIdle {
-            return;
-        }
-        let checks = self.arming_checks();
-        let failing = checks.iter().find(|check| !check.passed);
-        let complaint = failing.map(|check| check.name);
-        if complaint != self.readiness_complaint
-            && let Some(reason) = failing.and_then(Check::refusal)
+        if self.mode.phase == Phase::PadIdle
+            && let Some(words) = self.readiness.news(&self.arming_checks())
         {
-            self.say(Severity::Warning, format!("not ready: {reason}"));
+            self.say(Severity::Warning, words);
         }
-        self.readiness_complaint = complaint;
     }
 
-    /// Moves every actuator and brings it back.
     fn test_itself(&mut self, time_s: f64) {
         let closed_rad = self.profile.fins.closed_rad();
-        match self.self_test {
-            SelfTest::NotBegun => {
-                self.plant.command(SELF_TEST_RAD, [closed_rad + SELF_TEST_RAD; 4]);
-                self.self_test = SelfTest::Moved;
-            }
-            SelfTest::Moved if self.actuators_answer() => {
-                self.plant.command(0.0, [closed_rad; 4]);
-                self.self_test = SelfTest::BroughtBack;
-            }
-            SelfTest::BroughtBack if self.actuators_answer() => {
+        match self.self_test.step(self.actuators_answer(), time_s) {
+            TestStep::Command(angle_rad) => self.plant.command(angle_rad, [closed_rad + angle_rad; 4]),
+            TestStep::Passed => {
                 self.happen(Event::SelfTestPassed);
             }
-            SelfTest::Moved | SelfTest::BroughtBack if time_s > SELF_TEST_LIMIT_S => {
+            TestStep::Failed => {
                 let fins = self.fins_answering().iter().filter(|answers| **answers).count();
-                self.say(
-                    Severity::Error,
-                    format!("self-test failed: an actuator does not answer ({fins} of 4 fins do)"),
-                );
-                self.self_test = SelfTest::Failed;
+                self.say(Severity::Error, self_test_failed(fins));
             }
-            SelfTest::Moved | SelfTest::BroughtBack | SelfTest::Failed => {}
+            TestStep::Wait => {}
         }
     }
 
@@ -263,8 +243,9 @@ impl Vehicle {
             .collect();
         let worst = judged.iter().find(|(_, verdict)| !verdict.landed()).or(judged.first());
         if let Some((impact, verdict)) = worst.copied() {
-            self.verdict = Some((impact, verdict));
-            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
+            let landed = verdict.landed();
+            self.verdict = Some(Judged { impact, verdict, landed });
+            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict), landed });
         }
     }
 }

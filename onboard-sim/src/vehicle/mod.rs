@@ -4,28 +4,25 @@
 //! frames ([`Vehicle::frame_s`], 20 ms for a 100 ms sample); a controller tick falls on every few frames.
 //! Its state estimate is the plant's true state and its accelerometer is perfect: sensors are a matter of their own.
 
-mod answer;
-mod events;
+mod craft;
 mod flight_loop;
 mod snapshot;
 #[cfg(test)]
 mod tests;
 
-use std::time::Duration;
-
-use flight::arming::{ArmingInput, Check, arming_checks};
-use flight::controller::{ControlLevel, ControllerConfig, ControllerOutput, ControllerState};
+use flight::arming::Check;
+use flight::controller::{ControllerConfig, ControllerOutput, ControllerState};
 use flight::gate::{GateInput, gate_checks};
-use flight::phase::{Mode, Phase, StartPoint};
+use flight::phase::{Mode, StartPoint};
 use flight::profile::Profile;
 use flight::thrust_estimate::ThrustEstimate;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::verdict::TouchdownLimits;
 
-pub use answer::{Answer, Request, Result};
-pub use events::{Severity, Tick, VehicleEvent};
-pub(crate) use snapshot::violations;
-pub use snapshot::{AbortEffect, Snapshot};
+pub(crate) use craft::LOG_STOPPED;
 
+pub use crate::craft::{Severity, Tick, VehicleEvent};
+
+use crate::craft::{ANSWERING_RAD, Judged, LogState, Readiness, SelfTest};
 use crate::plant::{Impact, Plant, STEP_S};
 use crate::scatter::Draw;
 
@@ -33,12 +30,6 @@ use crate::scatter::Draw;
 const FRAME_MIN_S: f64 = 0.02;
 /// The landing is rehearsed this often while the vehicle waits on the pad.
 const REHEARSAL_PERIOD_S: f64 = 1.0;
-/// Fins and gimbal are moved by this much in the self-test.
-const SELF_TEST_RAD: f64 = 0.05;
-/// An actuator that is farther than this from its command does not answer.
-const ANSWERING_RAD: f64 = 0.02;
-/// The self-test has failed if it has not passed by then.
-const SELF_TEST_LIMIT_S: f64 = 3.0;
 /// Thrust is believed once it has been sensed for this long: one spike is not a burning motor.
 const THRUST_CONFIRM_S: f64 = 0.04;
 /// Time on the ground before everything is shut down.
@@ -67,15 +58,6 @@ pub enum VehicleError {
     },
 }
 
-/// What the vehicle is told of its log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LogState {
-    /// The log is being written; also true where the operator chose to fly without one.
-    pub running: bool,
-    /// Free space for it, bytes.
-    pub space_bytes: u64,
-}
-
 /// How late outputs are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DeadlinePolicy {
@@ -84,15 +66,6 @@ pub enum DeadlinePolicy {
     Observe,
     /// As in hardware: a late output is not applied, the previous plan's next command is.
     Enforce,
-}
-
-/// How far the self-test has come: every actuator is moved and brought back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum SelfTest {
-    NotBegun,
-    Moved,
-    BroughtBack,
-    Failed,
 }
 
 /// One vehicle, one flight.
@@ -116,8 +89,7 @@ pub struct Vehicle {
     self_test: SelfTest,
     /// Since when thrust has been felt without a break.
     thrust_felt_since_s: Option<f64>,
-    /// The arming check that was last complained of.
-    readiness_complaint: Option<&'static str>,
+    readiness: Readiness,
     /// The gate check that was last complained of.
     gate_complaint: Option<&'static str>,
     /// The command that the actuators get at the next sample.
@@ -129,7 +101,7 @@ pub struct Vehicle {
     misses: usize,
     impacts: Vec<Impact>,
     burned_out: bool,
-    verdict: Option<(Impact, LandingVerdict)>,
+    verdict: Option<Judged>,
     events: Vec<VehicleEvent>,
 }
 
@@ -173,7 +145,7 @@ impl Vehicle {
             thrust: ThrustEstimate::default(),
             self_test: SelfTest::NotBegun,
             thrust_felt_since_s: None,
-            readiness_complaint: None,
+            readiness: Readiness::default(),
             gate_complaint: None,
             next_gimbal_rad: 0.0,
             gimbal_applied_rad: 0.0,
@@ -189,88 +161,9 @@ impl Vehicle {
         })
     }
 
-    /// Simulated time, s. A product rather than a sum, so that it does not drift.
-    pub fn time_s(&self) -> f64 {
-        self.frame as f64 * self.frame_s()
-    }
-
     /// Length of a frame, s.
     pub fn frame_s(&self) -> f64 {
         self.profile.nmpc.sample_time_s / self.frames_per_sample as f64
-    }
-
-    /// The phase.
-    pub fn phase(&self) -> Phase {
-        self.mode.phase
-    }
-
-    /// Phase, latches and countdown.
-    pub fn mode(&self) -> &Mode {
-        &self.mode
-    }
-
-    /// The profile.
-    pub fn profile(&self) -> &Profile {
-        &self.profile
-    }
-
-    /// The verdict of the touchdown, with the contact it judges, once there is one.
-    pub fn verdict(&self) -> Option<&(Impact, LandingVerdict)> {
-        self.verdict.as_ref()
-    }
-
-    /// Whether an abort has been accepted.
-    pub fn aborted(&self) -> bool {
-        self.mode.interlocks.abort_latched
-    }
-
-    /// Tells the vehicle how its log fares; a log that stops is announced.
-    pub fn set_log_state(&mut self, log: LogState) {
-        if self.log.running && !log.running {
-            self.say(
-                Severity::Error,
-                "the log has stopped: this flight is no longer recorded whole".to_owned(),
-            );
-        }
-        self.log = log;
-    }
-
-    /// What the crew pulls by hand; the simulation does it when the program starts.
-    pub fn pull_pin(&mut self) {
-        self.happen(flight::phase::Event::PinPulled);
-    }
-
-    /// Advances by one frame. `stopwatch` is any clock; only differences of it are used, to time the controller.
-    pub fn advance_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {
-        self.run_frame(stopwatch);
-        std::mem::take(&mut self.events)
-    }
-
-    /// The arming checks with the values found now.
-    pub fn arming_checks(&self) -> Vec<Check> {
-        let state = self.plant.state();
-        let solver = self.output.as_ref().map(|output| output.solver);
-        let rehearsed = self.output.as_ref().filter(|output| output.level == ControlLevel::Rehearsal);
-        let input = ArmingInput {
-            pin_out: self.mode.interlocks.pin_out,
-            abort_latched: self.mode.interlocks.abort_latched,
-            tilt_rad: state.theta_rad - core::f64::consts::FRAC_PI_2,
-            rotation_rad_s: state.q_rad_s,
-            speed_m_s: state.speed_m_s(),
-            self_test_passed: self.mode.phase != Phase::Safe,
-            // The estimate is the truth.
-            estimator_converged: true,
-            fins_answering: self.fins_answering(),
-            igniter_continuity: self.ignition_sample.is_none(),
-            log_running: self.log.running,
-            log_space_bytes: self.log.space_bytes,
-            controller_warm: solver.is_some_and(|solver| solver.converged()),
-            controller_found: solver.map_or_else(|| "no rehearsal yet".to_owned(), |solver| solver.summary()),
-            predicted_landing: rehearsed
-                .filter(|output| output.plan.len > 0)
-                .map(|output| LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state)),
-        };
-        arming_checks(&self.profile.arming, &input)
     }
 
     /// The ignition gate's checks with the values found now.

@@ -5,7 +5,10 @@ use std::time::Duration;
 use flight::phase::Phase;
 use flight::profile::Profile;
 
+use flight::controller::ControlLevel;
+
 use super::*;
+use crate::craft::{AbortEffect, Craft as _, Request, Result};
 use crate::scatter::draw;
 
 fn still() -> impl FnMut() -> Duration {
@@ -65,8 +68,8 @@ fn the_nominal_flight_passes_its_phases_and_lands_inside_table_2() {
     let expected =
         [Phase::PadArmed, Phase::LandArmed, Phase::Ignition, Phase::Powered, Phase::Touchdown, Phase::Safed];
     assert_eq!(phases(&events), expected);
-    let (impact, verdict) = vehicle.verdict().unwrap();
-    assert!(verdict.landed(), "{impact:?}: {}", verdict.summary());
+    let judged = vehicle.judged().unwrap();
+    assert!(judged.landed && judged.verdict.landed(), "{:?}: {}", judged.impact, judged.verdict.summary());
     assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict { .. })));
 }
 
@@ -206,7 +209,7 @@ fn an_abort_under_thrust_holds_upright_and_never_opens_a_parachute() {
             VehicleEvent::Tick(tick) if tick.output.level == ControlLevel::Stabiliser
         )));
         // Full upright thrust from here climbs and falls back: recorded as what it is.
-        assert!(!vehicle.verdict().unwrap().1.landed());
+        assert!(!vehicle.judged().unwrap().landed);
     }
 }
 
@@ -233,7 +236,7 @@ fn a_gate_that_does_not_open_lights_nothing() {
     vehicle.request(Request::Start);
     let events = run_until(&mut vehicle, Vehicle::is_over);
     assert!(!phases(&events).contains(&Phase::Ignition), "{:?}", phases(&events));
-    assert!(!vehicle.verdict().unwrap().1.landed());
+    assert!(!vehicle.judged().unwrap().landed);
     let gate_words = events.iter().any(|event| {
         matches!(event, VehicleEvent::Text { text, .. } if text.starts_with("ignition gate closed: tilt"))
     });

@@ -63,8 +63,8 @@ fn break_down(flight: &mut Flight, breakage: &Breakage) {
         Breakage::AccelerometerBiasStep(mg) => {
             flight.sensor_faults_mut().accelerometer_bias_step_m_s2 += every * (1e-3 * mg * GRAVITY_M_S2);
         }
-        // A campaign flies without a radio; the flight computer has no input that it would change.
-        Breakage::LinkLoss => {}
+        Breakage::LinkLoss => flight.radio_mut().silent = true,
+        Breakage::LinkDelay(delay_s) => flight.radio_mut().delay_s = delay_s,
         Breakage::Reboot(down_s) => flight.reboot(down_s),
         Breakage::Abort => flight.abort(),
     }

@@ -65,6 +65,7 @@ pub struct Expectation {
 /// What is expected of each fault, on the data as they stand with sensors and a day at the field.
 pub const EXPECTATIONS: &[Expectation] = &[
     expectation("link-loss@0", Expected::Land, "nothing on board waits for the radio"),
+    expectation("link-delay:1@0", Expected::Land, "nor for what comes late; an abort comes late by as much"),
     expectation(
         "gnss-out@5",
         Expected::Degrade,

@@ -146,6 +146,16 @@ impl Pilot {
         self.estimate.as_ref()
     }
 
+    /// The estimator, to compare it with the truth.
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
+    /// The guidance of the landing burn, with the plan that is flown.
+    pub fn powered(&self) -> &PoweredGuidance {
+        &self.powered
+    }
+
     /// What the last plan found.
     pub fn report(&self) -> &PoweredReport {
         self.powered.report()

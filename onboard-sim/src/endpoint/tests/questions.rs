@@ -7,7 +7,7 @@ use protocol::dialect::{
 };
 
 use super::*;
-use crate::parameters::COUNT;
+use crate::parameters;
 
 fn name(text: &str) -> CharArray<16> {
     let mut bytes = [0; 16];
@@ -57,8 +57,9 @@ fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
     }));
     let sent = bench.run(10.0);
     let places: Vec<u16> = values(&sent).iter().map(|value| value.param_index).collect();
-    assert_eq!(places, (0..COUNT).collect::<Vec<_>>());
-    assert!(values(&sent).iter().all(|value| value.param_count == COUNT));
+    let parameters = parameters::count(&Streams::of(&STANDARD));
+    assert_eq!(places, (0..parameters).collect::<Vec<_>>());
+    assert!(values(&sent).iter().all(|value| value.param_count == parameters));
     assert!(count(&sent, ATTITUDE_QUATERNION_DATA::ID) >= 99);
 }
 

@@ -1,4 +1,4 @@
-//! What a vehicle reports as it goes.
+//! What a craft reports as it goes.
 
 use flight::controller::{ControllerInput, ControllerOutput};
 use flight::phase::Phase;
@@ -55,11 +55,20 @@ pub enum VehicleEvent {
     },
     /// The controller ran.
     Tick(Box<Tick>),
+    /// The flight computer from apogee ran a frame with a plan in it.
+    Planned {
+        /// Measured, s.
+        took_s: f64,
+        /// Allowed, s.
+        deadline_s: f64,
+    },
     /// Touched down and judged.
     Verdict {
         /// The contact that was judged.
         impact: Impact,
         /// Limit by limit.
         verdict: Box<LandingVerdict>,
+        /// It landed: inside every limit, and it stands.
+        landed: bool,
     },
 }

@@ -1,0 +1,239 @@
+//! `onboard-sim fly`: one flight, on the wire or by itself.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use campaign::dispersion::{self, Dispersion};
+use campaign::fault::TimedFault;
+use clap::Args;
+use onboard_sim::craft::Judged;
+use onboard_sim::fly::{
+    FlightSummary, FlyOptions, LoadedFlight, Outcome, Speed, fly_observed, load_profile, log_header,
+};
+use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::log::recorder::Recorder;
+use protocol::transport::Endpoint;
+use tokio::sync::watch;
+
+use super::campaign::text_of;
+
+/// The strongest mean wind that can be asked for, m/s.
+const WIND_MAX_M_S: f64 = 30.0;
+
+#[derive(Args)]
+pub(crate) struct FlyArguments {
+    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2) at apogee.
+    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
+    profile: String,
+    /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once.
+    #[arg(long, value_name = "LINK")]
+    mavlink: Vec<Endpoint>,
+    /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Log to write (MCAP). An existing file is not overwritten.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Seed of the dispersions.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// From apogee: which flight of the seed, as in campaign --only.
+    #[arg(long, value_name = "NUMBER")]
+    flight: Option<u64>,
+    /// From apogee: built-in set of dispersions (none, thrust-only, field, harsh) or TOML file [default: field].
+    #[arg(long, value_name = "NAME|FILE")]
+    dispersion: Option<String>,
+    /// From apogee: mean wind 10 m above the ground, m/s, instead of the set's.
+    #[arg(long, value_name = "M_S")]
+    wind: Option<f64>,
+    /// From apogee: break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<TimedFault>,
+    /// Speed of simulated time: a factor, or max.
+    #[arg(long, default_value = "1")]
+    speed: Speed,
+    /// Arm and start without a ground station, also with --mavlink.
+    #[arg(long)]
+    auto_start: bool,
+    /// Keep serving the links after the flight, until interrupted.
+    #[arg(long)]
+    stay: bool,
+    /// Do not apply a controller output that took longer than its sample, as hardware would not.
+    #[arg(long)]
+    enforce_deadline: bool,
+}
+
+pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(fly(arguments))
+}
+
+impl FlyArguments {
+    /// Puts what was asked for into a flight from apogee. A start at ignition has its dispersions in its profile.
+    fn choose(&self, profile: &mut LoadedFlight) -> anyhow::Result<()> {
+        let LoadedFlight::FromApogee(flight) = profile else {
+            let given = [
+                (self.flight.is_some(), "--flight"),
+                (self.dispersion.is_some(), "--dispersion"),
+                (self.wind.is_some(), "--wind"),
+                (!self.faults.is_empty(), "--fault"),
+            ];
+            if let Some((_, option)) = given.iter().find(|(given, _)| *given) {
+                anyhow::bail!(
+                    "{option} is for missions from apogee; {} starts at ignition, and its dispersions are in its profile",
+                    profile.name()
+                );
+            }
+            return Ok(());
+        };
+        let order = &mut flight.order;
+        flight.number = self.flight.unwrap_or(0);
+        order.flights = flight.number.saturating_add(1);
+        if let Some(name) = &self.dispersion {
+            order.dispersion_toml = text_of(name, dispersion::BUILTIN, "set of dispersions")?;
+            order.dispersion = Dispersion::from_toml(&order.dispersion_toml, name)?;
+            order.dispersion_name.clone_from(name);
+        }
+        if let Some(wind_m_s) = self.wind {
+            anyhow::ensure!(
+                (0.0..=WIND_MAX_M_S).contains(&wind_m_s),
+                "--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
+            );
+            order.dispersion.wind_m_s = [wind_m_s; 2];
+            order.dispersion_name = format!("{} with {wind_m_s} m/s of wind", order.dispersion_name);
+        }
+        order.faults.clone_from(&self.faults);
+        Ok(())
+    }
+}
+
+async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
+    let mut profile = load_profile(&arguments.profile)?;
+    arguments.choose(&mut profile)?;
+    let recorder = match &arguments.log {
+        None => None,
+        Some(path) => {
+            let header = log_header("onboard-sim", &profile, arguments.seed, unix_ns());
+            Some(Recorder::create(path, &header)?)
+        }
+    };
+    let options = FlyOptions {
+        profile,
+        auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
+        links: arguments.mavlink,
+        key_file: arguments.key,
+        recorder: recorder.clone(),
+        seed: arguments.seed,
+        speed: arguments.speed,
+        exit_when_safed: !arguments.stay,
+        deadline_policy: if arguments.enforce_deadline {
+            DeadlinePolicy::Enforce
+        } else {
+            DeadlinePolicy::Observe
+        },
+        log_clock: None,
+    };
+    let (stop, stopped) = watch::channel(false);
+    tokio::spawn(async move {
+        interrupted().await;
+        let _ = stop.send(true);
+    });
+    let flown = Box::pin(fly_observed(options, stopped, report_event)).await;
+    let log_path = recorder.as_ref().map(Recorder::finish).transpose();
+    let summary = flown?;
+    print_summary(&summary)?;
+    if let Some(path) = log_path.context("the flight is over, but its log is not whole")? {
+        writeln!(std::io::stdout(), "log {}", path.display())?;
+    }
+    Ok(exit_code(&summary.outcome))
+}
+
+/// Waits for Ctrl-C or a request to terminate.
+async fn interrupted() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
+        let _ = tokio::signal::ctrl_c().await;
+        return;
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        _ = terminate.recv() => {}
+    }
+}
+
+fn report_event(time_s: f64, event: &VehicleEvent) {
+    let words = match event {
+        VehicleEvent::Text { text, .. } => text.clone(),
+        VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
+        VehicleEvent::Tick(_) | VehicleEvent::Planned { .. } | VehicleEvent::Verdict { .. } => return,
+    };
+    // A closed pipe must not end a flight.
+    let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");
+}
+
+fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    if let Some(judged) = &summary.judged {
+        let by = if summary.judged_by_table_2.is_some() { ", by what the legs take" } else { "" };
+        writeln!(out, "touchdown at {:.3} s{by}:", judged.impact.time_s)?;
+        print_limits(&mut out, judged)?;
+    }
+    if let Some(judged) = &summary.judged_by_table_2 {
+        writeln!(out, "by the landing paper's Table 2:")?;
+        print_limits(&mut out, judged)?;
+    }
+    if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
+        writeln!(
+            out,
+            "controller ticks: median {:.3} ms, p99 {:.3} ms, worst {:.3} ms, {} over their deadline",
+            1e3 * median_s,
+            1e3 * p99_s,
+            1e3 * worst_s,
+            summary.solve_times.missed()
+        )?;
+    }
+    if let Some([median, p99, worst]) = summary.lateness.quantiles() {
+        writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
+    }
+    match &summary.outcome {
+        Outcome::Landed if summary.judged_by_table_2.is_some_and(|judged| !judged.landed) => {
+            writeln!(out, "LANDED within what the legs take, outside a limit of Table 2")?;
+        }
+        Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
+        Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
+        Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,
+        Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
+        Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
+    }
+    Ok(())
+}
+
+fn print_limits(out: &mut impl std::io::Write, judged: &Judged) -> std::io::Result<()> {
+    for limit in &judged.verdict.results {
+        let mark = if limit.passed { "ok  " } else { "FAIL" };
+        writeln!(
+            out,
+            "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
+            limit.name, limit.value, limit.unit, limit.lowest, limit.highest
+        )?;
+    }
+    Ok(())
+}
+
+fn exit_code(outcome: &Outcome) -> ExitCode {
+    ExitCode::from(match outcome {
+        Outcome::Landed => 0,
+        Outcome::OutsideLimits => 3,
+        Outcome::Aborted | Outcome::Refused(_) => 4,
+        Outcome::Stopped => 5,
+    })
+}
+
+#[expect(clippy::disallowed_methods, reason = "a log says when it was begun")]
+fn unix_ns() -> u64 {
+    let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    since_epoch.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+}

@@ -1,0 +1,143 @@
+//! What every simulated vehicle is to its run loop and its radio, whatever flies inside.
+//!
+//! Two crafts exist: [`Vehicle`](crate::vehicle::Vehicle), planar and released at ignition, and
+//! [`Rocket`](crate::rocket::Rocket), in space from apogee. Crew, links, telemetry and log meet them here only.
+
+mod answer;
+mod events;
+mod self_test;
+mod snapshot;
+mod words;
+
+use std::time::Duration;
+
+use flight::arming::Check;
+use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
+use flight::profile::StateWeights;
+use protocol::log::record::Record;
+
+pub use answer::{Answer, Request, Result};
+pub use campaign::fly::Radio;
+pub use events::{Severity, Tick, VehicleEvent};
+pub(crate) use self_test::{ANSWERING_RAD, SelfTest, TestStep};
+pub use snapshot::{
+    AbortEffect, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS, Path,
+    Prediction, SensorFacts, Snapshot,
+};
+pub(crate) use snapshot::{bits, violations};
+pub(crate) use words::{DEGRADED, Readiness, self_test_failed, words_of};
+
+use crate::streams::Standard;
+
+/// What a craft is told of its log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogState {
+    /// The log is being written; also true where the operator chose to fly without one.
+    pub running: bool,
+    /// Free space for it, bytes.
+    pub space_bytes: u64,
+}
+
+/// A simulated vehicle with its flight computer.
+///
+/// Pure but for the stopwatch handed to [`Craft::advance_frame`]. Time is simulated and moves in frames.
+pub trait Craft {
+    /// Simulated time since power-up, s.
+    fn time_s(&self) -> f64;
+
+    /// Length of a frame, s.
+    fn frame_s(&self) -> f64;
+
+    /// Phase, latches and countdown.
+    fn mode(&self) -> &Mode;
+
+    /// The phase.
+    fn phase(&self) -> Phase {
+        self.mode().phase
+    }
+
+    /// Whether an abort has been accepted.
+    fn aborted(&self) -> bool {
+        self.mode().interlocks.abort_latched
+    }
+
+    /// Whether nothing more will happen in this flight.
+    fn is_over(&self) -> bool {
+        self.phase() == Phase::Safed || (self.phase().on_pad() && self.aborted())
+    }
+
+    /// Every message that is sent unasked.
+    fn standard(&self) -> &'static [Standard];
+
+    /// Weights of the landing cost.
+    fn weights(&self) -> &StateWeights;
+
+    /// The arming checks with the values found now.
+    fn arming_checks(&self) -> Vec<Check>;
+
+    /// Arming checks pass after this long, s, or never will.
+    fn ready_within_s(&self) -> f64 {
+        3.0
+    }
+
+    /// Length of the countdown, s.
+    fn countdown_s(&self) -> f64;
+
+    /// What the crew pulls by hand; the simulation does it when the program starts.
+    fn pull_pin(&mut self) {
+        self.happen(Event::PinPulled);
+    }
+
+    /// Tells the craft how its log fares; a log that stops is announced.
+    fn set_log_state(&mut self, log: LogState);
+
+    /// Puts an event to the phase table and does what follows from it; returns the refusal, if any.
+    fn happen(&mut self, event: Event) -> Option<Refusal>;
+
+    /// Says something to the crew.
+    fn say(&mut self, severity: Severity, text: String);
+
+    /// The abort as it would be meant now.
+    fn abort_event(&self) -> Event;
+
+    /// Advances by one frame. `stopwatch` is any clock; only differences of it are used, to time the controller.
+    fn advance_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent>;
+
+    /// The state now, for telemetry.
+    fn snapshot(&self) -> Snapshot;
+
+    /// What of this frame belongs into a log beside the events. `changed`: the phase has just changed.
+    fn log(&self, changed: bool) -> Vec<Record>;
+
+    /// The touchdown limits with the values found, once it is judged.
+    fn judged(&self) -> Option<Judged>;
+
+    /// The landing by the landing paper's Table 2, where [`Craft::judged`] goes by what the legs take.
+    fn judged_by_table_2(&self) -> Option<Judged> {
+        None
+    }
+
+    /// What the radio does to what is sent and heard.
+    fn radio(&self) -> Radio {
+        Radio::default()
+    }
+
+    /// Answers a request and acts on it.
+    fn request(&mut self, request: Request) -> Answer {
+        answer::answer(self, request)
+    }
+
+    /// Asked of the phase table itself, so that the words beside the abort key are what it would do.
+    fn abort_effect(&self) -> AbortEffect {
+        let next = transition(self.mode(), self.abort_event(), self.time_s());
+        let does = |effect| next.effects.contains(effect);
+        match () {
+            () if next.refusal.is_some() => AbortEffect::None,
+            () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
+            () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
+            () if next.mode.interlocks.degraded => AbortEffect::UprightOnly,
+            () if does(Effect::IgniteLandingMotor) || does(Effect::RecordLoss) => AbortEffect::BurnOrInhibit,
+            () => AbortEffect::ChuteAtApogee,
+        }
+    }
+}
