@@ -9,7 +9,7 @@ use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use e2e::SerialLine;
+use e2e::{SerialLine, free_port};
 use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
@@ -133,7 +133,7 @@ fn report(name: &str, mut latencies: Vec<Duration>) -> std::io::Result<()> {
 
 fn main() -> Result<(), Failure> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let port = std::net::UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+    let port = free_port();
     let udp = runtime.block_on(receive(
         format!("udpin:127.0.0.1:{port}").parse()?,
         format!("udpout:127.0.0.1:{port}").parse()?,
