@@ -10,9 +10,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use e2e::{BareGround, Program, Running, Signal, program};
-use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TdPhase};
-use protocol::frame::{Encoder, Frame};
+use e2e::{BareGround, Program, Running, Signal, command_frame, free_port, program};
+use protocol::dialect::{MavCmd, TdPhase};
+use protocol::frame::Encoder;
 use protocol::hostile::frame_of;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::signing::{Key, Memory, Signing};
@@ -24,11 +24,6 @@ const VOLLEY_TIME: Duration = Duration::from_millis(10);
 
 fn wanted() -> u64 {
     std::env::var("TOUCHDOWN_HOSTILE_DATAGRAMS").ok().and_then(|count| count.parse().ok()).unwrap_or(ORDINARY)
-}
-
-fn free_port() -> u16 {
-    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
 }
 
 /// Numbers that are the same in every run (Knuth's MMIX generator).
@@ -43,16 +38,6 @@ impl Dice {
     fn bytes(&mut self, most: u64) -> Vec<u8> {
         (0..self.next() % (most + 1)).map(|_| self.next() as u8).collect()
     }
-}
-
-fn command(encoder: &mut Encoder, command: MavCmd, param1: f32) -> Frame {
-    encoder.encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-        command,
-        param1,
-        target_system: VEHICLE.system_id,
-        target_component: VEHICLE.component_id,
-        ..COMMAND_LONG_DATA::default()
-    }))
 }
 
 /// A datagram that nobody honest would send, of the `number`th kind.
@@ -86,11 +71,11 @@ fn hostile(dice: &mut Dice, forger: &mut Signing, ours: &mut Encoder, number: u6
             frame_of(&piece).map_or_else(Vec::new, |frame| frame.as_bytes().to_vec())
         }
         // In the ground's name: unsigned, and signed with another key.
-        5 => command(ours, asked, param1).as_bytes().to_vec(),
-        6 => forger.sign(&command(ours, asked, param1), 0, 1 << 45).as_bytes().to_vec(),
+        5 => command_frame(ours, asked, param1).as_bytes().to_vec(),
+        6 => forger.sign(&command_frame(ours, asked, param1), 0, 1 << 45).as_bytes().to_vec(),
         // A good beginning.
         _ => {
-            let frame = command(ours, asked, param1);
+            let frame = command_frame(ours, asked, param1);
             let cut = (dice.next() as usize) % frame.as_bytes().len();
             frame.as_bytes()[..cut].to_vec()
         }

@@ -9,10 +9,10 @@ use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use e2e::SerialLine;
+use e2e::{SerialLine, free_port};
 use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
-use ground::model::{Model, Role, Settings};
+use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
 use onboard_sim::fly::{FlyOptions, Speed, fly_observed, load_profile};
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
@@ -80,16 +80,7 @@ async fn receive(listening: Endpoint, vehicle: Endpoint) -> Result<Vec<Duration>
     let mut wire = Wire::open(vec![listening], None, clock, None, LogTime::Run(clock)).await?;
     let ticks = Ticks::default();
     let vehicle = start_vehicle(vehicle, &ticks)?;
-    let mut model = Model::new(Settings {
-        link_name: String::new(),
-        link_capacity_bytes_s: None,
-        log_path: None,
-        tlog_path: None,
-        role: Role::Station,
-        auto: false,
-        interactive: true,
-        time_limit: None,
-    });
+    let mut model = Model::new(Settings::on_screen(""));
     let mut latencies = Vec::new();
     let mut beat = tokio::time::interval(Duration::from_millis(100));
     while !vehicle.is_finished() {
@@ -142,7 +133,7 @@ fn report(name: &str, mut latencies: Vec<Duration>) -> std::io::Result<()> {
 
 fn main() -> Result<(), Failure> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let port = std::net::UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+    let port = free_port();
     let udp = runtime.block_on(receive(
         format!("udpin:127.0.0.1:{port}").parse()?,
         format!("udpout:127.0.0.1:{port}").parse()?,

@@ -3,12 +3,7 @@
 
 use std::path::Path;
 
-use e2e::{Program, Running, SerialLine, program};
-
-fn free_port() -> u16 {
-    let socket = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
-}
+use e2e::{Program, Running, SerialLine, free_port, program};
 
 fn links<'a>(option: &'a str, links: &'a [String]) -> impl Iterator<Item = &'a str> {
     links.iter().flat_map(move |link| [option, link.as_str()])

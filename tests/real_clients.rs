@@ -5,12 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use e2e::{Clients, Program, Running, program, raw_frames_of};
-
-fn free_port() -> u16 {
-    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
-}
+use e2e::{Clients, Program, Running, free_port, program, raw_frames_of};
 
 fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);

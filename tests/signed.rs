@@ -1,14 +1,8 @@
 //! Signed links between the real processes.
-#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::Path;
 
-use e2e::{Ended, Program, Running, program};
-
-fn free_port() -> u16 {
-    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
-}
+use e2e::{Ended, Program, Running, free_port, program};
 
 fn keygen(folder: &Path, name: &str) -> Ended {
     Running::to_end(program(Program::OnboardSim).args(["keygen", name]).current_dir(folder))

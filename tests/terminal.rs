@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use e2e::{BareGround, Program, Running, Terminal, program};
+use e2e::{BareGround, Program, Running, Terminal, free_port, program};
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavResult,
@@ -70,10 +70,6 @@ const HANDS: [Hand; 4] = [
 #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
 fn now() -> Instant {
     Instant::now()
-}
-
-fn free_port() -> std::io::Result<u16> {
-    Ok(UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port())
 }
 
 fn ground(folder: &tempfile::TempDir, port: u16, tells_repeats: bool) -> Terminal {
@@ -155,7 +151,7 @@ fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
 
 fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
     let folder = tempfile::tempdir()?;
-    let port = free_port()?;
+    let port = free_port();
     let mut terminal = ground(&folder, port, hand.tells_repeats);
     let socket = UdpSocket::bind("127.0.0.1:0")?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -217,7 +213,7 @@ fn mark(terminal: &Terminal) -> (Instant, Duration, u64) {
 /// A real flight, armed and started by the hand; what the screen cost on the pad and during the landing.
 fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
-    let port = free_port()?;
+    let port = free_port();
     let mut watch = BareGround::new();
     let mut terminal = ground(&folder, port, false);
     let mut vehicle = program(Program::OnboardSim);

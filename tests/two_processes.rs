@@ -1,14 +1,13 @@
 //! Vehicle and ground as processes of their own, over UDP and over a serial line.
-#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use e2e::{Ended, Program, Running, SerialLine, program};
-use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage};
+use e2e::{Ended, Program, Running, SerialLine, command_frame, free_port, program};
+use protocol::dialect::MavCmd;
 use protocol::frame::Encoder;
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::identity::GROUND;
 
 fn vehicle(folder: &Path, link: &str) -> Command {
     let mut command = program(Program::OnboardSim);
@@ -20,11 +19,6 @@ fn ground(folder: &Path, link: &str) -> Command {
     let mut command = program(Program::Ground);
     command.args(["--connect", link, "--headless", "--auto", "--log", "ground.mcap"]).current_dir(folder);
     command
-}
-
-fn free_port() -> u16 {
-    let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.local_addr().unwrap().port()
 }
 
 fn verified(folder: &Path) -> Ended {
@@ -87,14 +81,7 @@ fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
     let mut radio = std::fs::File::options().write(true).open(&line.far).unwrap();
     let mut encoder = Encoder::new(GROUND);
     let mut command = |command, param1| {
-        let message = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-            command,
-            param1,
-            target_system: VEHICLE.system_id,
-            target_component: VEHICLE.component_id,
-            ..COMMAND_LONG_DATA::default()
-        });
-        radio.write_all(encoder.encode(&message).as_bytes()).unwrap();
+        radio.write_all(command_frame(&mut encoder, command, param1).as_bytes()).unwrap();
     };
     flight.wait_for_line("PAD_IDLE");
     command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use divan::Bencher;
 use ground::key::Key;
-use ground::model::{Model, Role, Settings};
+use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
 use ground::view::theme::Theme;
 use ground::view::view;
@@ -22,16 +22,7 @@ const NOW: Duration = Duration::from_mins(1);
 
 /// Under thrust, with a path behind it.
 fn flying() -> Model {
-    let mut model = Model::new(Settings {
-        link_name: "udpin:0.0.0.0:14550".to_owned(),
-        link_capacity_bytes_s: None,
-        log_path: None,
-        tlog_path: None,
-        role: Role::Station,
-        auto: false,
-        interactive: true,
-        time_limit: None,
-    });
+    let mut model = Model::new(Settings::on_screen("udpin:0.0.0.0:14550"));
     let mut encoder = Encoder::new(VEHICLE);
     let heartbeat = HEARTBEAT_DATA { custom_mode: 9, ..HEARTBEAT_DATA::default() };
     let heartbeat = encoder.encode(&MavMessage::HEARTBEAT(heartbeat));

@@ -3,6 +3,8 @@
 //! Each function takes any bytes, makes the most of them, and panics only if a promise is broken. Checksums are put
 //! right, so that what is behind them is reached, too.
 
+use std::io::Cursor;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use crate::command::{CommandAnswer, CommandRequest, CommandSender};
@@ -12,6 +14,10 @@ use crate::ftp::FileRequest;
 use crate::hub::{Hub, News, Received};
 use crate::identity::{Address, GROUND};
 use crate::link::LinkStats;
+use crate::log::reader::LogReader;
+use crate::log::record::{Event, EventLevel, Record};
+use crate::log::v1::OperatorAction;
+use crate::log::writer::{LogHeader, LogWriteError, LogWriter};
 use crate::parameter::ParamRequest;
 use crate::signing::{Key, Memory, Signing};
 use crate::text::{Reassembler, printable};
@@ -120,6 +126,45 @@ pub fn hub(data: &[u8]) {
             }
         }
     }
+}
+
+/// The bytes as a flight log; and a good log with some of its bytes changed: two of place, one of value, and so on.
+///
+/// # Panics
+/// A good log cannot be written to memory, or a log in memory cannot be read to its end.
+pub fn log(data: &[u8]) {
+    read_log(data);
+    let mut changed = GOOD_LOG.clone();
+    for change in data.as_chunks::<3>().0 {
+        let [low, high, value] = *change;
+        let place = usize::from(u16::from_le_bytes([low, high])) % changed.len();
+        changed[place] = value;
+    }
+    read_log(&changed);
+}
+
+/// A few records of each encoding, in two chunks.
+static GOOD_LOG: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let written = || -> Result<Vec<u8>, LogWriteError> {
+        let mut writer = LogWriter::new(Cursor::new(Vec::new()), &LogHeader::default())?;
+        for time_ns in 0..20 {
+            let event =
+                Event { level: EventLevel::Info, name: "hostile".to_owned(), message: "text".to_owned() };
+            writer.write(&Record::Event(event), time_ns)?;
+            let action = OperatorAction { time_s: 1.0, kind: "key".to_owned(), detail: "A".to_owned() };
+            writer.write(&Record::OperatorAction(action), time_ns)?;
+            if time_ns == 10 {
+                writer.flush()?;
+            }
+        }
+        Ok(writer.finish()?.into_inner())
+    };
+    written().expect("memory takes a log")
+});
+
+fn read_log(bytes: &[u8]) {
+    let mut reader = LogReader::new(bytes);
+    while reader.next_item().expect("memory can be read").is_some() {}
 }
 
 /// Signed with a key that is not the hub's.

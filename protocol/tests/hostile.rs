@@ -38,6 +38,14 @@ proptest! {
     }
 
     #[test]
+    fn any_log_is_read(data in prop::collection::vec(any::<u8>(), 0..300), magic: bool) {
+        hostile::log(&data);
+        if magic {
+            hostile::log(&[mcap::MAGIC, &data].concat());
+        }
+    }
+
+    #[test]
     fn any_links_are_carried(kinds in prop::collection::vec(any::<u8>(), 0..12), data in pieces()) {
         // Each piece is led by what kind of thing a link brings.
         let mut bytes = Vec::new();

@@ -114,15 +114,19 @@ impl BareGround {
     /// # Panics
     /// The vehicle has not been heard yet.
     pub fn send_command(&mut self, command: MavCmd, param1: f32) {
-        let message = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-            command,
-            param1,
-            target_system: VEHICLE.system_id,
-            target_component: VEHICLE.component_id,
-            ..COMMAND_LONG_DATA::default()
-        });
-        let frame = self.encoder.encode(&message);
+        let frame = command_frame(&mut self.encoder, command, param1);
         let vehicle = self.vehicle.expect("a vehicle that has been heard");
         self.socket.send_to(frame.as_bytes(), vehicle).expect("sent");
     }
+}
+
+/// COMMAND_LONG to the vehicle.
+pub fn command_frame(encoder: &mut Encoder, command: MavCmd, param1: f32) -> Frame {
+    encoder.encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        command,
+        param1,
+        target_system: VEHICLE.system_id,
+        target_component: VEHICLE.component_id,
+        ..COMMAND_LONG_DATA::default()
+    }))
 }

@@ -158,14 +158,12 @@ fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
 fn settings(hello: &Hello, watch: bool) -> Settings {
     let path = |path: &String| Some(path.clone()).filter(|path| !path.is_empty());
     Settings {
-        link_name: hello.link_name.clone(),
         link_capacity_bytes_s: Some(hello.link_capacity_bytes_s).filter(|most| *most > 0),
         log_path: path(&hello.log_path),
         tlog_path: path(&hello.tlog_path),
         role: if watch { Role::Watching } else { Role::Attached },
         auto: hello.auto,
-        interactive: true,
-        time_limit: None,
+        ..Settings::on_screen(&hello.link_name)
     }
 }
 

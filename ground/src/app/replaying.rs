@@ -29,16 +29,9 @@ const STEP: Duration = Duration::from_millis(100);
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let film = Film::load(path)?;
     let damage = film.damage.clone();
-    let settings = Settings {
-        link_name: path.display().to_string(),
-        link_capacity_bytes_s: None,
-        log_path: Some(path.display().to_string()),
-        tlog_path: None,
-        role: Role::Replaying,
-        auto: false,
-        interactive: true,
-        time_limit: None,
-    };
+    let name = path.display().to_string();
+    let settings =
+        Settings { log_path: Some(name.clone()), role: Role::Replaying, ..Settings::on_screen(name) };
     let mut player = Player::new(film, settings);
     match cli.from {
         None => {}

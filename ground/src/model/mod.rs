@@ -55,6 +55,22 @@ pub struct Settings {
     pub time_limit: Option<Duration>,
 }
 
+impl Settings {
+    /// A station with a person at its screen, and nothing else: no log, a link of unknown capacity, no time limit.
+    pub fn on_screen(link_name: impl Into<String>) -> Self {
+        Self {
+            link_name: link_name.into(),
+            link_capacity_bytes_s: None,
+            log_path: None,
+            tlog_path: None,
+            role: Role::Station,
+            auto: false,
+            interactive: true,
+            time_limit: None,
+        }
+    }
+}
+
 /// What this screen may do.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Role {

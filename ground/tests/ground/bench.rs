@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{Model, Role, Settings};
+use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
 use ground::view::theme::Theme;
 use ground::view::view;
@@ -351,16 +351,8 @@ impl Bench {
 }
 
 pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
-    Settings {
-        link_name: "udpin:127.0.0.1:14550".to_owned(),
-        link_capacity_bytes_s: None,
-        log_path: Some("flight.mcap".to_owned()),
-        tlog_path: None,
-        role: Role::Station,
-        auto,
-        interactive,
-        time_limit: None,
-    }
+    let log_path = Some("flight.mcap".to_owned());
+    Settings { log_path, auto, interactive, ..Settings::on_screen("udpin:127.0.0.1:14550") }
 }
 
 pub(crate) fn is_arm(command: &COMMAND_LONG_DATA) -> bool {

@@ -17,6 +17,18 @@ use super::record::{
 use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
 
+/// The log's own messages.
+const LOG: Package = Package { name: "touchdown.log.v1", descriptors: DESCRIPTORS_V1 };
+/// The flight computer's.
+const FLIGHT: Package = Package { name: "touchdown.flight.v1", descriptors: DESCRIPTORS_FLIGHT_V1 };
+
+/// A protobuf package and the descriptors of its messages.
+#[derive(Clone, Copy)]
+struct Package {
+    name: &'static str,
+    descriptors: &'static [u8],
+}
+
 /// Small chunks lose little when the process is killed.
 const CHUNK_BYTES: u64 = 64 * 1024;
 
@@ -105,10 +117,10 @@ impl<W: Write + Seek> LogWriter<W> {
         let log_time = self.start_unix_ns.saturating_add(time_ns);
         match record {
             Record::ControllerTick(tick) => {
-                self.write_v1(TOPIC_CONTROLLER_TICK, "ControllerTick", tick.as_ref(), log_time)
+                self.write_message(TOPIC_CONTROLLER_TICK, (LOG, "ControllerTick"), tick.as_ref(), log_time)
             }
             Record::PlantTruth(truth) => {
-                self.write_v1(TOPIC_PLANT_TRUTH, "PlantTruth", truth.as_ref(), log_time)?;
+                self.write_message(TOPIC_PLANT_TRUTH, (LOG, "PlantTruth"), truth.as_ref(), log_time)?;
                 self.write_foxglove(
                     TOPIC_TRANSFORM,
                     &transform(truth, log_time),
@@ -117,25 +129,25 @@ impl<W: Write + Seek> LogWriter<W> {
                 )
             }
             Record::LandingVerdict(verdict) => {
-                self.write_v1(TOPIC_VERDICT, "LandingVerdict", verdict.as_ref(), log_time)
+                self.write_message(TOPIC_VERDICT, (LOG, "LandingVerdict"), verdict.as_ref(), log_time)
             }
             Record::Telemetry(telemetry) => {
-                self.write_v1(TOPIC_TELEMETRY, "Telemetry", telemetry.as_ref(), log_time)
+                self.write_message(TOPIC_TELEMETRY, (LOG, "Telemetry"), telemetry.as_ref(), log_time)
             }
             Record::OperatorAction(action) => {
-                self.write_v1(TOPIC_OPERATOR, "OperatorAction", action, log_time)
+                self.write_message(TOPIC_OPERATOR, (LOG, "OperatorAction"), action, log_time)
             }
             Record::PilotStart(start) => {
-                self.write_flight(TOPIC_PILOT_START, "PilotStart", start.as_ref(), log_time)
+                self.write_message(TOPIC_PILOT_START, (FLIGHT, "PilotStart"), start.as_ref(), log_time)
             }
             Record::PilotTick(tick) => {
-                self.write_flight(TOPIC_PILOT_TICK, "PilotTick", tick.as_ref(), log_time)
+                self.write_message(TOPIC_PILOT_TICK, (FLIGHT, "PilotTick"), tick.as_ref(), log_time)
             }
             Record::Estimate(estimate) => {
-                self.write_flight(TOPIC_ESTIMATE, "Estimate", estimate.as_ref(), log_time)
+                self.write_message(TOPIC_ESTIMATE, (FLIGHT, "Estimate"), estimate.as_ref(), log_time)
             }
             Record::TruthSample(truth) => {
-                self.write_flight(TOPIC_TRUTH_SAMPLE, "TruthSample", truth.as_ref(), log_time)
+                self.write_message(TOPIC_TRUTH_SAMPLE, (FLIGHT, "TruthSample"), truth.as_ref(), log_time)
             }
             Record::RawFrame(frame) => self.write_raw(frame, log_time),
             Record::Event(event) => self.write_foxglove(
@@ -164,43 +176,19 @@ impl<W: Write + Seek> LogWriter<W> {
         Ok(self.writer.into_inner())
     }
 
-    fn write_v1<M: prost::Message>(
-        &mut self,
-        topic: &'static str,
-        message_name: &str,
-        message: &M,
-        log_time: u64,
-    ) -> Result<(), LogWriteError> {
-        let schema = format!("touchdown.log.v1.{message_name}");
-        self.write_message(topic, (&schema, DESCRIPTORS_V1), message, log_time)
-    }
-
-    fn write_flight<M: prost::Message>(
-        &mut self,
-        topic: &'static str,
-        message_name: &str,
-        message: &M,
-        log_time: u64,
-    ) -> Result<(), LogWriteError> {
-        let schema = format!("touchdown.flight.v1.{message_name}");
-        self.write_message(topic, (&schema, DESCRIPTORS_FLIGHT_V1), message, log_time)
-    }
-
     fn write_message<M: prost::Message>(
         &mut self,
         topic: &'static str,
-        schema: (&str, &[u8]),
+        (package, message_name): (Package, &str),
         message: &M,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
-        let mut buffer = std::mem::take(&mut self.buffer);
-        buffer.clear();
-        buffer.reserve(message.encoded_len());
-        message.encode_raw(&mut buffer);
-        let channel = self.channel(topic, "protobuf", Some(schema), &BTreeMap::new())?;
-        let written = self.put(channel, log_time, &buffer);
-        self.buffer = buffer;
-        written
+        let name = format!("{}.{message_name}", package.name);
+        self.write_protobuf(topic, Some((&name, package.descriptors)), log_time, |buffer| {
+            buffer.reserve(message.encoded_len());
+            message.encode_raw(buffer);
+            Ok(())
+        })
     }
 
     fn write_foxglove<M: foxglove::Encode>(
@@ -210,11 +198,23 @@ impl<W: Write + Seek> LogWriter<W> {
         schema: Option<&foxglove::Schema>,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
+        let schema = schema.map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        self.write_protobuf(topic, schema, log_time, |buffer| {
+            let encoded = message.encode(buffer);
+            encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })
+        })
+    }
+
+    fn write_protobuf(
+        &mut self,
+        topic: &'static str,
+        schema: Option<(&str, &[u8])>,
+        log_time: u64,
+        encode: impl FnOnce(&mut Vec<u8>) -> Result<(), LogWriteError>,
+    ) -> Result<(), LogWriteError> {
         let mut buffer = std::mem::take(&mut self.buffer);
         buffer.clear();
-        let encoded = message.encode(&mut buffer);
-        encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })?;
-        let schema = schema.as_ref().map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        encode(&mut buffer)?;
         let channel = self.channel(topic, "protobuf", schema, &BTreeMap::new())?;
         let written = self.put(channel, log_time, &buffer);
         self.buffer = buffer;
