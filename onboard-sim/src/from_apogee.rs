@@ -17,16 +17,12 @@ use protocol::log::writer::LogHeader;
 use tick_log::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
 use world::Touchdown;
 
-/// The log's run fact with the text of the dispersions.
-pub const RUN_DISPERSION_TOML: &str = "dispersion_toml";
-
 /// A flight of a campaign has no day: its log begins at the epoch, so that the same flight gives the same log.
 pub fn header(order: &Order, number: u64) -> LogHeader {
     let faults = order.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     let run = [
         ("profile", order.mission.name.clone()),
         ("dispersion", order.dispersion_name.clone()),
-        (RUN_DISPERSION_TOML, order.dispersion_toml.clone()),
         ("seed", order.seed.to_string()),
         ("flight", number.to_string()),
         ("controller", order.controller.name().to_owned()),
@@ -38,16 +34,20 @@ pub fn header(order: &Order, number: u64) -> LogHeader {
         start_unix_ns: 0,
         run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
         profile_toml: Some(order.mission_toml.clone()),
+        scenario_toml: Some(order.dispersion_toml.clone()),
     }
 }
 
-/// The dispersions that a log's run facts name: their text, or of a log without it the built-in of the name.
+/// The dispersions of a log: by its scenario's text, or of a log without one the built-in that its run facts name.
 ///
 /// # Errors
 /// The text is no set of dispersions, or no built-in has the name.
-pub fn dispersion_of(run: &BTreeMap<String, String>) -> Result<Dispersion, DispersionError> {
+pub fn dispersion_of(
+    run: &BTreeMap<String, String>,
+    scenario_toml: Option<&str>,
+) -> Result<Dispersion, DispersionError> {
     let name = run.get("dispersion").map_or("", String::as_str);
-    match run.get(RUN_DISPERSION_TOML) {
+    match scenario_toml {
         Some(text) => Dispersion::from_toml(text, name),
         None => Dispersion::builtin(name),
     }

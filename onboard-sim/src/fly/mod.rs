@@ -203,7 +203,13 @@ pub fn log_header(writer: &str, loaded: &LoadedProfile, seed: u64, start_unix_ns
         ("seed".to_owned(), seed.to_string()),
         ("start_unix_ns".to_owned(), start_unix_ns.to_string()),
     ]);
-    LogHeader { writer: writer.to_owned(), start_unix_ns, run, profile_toml: Some(loaded.toml.clone()) }
+    LogHeader {
+        writer: writer.to_owned(),
+        start_unix_ns,
+        run,
+        profile_toml: Some(loaded.toml.clone()),
+        scenario_toml: None,
+    }
 }
 
 /// Flies, reporting nothing but the summary. See [`fly_observed`].

@@ -45,11 +45,7 @@ impl Wind {
 
     /// This wind with the mean and the gust intensity of another; the gusts themselves go on.
     pub(crate) fn changed(&self, other: &Self) -> Self {
-        Self {
-            gusts: self.gusts.as_strong_as(&other.gusts),
-            now_m_s: self.now_m_s,
-            ..other.clone()
-        }
+        Self { gusts: self.gusts.as_strong_as(&other.gusts), now_m_s: self.now_m_s, ..other.clone() }
     }
 
     /// Mean wind at a height above ground, in the world, m/s.
