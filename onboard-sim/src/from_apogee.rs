@@ -16,20 +16,23 @@ use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use world::Touchdown;
 
-use crate::pilot_log::{self, RUN_DISPERSION_TOML};
+use crate::pilot_log;
 
 /// A flight of a campaign has no day: its log begins at the epoch, so that the same flight gives the same log.
 pub fn header(order: &Order, number: u64) -> LogHeader {
     pilot_log::header("onboard-sim campaign", order, number, 0)
 }
 
-/// The dispersions that a log's run facts name: their text, or of a log without it the built-in of the name.
+/// The dispersions of a log: by its scenario's text, or of a log without one the built-in that its run facts name.
 ///
 /// # Errors
 /// The text is no set of dispersions, or no built-in has the name.
-pub fn dispersion_of(run: &BTreeMap<String, String>) -> Result<Dispersion, DispersionError> {
+pub fn dispersion_of(
+    run: &BTreeMap<String, String>,
+    scenario_toml: Option<&str>,
+) -> Result<Dispersion, DispersionError> {
     let name = run.get("dispersion").map_or("", String::as_str);
-    match run.get(RUN_DISPERSION_TOML) {
+    match scenario_toml {
         Some(text) => Dispersion::from_toml(text, name),
         None => Dispersion::builtin(name),
     }

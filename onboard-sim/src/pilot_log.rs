@@ -10,16 +10,12 @@ use protocol::log::record::Record;
 use protocol::log::writer::LogHeader;
 use tick_log::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
 
-/// The log's run fact with the text of the dispersions.
-pub const RUN_DISPERSION_TOML: &str = "dispersion_toml";
-
 /// The header of such a log.
 pub fn header(writer: &str, order: &Order, number: u64, start_unix_ns: u64) -> LogHeader {
     let faults = order.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     let run = [
         ("profile", order.mission.name.clone()),
         ("dispersion", order.dispersion_name.clone()),
-        (RUN_DISPERSION_TOML, order.dispersion_toml.clone()),
         ("seed", order.seed.to_string()),
         ("flight", number.to_string()),
         ("controller", order.controller.name().to_owned()),
@@ -31,6 +27,7 @@ pub fn header(writer: &str, order: &Order, number: u64, start_unix_ns: u64) -> L
         start_unix_ns,
         run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
         profile_toml: Some(order.mission_toml.clone()),
+        scenario_toml: Some(order.dispersion_toml.clone()),
     }
 }
 

@@ -112,6 +112,8 @@ pub const METADATA_BUILD: &str = "build";
 pub const METADATA_RUN: &str = "run";
 /// Name of the attachment that holds the profile's whole text.
 pub const ATTACHMENT_PROFILE: &str = "profile.toml";
+/// Name of the attachment that holds the whole text of what chance was drawn from.
+pub const ATTACHMENT_SCENARIO: &str = "scenario.toml";
 /// Name of the attachment that holds the dialect.
 pub const ATTACHMENT_DIALECT: &str = "touchdown.xml";
 

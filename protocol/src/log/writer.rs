@@ -9,10 +9,10 @@ use mcap::records::MessageHeader;
 
 use super::build::build_info;
 use super::record::{
-    ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, Direction, ENCODING_MAVLINK, METADATA_BUILD, METADATA_RUN,
-    RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
-    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM,
-    TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
+    ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
+    METADATA_RUN, RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR,
+    TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY,
+    TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
 };
 use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
@@ -43,6 +43,8 @@ pub struct LogHeader {
     pub run: BTreeMap<String, String>,
     /// The profile's whole text, when the program knows it.
     pub profile_toml: Option<String>,
+    /// The whole text of what chance was drawn from, when there is one.
+    pub scenario_toml: Option<String>,
 }
 
 /// Why a log could not be written.
@@ -70,7 +72,7 @@ pub struct LogWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> LogWriter<W> {
-    /// Starts a log: header, build and run metadata, profile and dialect attachments.
+    /// Starts a log: header, build and run metadata, profile, scenario and dialect attachments.
     ///
     /// # Errors
     /// The underlying writer failed.
@@ -99,6 +101,9 @@ impl<W: Write + Seek> LogWriter<W> {
         };
         if let Some(profile) = &header.profile_toml {
             attach(ATTACHMENT_PROFILE, "application/toml", profile)?;
+        }
+        if let Some(scenario) = &header.scenario_toml {
+            attach(ATTACHMENT_SCENARIO, "application/toml", scenario)?;
         }
         attach(ATTACHMENT_DIALECT, "application/xml", DIALECT_XML)?;
         Ok(Self {

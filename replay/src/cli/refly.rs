@@ -42,7 +42,7 @@ pub(super) struct FlownHow {
     #[command(flatten)]
     pub(super) settings: SettingArguments,
     /// Another setting of the plant alone, which the controller does not know of. Of a planar landing motor.thrust_n=31,
-    /// plant.thrust_scale=0.97 (it has no wind); of a flight from apogee airframe.motor=AeroTech_G12ST,
+    /// plant.thrust_scale=0.97 (it has no wind); of a flight from apogee airframe.motor=G33,
     /// truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     plant: Vec<Setting>,

@@ -93,7 +93,7 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
         writer: "replay".to_owned(),
         start_unix_ns: start_us.saturating_mul(1000),
         run: BTreeMap::from([("imported_from".to_owned(), input.display().to_string())]),
-        profile_toml: None,
+        ..LogHeader::default()
     };
     let write = |source| ImportError::Write { path: output.to_owned(), source };
     let mut writer = LogWriter::new(BufWriter::new(file), &header).map_err(write)?;

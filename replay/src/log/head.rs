@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use protocol::log::build::build_info;
 use protocol::log::reader::LogItem;
-use protocol::log::record::{ATTACHMENT_PROFILE, METADATA_BUILD, METADATA_RUN};
+use protocol::log::record::{ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RUN};
 use serde::Serialize;
 
 /// Metadata and attachments.
@@ -18,6 +18,8 @@ pub struct Head {
     pub run: BTreeMap<String, String>,
     /// The profile's whole text, or what kept it from being text.
     pub profile_toml: Option<Result<String, std::string::FromUtf8Error>>,
+    /// The whole text of what chance was drawn from.
+    pub scenario_toml: Option<String>,
     /// Every attachment.
     pub attachments: Vec<AttachmentFacts>,
 }
@@ -67,8 +69,10 @@ impl Head {
             LogItem::Metadata { name, entries } if name == METADATA_RUN => self.run.extend(entries),
             LogItem::Attachment { name, data } => {
                 self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
-                if name == ATTACHMENT_PROFILE {
-                    self.profile_toml = Some(String::from_utf8(data));
+                match name.as_str() {
+                    ATTACHMENT_PROFILE => self.profile_toml = Some(String::from_utf8(data)),
+                    ATTACHMENT_SCENARIO => self.scenario_toml = String::from_utf8(data).ok(),
+                    _ => {}
                 }
             }
             _ => {}

@@ -85,7 +85,8 @@ impl<'a> AtStart<'a> {
             number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
         };
         let (seed, number) = (number_of("seed")?, number_of("flight")?);
-        let dispersion = from_apogee::dispersion_of(run).map_err(|error| lacking(error.to_string()))?;
+        let dispersion = from_apogee::dispersion_of(run, recording.head.scenario_toml.as_deref())
+            .map_err(|error| lacking(error.to_string()))?;
         let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
         let controller = from_apogee::controller_of(run).ok_or_else(unknown)?;
         let faults = run.get("faults").map_or("", String::as_str).split_whitespace();

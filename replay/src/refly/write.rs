@@ -89,7 +89,13 @@ fn header(
         }
     });
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
-    LogHeader { writer: "replay".to_owned(), start_unix_ns: start.unwrap_or(0), run, profile_toml: profile }
+    LogHeader {
+        writer: "replay".to_owned(),
+        start_unix_ns: start.unwrap_or(0),
+        run,
+        profile_toml: profile,
+        scenario_toml: recording.head.scenario_toml.clone(),
+    }
 }
 
 /// Every record with its vehicle time, s, in order.

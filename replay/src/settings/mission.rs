@@ -141,7 +141,7 @@ mod tests {
             "no setting `powered.wieghts.theta`: did you mean `powered.weights.theta`?"
         );
         assert!(refusal("airframe.mass.loaded=1").contains("`airframe.mass.loaded_kg`"));
-        assert!(refusal("airframe.motor=AeroTech_X1").contains("AeroTech_X1"));
+        assert!(refusal("airframe.motor=X1").contains("X1"));
     }
 
     #[test]

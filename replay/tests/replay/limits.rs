@@ -132,7 +132,8 @@ proptest! {
         let recording = Recording::open(&path).unwrap();
         prop_assert_eq!(recording.ticks.len(), 30);
         let evaluated = evaluate(&recording, &["nmpc.weights.w=90".parse().unwrap()]).unwrap();
-        prop_assert!(evaluated.ticks.iter().all(|tick| tick.evaluated.gimbal_rad.is_finite()));
+        let gimbal_rad = |tick: &replay::evaluate::EvaluatedTick| tick.evaluated.gimbal_rad.clone();
+        prop_assert!(evaluated.ticks.iter().flat_map(gimbal_rad).all(f64::is_finite));
         prop_assert_eq!(tick(&recording, 20).unwrap().tick, 20);
         for start in [StartAt::Landing, StartAt::Tick(12)] {
             let options = ReflyOptions { start, ..ReflyOptions::default() };

@@ -97,7 +97,7 @@ mod tests {
         let mut changed = world.changed(world.airframe(), &motor, &calm).unwrap();
         changed.step(&IGNITED);
         assert!(changed.wind_m_s().norm() < 1e-300);
-        let other = motors::builtin("AeroTech_G12ST").unwrap();
+        let other = motors::builtin("G33").unwrap();
         let changed = world.changed(world.airframe(), &other, world.truth()).unwrap();
         let since_s = world.time_s() - world.thrust_begins_s().unwrap();
         assert!((changed.thrust_n() - 0.9 * 1.03 * other.thrust_at_n(since_s)).abs() < 1e-9);

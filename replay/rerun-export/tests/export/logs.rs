@@ -29,6 +29,7 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
         start_unix_ns: START_UNIX_NS,
         run: BTreeMap::from([("start_unix_ns".to_owned(), START_UNIX_NS.to_string())]),
         profile_toml: Profile::builtin_toml(PROFILE).map(str::to_owned),
+        ..LogHeader::default()
     };
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
     let event = Event {

@@ -1,0 +1,363 @@
+//! A whole flight from apogee, as a campaign logs it: every what-if question asked of it.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use campaign::baseline::Controller;
+use campaign::dispersion::Dispersion;
+use campaign::order::Order;
+use campaign::sortie::Sortie;
+use flight::mission::Mission;
+use flight::phase::Phase;
+use onboard_sim::from_apogee;
+use protocol::log::record::Record;
+use protocol::log::writer::LogWriter;
+use replay::evaluate::{EvaluateError, evaluate};
+use replay::log::Recording;
+use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
+use replay::settings::Setting;
+use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
+use replay::tick::tick;
+use replay::verify::{Outcome, verify};
+use tempfile::TempDir;
+
+use crate::command_line::{replay, run};
+
+const NUMBER: u64 = 3;
+
+pub(crate) struct Logged {
+    directory: TempDir,
+    pub(crate) log: PathBuf,
+    landed: bool,
+}
+
+/// Flight 3 of the campaign with field dispersions and seed 1; it lands.
+pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| {
+    let order = order();
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("apogee.mcap");
+    let mut sortie = Sortie::new(&order, NUMBER).unwrap();
+    let file = std::fs::File::create(&log).unwrap();
+    let mut writer = LogWriter::new(file, &from_apogee::header(&order, NUMBER)).unwrap();
+    writer.write(&from_apogee::start(sortie.flight()), 0).unwrap();
+    let mut phase = sortie.flight().pilot().mode().phase;
+    loop {
+        let goes_on = sortie.step();
+        for record in from_apogee::frame(sortie.flight(), phase) {
+            writer.write(&record, from_apogee::time_ns(sortie.flight())).unwrap();
+        }
+        phase = sortie.flight().pilot().mode().phase;
+        if !goes_on {
+            break;
+        }
+    }
+    let verdict = Box::new(from_apogee::verdict(sortie.flight()).unwrap());
+    writer.write(&Record::LandingVerdict(verdict), from_apogee::time_ns(sortie.flight())).unwrap();
+    writer.finish().unwrap();
+    Logged { directory, log, landed: sortie.row().legs }
+});
+
+fn order() -> Order {
+    let toml = |texts: &[(&str, &str)], name: &str| {
+        texts.iter().find(|(known, _)| *known == name).unwrap().1.to_owned()
+    };
+    let mission_toml = toml(flight::mission::BUILTIN, "mk2");
+    let dispersion_toml = toml(campaign::dispersion::BUILTIN, "field");
+    Order {
+        mission: Mission::from_toml(&mission_toml, "mk2").unwrap(),
+        mission_toml,
+        dispersion: Dispersion::from_toml(&dispersion_toml, "field").unwrap(),
+        dispersion_name: "field".to_owned(),
+        dispersion_toml,
+        seed: 1,
+        flights: 10,
+        controller: Controller::Nmpc,
+        faults: Vec::new(),
+    }
+}
+
+impl Logged {
+    pub(crate) fn recording(&self) -> Recording {
+        Recording::open(&self.log).unwrap()
+    }
+}
+
+fn settings(given: &[&str]) -> Vec<Setting> {
+    given.iter().map(|text| text.parse().unwrap()).collect()
+}
+
+fn with(given: &[&str]) -> ReflyOptions {
+    ReflyOptions { settings: settings(given), ..ReflyOptions::default() }
+}
+
+fn with_plant(given: &[&str]) -> ReflyOptions {
+    ReflyOptions { plant_settings: settings(given), ..ReflyOptions::default() }
+}
+
+#[test]
+fn it_landed_and_verifies() {
+    assert!(LANDED.landed && LANDED.recording().verdict.unwrap().landed);
+    let report = verify(&LANDED.log).unwrap();
+    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+}
+
+#[test]
+fn nothing_changed_decides_nothing_else() {
+    let report = evaluate(&LANDED.recording(), &[]).unwrap();
+    assert!(report.kind.starts_with("open loop"));
+    assert_eq!((report.commands_different, report.levels_different), (0, 0));
+    assert!(report.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
+    assert!(report.phases.iter().all(|phase| phase.recorded_s == phase.evaluated_s));
+}
+
+#[test]
+fn other_settings_command_otherwise_from_their_time_on() {
+    let recording = LANDED.recording();
+    let ignited_s = evaluate(&recording, &[]).unwrap().phases;
+    let entered =
+        |name: &str| ignited_s.iter().find(|phase| phase.phase == name).unwrap().recorded_s.unwrap();
+    let from_s = entered("POWERED") + 1.0;
+    let setting = format!("powered.weights.theta=300@{from_s:?}");
+    let report = evaluate(&recording, &settings(&[&setting])).unwrap();
+    assert!(report.commands_different > 100, "{}", report.commands_different);
+    assert!(report.ticks.iter().all(|tick| tick.time_s >= from_s || tick.recorded == tick.evaluated));
+    // Lighting at a fixed height moves the ignition and nothing before it.
+    let report = evaluate(&recording, &settings(&["ignition.fixed_height_m=90.0"])).unwrap();
+    let ignition = report.phases.iter().find(|phase| phase.phase == "IGNITION").unwrap();
+    assert!(ignition.evaluated_s.unwrap() < ignition.recorded_s.unwrap(), "{ignition:?}");
+    // The estimator can be set up otherwise from the beginning on, not in flight.
+    let report = evaluate(&recording, &settings(&["estimator.barometer_offset_walk_m_sqrt_s=1.0"])).unwrap();
+    assert!(report.fins_difference_max_rad > 0.0);
+}
+
+#[test]
+fn what_the_flight_computer_does_not_have_is_refused() {
+    let recording = LANDED.recording();
+    let refused = |given| evaluate(&recording, &settings(&[given])).unwrap_err();
+    assert!(matches!(refused("leg_limits.tilt_deg=3.0"), EvaluateError::NotTheControllers { .. }));
+    assert!(matches!(refused("truth.wind_m_s=3.0"), EvaluateError::NotTheControllers { .. }));
+    assert!(matches!(refused("estimator.frame_s=0.01"), EvaluateError::SampleTime { .. }));
+    assert!(matches!(refused("estimator.frame=1@3"), EvaluateError::TimedEstimator { .. }));
+    let message = refused("powered.weihgts.theta=1").to_string();
+    assert!(message.contains("did you mean `powered.weights.theta`?"), "{message}");
+}
+
+/// Flown again from its landing, from frames before and during the burn: bit for bit the recorded flight.
+#[test]
+fn nothing_changed_flies_the_same_bit_for_bit() {
+    let recording = LANDED.recording();
+    let starts = [
+        StartAt::Landing,
+        StartAt::Tick(1),
+        StartAt::Time(5.0),
+        StartAt::Phase(Phase::AeroDescent),
+        StartAt::Phase(Phase::Powered),
+    ];
+    for start in starts {
+        let (report, flown) =
+            refly_flight(&recording, &ReflyOptions { start: start.clone(), ..ReflyOptions::default() })
+                .unwrap();
+        assert!(report.kind.starts_with("closed loop"));
+        let reached = report.reached.unwrap();
+        assert_eq!((reached.identical, reached.first_different), (reached.frames, None), "{start:?}");
+        assert_eq!(report.commands_identical, report.ticks, "{start:?}");
+        assert_eq!(reached.frames + report.ticks, recording.frames.len(), "{start:?}");
+        assert_eq!(flown.verdict, recording.verdict, "{start:?}");
+        assert_eq!(report.verdict_changed, Some(false));
+        let again = flown.records.iter().filter_map(|(_, record)| match record {
+            Record::PilotTick(tick) => Some(tick.as_ref()),
+            _ => None,
+        });
+        assert!(again.eq(&recording.frames), "{start:?}");
+    }
+}
+
+#[test]
+fn another_day_turns_the_verdict() {
+    let recording = LANDED.recording();
+    let report = refly(&recording, &with_plant(&["truth.impulse_scale=0.7"])).unwrap();
+    assert_eq!((report.verdict_changed, report.thrust_scale.to_bits()), (Some(true), 0.7_f64.to_bits()));
+    assert!(report.margin.unwrap() < 0.0);
+    // Wind and motor from the burn on; the controller is told of neither.
+    for given in ["truth.wind_m_s=14", "airframe.motor=G33"] {
+        let options = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..with_plant(&[given]) };
+        let report = refly(&recording, &options).unwrap();
+        assert_eq!(report.reached.unwrap().first_different, None);
+        assert!(report.gimbal_difference_max_rad > 0.0, "{given}");
+    }
+    let other = ReflyOptions { seed: Some(9), ..ReflyOptions::default() };
+    assert!(refly(&recording, &other).unwrap().commands_identical < recording.frames.len());
+}
+
+#[test]
+fn another_controller_flies_the_burn() {
+    let recording = LANDED.recording();
+    let flown_by = |law| refly(&recording, &ReflyOptions { law, ..ReflyOptions::default() });
+    let same = flown_by(Law::Nmpc).unwrap();
+    assert_eq!((same.commands_identical, same.verdict_changed), (same.ticks, Some(false)));
+    for law in [Law::OpenLoop, Law::Oscillating] {
+        let report = flown_by(law).unwrap();
+        assert!(report.commands_identical < report.ticks, "{law:?}");
+    }
+    let refusal = flown_by(Law::Stabiliser).unwrap_err().to_string();
+    assert!(refusal.contains("stabiliser is of a planar landing"), "{refusal}");
+    let planar = crate::simulated::NOMINAL.recording();
+    let refusal = refly(&planar, &ReflyOptions { law: Law::OpenLoop, ..ReflyOptions::default() });
+    assert!(refusal.unwrap_err().to_string().contains("open-loop is of a flight from apogee"));
+}
+
+#[test]
+fn what_cannot_be_flown_again_is_said() {
+    let mut recording = LANDED.recording();
+    let refusal = |start| {
+        refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap_err().to_string()
+    };
+    assert!(refusal(StartAt::Tick(99_999)).contains("no frame 99999; there are 1 to"));
+    assert!(refusal(StartAt::Time(1e6)).contains("the last is at"));
+    assert!(refusal(StartAt::Phase(Phase::Chute)).contains("no frame in phase CHUTE"));
+    let refused = |options: &ReflyOptions| refly(&recording, options).unwrap_err().to_string();
+    assert!(refused(&with(&["powered.gimball_deg=3"])).contains("`powered.gimbal_deg`"));
+    assert!(refused(&with_plant(&["truth.wind=3"])).contains("`truth.wind_m_s`"));
+    assert!(refused(&with_plant(&["truth.wind_m_s=3@4"])).contains("from the beginning"));
+    assert!(refused(&with_plant(&["truth.wind_m_s=99"])).contains("0 to 60 is accepted"));
+    assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
+    recording.head.run.remove("flight");
+    let message = refly(&recording, &ReflyOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("apogee.mcap") && message.contains("`flight`"), "{message}");
+}
+
+/// A log that this build's world no longer gives: its forged frame is named, and the flight is flown on all the same.
+#[test]
+fn another_flight_before_the_start_is_named() {
+    let mut recording = LANDED.recording();
+    recording.frames[99].state_digest ^= 1;
+    let report = refly(&recording, &ReflyOptions::default()).unwrap();
+    let reached = report.reached.unwrap();
+    assert_eq!((reached.first_different, reached.frames - reached.identical), (Some(100), 1));
+}
+
+#[test]
+fn a_flight_flown_again_is_a_log_that_verifies() {
+    let recording = LANDED.recording();
+    for (name, options) in [
+        ("same.mcap", ReflyOptions::default()),
+        ("weights.mcap", with(&["powered.weights.theta=200", "powered.gimbal_deg=4.0@9"])),
+        ("weak.mcap", with_plant(&["truth.impulse_scale=0.9"])),
+        (
+            "timed.mcap",
+            ReflyOptions { law: Law::OpenLoop, start: StartAt::Tick(1), ..ReflyOptions::default() },
+        ),
+    ] {
+        let (report, flown) = refly_flight(&recording, &options).unwrap();
+        let path = LANDED.directory.path().join(name);
+        write_log(&path, &recording, &options, &report, &flown).unwrap();
+        let verified = verify(&path).unwrap();
+        assert_eq!((verified.outcome, verified.first_divergence), (Outcome::Identical, None), "{name}");
+        let again = Recording::open(&path).unwrap();
+        assert_eq!(again.verdict, flown.verdict, "{name}");
+        assert_eq!(again.truth.len(), 0);
+        assert!(evaluate(&again, &[]).unwrap().commands_different == 0, "{name}");
+        let refusal = refly(&again, &ReflyOptions::default()).unwrap_err().to_string();
+        assert!(refusal.contains("fly that one again"), "{refusal}");
+    }
+}
+
+/// Every frame that plans, solved again alone: the same landing, and the warm start is worth its name.
+#[test]
+fn every_plan_solved_again_is_the_flown_one() {
+    let recording = LANDED.recording();
+    let (mut plans, mut warm_iterations, mut cold_iterations) = (0, 0, 0);
+    let powered: Vec<u64> = recording
+        .frames
+        .iter()
+        .filter(|tick| tick.output.phase == u32::from(Phase::Powered.index()))
+        .map(|tick| tick.input.frame)
+        .filter(|frame| frame.is_multiple_of(40))
+        .collect();
+    for frame in powered {
+        let report = tick(&recording, frame).unwrap();
+        assert!(report.identical, "frame {frame}");
+        let Some((warm, cold)) = report.warm.zip(report.cold) else { continue };
+        plans += 1;
+        warm_iterations += warm.iterations;
+        cold_iterations += cold.iterations;
+        assert_eq!(
+            report.path.len(),
+            report.path.iter().filter(|point| point.gimbal_rad.is_some()).count() + 1
+        );
+        assert!(report.active.iter().any(|constraint| constraint.what == "z_m = 0.0000"), "frame {frame}");
+    }
+    assert!(plans > 5 && warm_iterations < cold_iterations, "{plans}: {warm_iterations}, {cold_iterations}");
+    let between = tick(&recording, 3).unwrap();
+    assert!(between.identical && between.warm.is_none() && between.path.is_empty());
+    let refusal = tick(&recording, 99_999).unwrap_err().to_string();
+    assert!(refusal.contains("no tick 99999 that can be re-executed; there are 1 to"), "{refusal}");
+}
+
+#[test]
+fn a_sweep_does_not_depend_on_jobs() {
+    let flights = [LANDED.recording(), crate::simulated::NOMINAL.recording()];
+    let points = grid(&[], &["truth.impulse_scale=0.8:1.0:3".parse().unwrap()]).unwrap();
+    let fly = |flights: &[Recording], count: usize| {
+        let jobs = NonZeroUsize::new(count).unwrap();
+        let mut state = State::in_memory(points.len() * flights.len());
+        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut state, &mut |_| {})
+    };
+    let one = fly(&flights[..1], 1).unwrap();
+    assert_eq!(one, fly(&flights[..1], 3).unwrap());
+    assert!(one.points[2].worst_margin.unwrap() < one.points[0].worst_margin.unwrap());
+    // A setting that one of the flights does not have ends the sweep.
+    assert!(fly(&flights, 2).unwrap_err().to_string().contains("truth.impulse_scale"));
+}
+
+/// The verdict really is another on the two sides of the value found.
+#[test]
+fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
+    let recording = LANDED.recording();
+    let options = BisectOptions {
+        path: "truth.impulse_scale".to_owned(),
+        plant_alone: true,
+        value: None,
+        from: 0.6,
+        to: 1.2,
+        steps: 4,
+        refly: ReflyOptions::default(),
+    };
+    let report = bisect(&recording, &options).unwrap();
+    let drawn = refly(&recording, &ReflyOptions::default()).unwrap().thrust_scale;
+    assert_eq!((report.value.to_bits(), report.outcome.landed), (drawn.to_bits(), true));
+    let flip = report.below.unwrap();
+    let prepared = Prepared::new(&recording, &ReflyOptions::default()).unwrap();
+    let landed = |scale: f64| {
+        let options = with_plant(&[&format!("truth.impulse_scale={scale:?}")]);
+        prepared.fly(&options).unwrap().reflown.unwrap().landed
+    };
+    assert!(landed(flip.same_at) && !landed(flip.other_at), "{flip:?}");
+}
+
+#[test]
+fn every_question_answers_by_the_command() {
+    let log = &LANDED.log;
+    let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0"]));
+    assert!(code == 0 && stdout.contains("open loop") && stdout.contains("POWERED"), "{stdout}{stderr}");
+    let (code, stdout, _) = run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0", "--csv"]));
+    assert!(code == 0 && stdout.starts_with("tick,time_s,recorded_phase"), "{stdout}");
+    assert!(stdout.lines().next().unwrap().contains("evaluated_gimbal_rad_1"), "{stdout}");
+    let (code, stdout, stderr) = run(replay("refly", log).args(["--plant", "truth.impulse_scale=0.7"]));
+    assert!(code == 0 && stdout.contains("the verdict CHANGES"), "{stdout}{stderr}");
+    assert!(stdout.contains("recorded frames identical") && stdout.contains("vertical speed"), "{stdout}");
+    let (code, stdout, _) = run(replay("refly", log).args(["--controller", "oscillating"]));
+    assert!(code == 0 && stdout.contains("flown by oscillating"), "{stdout}");
+    let planning =
+        LANDED.recording().frames.iter().rev().map(|tick| tick.input.frame).find(|frame| {
+            frame.is_multiple_of(10) && tick(&LANDED.recording(), *frame).unwrap().warm.is_some()
+        });
+    let (code, stdout, _) = run(replay("tick", log).arg(planning.unwrap().to_string()));
+    assert!(code == 0 && stdout.contains("identical bit for bit") && stdout.contains("cold"), "{stdout}");
+    let (code, stdout, stderr) =
+        run(replay("sweep", log).args(["--vary", "powered.weights.theta=80,100", "--csv", "--jobs", "2"]));
+    assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
+    let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
+    assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
+}
