@@ -24,7 +24,7 @@ use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
 pub use self::pace::Lateness;
 use self::pace::Pace;
-use self::radio::Delayed;
+pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
 use crate::craft::{Craft, Judged};
 use crate::endpoint::VehicleEndpoint;

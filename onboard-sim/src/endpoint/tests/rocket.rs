@@ -7,31 +7,50 @@ use protocol::dialect::{
 };
 
 use super::*;
-use crate::fly::{LoadedFlight, load_profile};
+use crate::fly::{Delayed, LoadedFlight, load_profile};
 use crate::rocket::Rocket;
 use crate::streams::FROM_APOGEE;
 
 struct Airborne {
     rocket: Rocket,
     endpoint: VehicleEndpoint,
+    /// What the ground sends now.
+    uplink: Vec<Frame>,
+    heard: Delayed<Frame>,
+    sent: Delayed<Frame>,
 }
 
 impl Airborne {
     fn on_the_pad(dispersion: &str) -> Self {
+        Self::with_faults(dispersion, &[])
+    }
+
+    fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
         let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").unwrap() else {
             panic!("from apogee")
         };
         flight.order.dispersion = Dispersion::builtin(dispersion).unwrap();
+        flight.order.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
         let mut rocket = Rocket::new(&flight).unwrap();
         rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
         rocket.pull_pin();
-        let mut airborne = Self { rocket, endpoint: VehicleEndpoint::sending(&FROM_APOGEE) };
+        let mut airborne = Self {
+            rocket,
+            endpoint: VehicleEndpoint::sending(&FROM_APOGEE),
+            uplink: Vec::new(),
+            heard: Delayed::default(),
+            sent: Delayed::default(),
+        };
         airborne.run_while(|rocket| rocket.snapshot().checks_failed != 0);
         airborne
     }
 
     fn let_go(dispersion: &str) -> Self {
-        let mut airborne = Self::on_the_pad(dispersion);
+        Self::let_go_with_faults(dispersion, &[])
+    }
+
+    fn let_go_with_faults(dispersion: &str, faults: &[&str]) -> Self {
+        let mut airborne = Self::with_faults(dispersion, faults);
         airborne.rocket.request(crate::craft::Request::Arm);
         airborne.rocket.request(crate::craft::Request::Start);
         airborne.run_while(|rocket| rocket.phase().on_pad());
@@ -41,10 +60,16 @@ impl Airborne {
     fn run_while(&mut self, mut holds: impl FnMut(&Rocket) -> bool) -> Vec<Frame> {
         let mut sent = Vec::new();
         while holds(&self.rocket) {
+            let time_s = self.rocket.time_s();
+            let uplink = std::mem::take(&mut self.uplink);
+            for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
+                self.endpoint.on_frame(&frame, &mut self.rocket);
+            }
             for event in self.rocket.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            sent.extend(self.endpoint.poll(&self.rocket, &self.rocket.snapshot()));
+            let leaving = self.endpoint.poll(&self.rocket, &self.rocket.snapshot());
+            sent.extend(self.sent.pass(leaving, self.rocket.time_s(), self.rocket.radio()));
         }
         sent
     }
@@ -151,4 +176,52 @@ fn what_is_off_can_be_asked_for_and_what_is_not_modelled_is_unknown() {
         panic!("not the battery")
     };
     assert_eq!((battery.voltages[0], battery.current_battery, battery.battery_remaining), (u16::MAX, -1, -1));
+}
+
+fn abort() -> Frame {
+    Encoder::new(GROUND).encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1: 1.0,
+        command: MavCmd::MAV_CMD_DO_FLIGHTTERMINATION,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    }))
+}
+
+/// Outcome: it lands as if nothing had happened; aborts that are not heard change nothing.
+#[test]
+fn a_link_that_is_lost_changes_nothing_about_the_flight() {
+    let mut lost = Airborne::let_go_with_faults("field", &["link-loss@descent"]);
+    lost.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
+    lost.run(0.01);
+    let mut sent = Vec::new();
+    while !lost.rocket.is_over() {
+        lost.uplink.push(abort());
+        sent.extend(lost.run(0.5));
+    }
+    assert!(sent.is_empty(), "{} frames through a silent radio", sent.len());
+    assert!(!lost.rocket.aborted());
+    let mut whole = Airborne::let_go("field");
+    whole.run_while(|rocket| !rocket.is_over());
+    assert_eq!(lost.rocket.judged(), whole.rocket.judged());
+    assert!(lost.rocket.judged().unwrap().landed);
+}
+
+/// Outcome: what is asked for happens, later by as much; its answer comes later by twice that.
+#[test]
+fn over_a_late_link_an_abort_comes_late_and_is_still_an_abort() {
+    let mut late = Airborne::let_go_with_faults("field", &["link-delay:1.5@descent"]);
+    late.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
+    late.run(0.5);
+    let asked_at_s = late.rocket.time_s();
+    late.uplink.push(abort());
+    late.run_while(|rocket| rocket.phase() != Phase::Chute);
+    let heard_after_s = late.rocket.time_s() - asked_at_s;
+    assert!((1.5..1.52).contains(&heard_after_s), "{heard_after_s}");
+    let mut answered_after_s = None;
+    while answered_after_s.is_none() {
+        let answers = late.run(0.02).iter().filter_map(CommandAnswer::from_frame).count();
+        answered_after_s = (answers > 0).then(|| late.rocket.time_s() - asked_at_s);
+    }
+    assert!((3.0..3.05).contains(&answered_after_s.unwrap()), "{answered_after_s:?}");
 }
