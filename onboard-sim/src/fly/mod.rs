@@ -286,11 +286,10 @@ pub async fn fly_observed(
         // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
         _ if craft.aborted() => Outcome::Aborted,
         (Some(true), _) => Outcome::Landed,
-        (Some(false), _) => Outcome::OutsideLimits,
         (None, Some(reason)) => Outcome::Refused(reason),
         (None, None) if stopped => Outcome::Stopped,
-        // Given up: it never came down.
-        (None, None) => Outcome::OutsideLimits,
+        // Judged so, or given up: it never came down.
+        (Some(false) | None, _) => Outcome::OutsideLimits,
     };
     Ok(FlightSummary {
         outcome,
