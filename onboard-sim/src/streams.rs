@@ -16,8 +16,9 @@ use protocol::identity::RADIO_BUDGET_BYTES_S;
 const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are nought and therefore cut.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
-/// Default rates are at most this where frames are signed, Hz: a signature is as long as a short message.
-const SIGNED_RATE_MAX_HZ: f64 = 6.0;
+/// Default rates are at most this where frames are signed, Hz, the first that fits the radio: a signature is as long as a
+/// short message.
+const SIGNED_RATES_MAX_HZ: [f64; 4] = [6.0, 5.0, 4.0, 3.5];
 /// Slowest interval that can be asked for, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
@@ -125,7 +126,11 @@ impl Streams {
 
     /// The same where every frame carries a signature: the fastest are slowed down, so that the radio's budget holds.
     pub fn signed(messages: &'static [Standard]) -> Self {
-        Self::at_most(messages, SIGNATURE_LEN, SIGNED_RATE_MAX_HZ)
+        let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz);
+        let [fastest, slower @ ..] = SIGNED_RATES_MAX_HZ;
+        slower.into_iter().fold(at_most(fastest), |streams, rate_max_hz| {
+            if streams.bytes_s() <= f64::from(RADIO_BUDGET_BYTES_S) { streams } else { at_most(rate_max_hz) }
+        })
     }
 
     /// What is sent.

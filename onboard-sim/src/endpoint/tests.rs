@@ -332,3 +332,4 @@ proptest! {
 }
 
 mod questions;
+mod rocket;

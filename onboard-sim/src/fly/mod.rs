@@ -24,7 +24,7 @@ use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
 pub use self::pace::Lateness;
 use self::pace::Pace;
-use self::radio::Delayed;
+pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
 use crate::craft::{Craft, Judged};
 use crate::endpoint::VehicleEndpoint;
@@ -286,11 +286,10 @@ pub async fn fly_observed(
         // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
         _ if craft.aborted() => Outcome::Aborted,
         (Some(true), _) => Outcome::Landed,
-        (Some(false), _) => Outcome::OutsideLimits,
         (None, Some(reason)) => Outcome::Refused(reason),
         (None, None) if stopped => Outcome::Stopped,
-        // Given up: it never came down.
-        (None, None) => Outcome::OutsideLimits,
+        // Judged so, or given up: it never came down.
+        (Some(false) | None, _) => Outcome::OutsideLimits,
     };
     Ok(FlightSummary {
         outcome,

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use crate::craft::Radio;
 
 /// One direction of the radio.
-pub(super) struct Delayed<T> {
+pub(crate) struct Delayed<T> {
     /// What is on its way, with the time it arrives, s; in the order it was sent.
     on_its_way: VecDeque<(f64, T)>,
 }
@@ -18,7 +18,7 @@ impl<T> Default for Delayed<T> {
 
 impl<T> Delayed<T> {
     /// What arrives at a time, of what is sent then and of what was sent before.
-    pub(super) fn pass(&mut self, sent: Vec<T>, time_s: f64, radio: Radio) -> Vec<T> {
+    pub(crate) fn pass(&mut self, sent: Vec<T>, time_s: f64, radio: Radio) -> Vec<T> {
         if radio.silent {
             self.on_its_way.clear();
             return Vec::new();

@@ -56,9 +56,10 @@ impl Pad {
             airframe.above_feet_m(airframe.mass.loaded_cg_station_m + draw.truth.cg_offset_m[0]),
         );
         let world = World::new(airframe, curve, &draw.truth, &standing, draw.flight_seed)?;
-        let sensors = match order.dispersion.sensors {
-            true => Some(Sensors::new(&order.dispersion.sensor_params, draw.flight_seed, 0.0)?),
-            false => None,
+        let sensors = if order.dispersion.sensors {
+            Some(Sensors::new(&order.dispersion.sensor_params, draw.flight_seed, 0.0)?)
+        } else {
+            None
         };
         let closed_rad = airframe.fins.closed_rad();
         Ok(Self {

@@ -95,7 +95,7 @@ impl Rocket {
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
             controller: Some(facts(flight.frame() / FRAMES_PER_PLAN, output.level, &air.report)),
             prediction: planned.and_then(|_| self.prediction(air, pilot, estimate, standing.time_s)),
-            path: planned.and_then(|(states, _)| self.path(pilot, estimate, states)),
+            path: planned.and_then(|(states, _)| path_from_the_east(pilot, estimate, states)),
             solve_time_s: air.took_s,
             thrust_scale: motor.impulse_scale(),
             descent: Some(self.descent(pilot, estimate, feet_m)),
@@ -139,18 +139,6 @@ impl Rocket {
         }
     }
 
-    /// The plan's path as it looks from the east, where the path that is flown is seen from too: its plane stands as it
-    /// happens to.
-    fn path(&self, pilot: &Pilot, estimate: &Estimate, states: &[PlanarState]) -> Option<Path> {
-        let plane = pilot.powered().plane()?;
-        let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
-        let mut path = Path::through(states)?;
-        for (north_m, _) in &mut path.points_m {
-            *north_m = *north_m * plane.along.x + beside_north_m;
-        }
-        Some(path)
-    }
-
     /// The plan's end over the ground; the plan itself moves with the wind.
     fn prediction(&self, air: &Air, pilot: &Pilot, estimate: &Estimate, time_s: f64) -> Option<Prediction> {
         let plane = pilot.powered().plane()?;
@@ -162,6 +150,18 @@ impl Rocket {
             violations: violations(&LandingVerdict::judge_plan(&self.limits.legs, &state)),
         })
     }
+}
+
+/// The plan's path as it looks from the east, where the path that is flown is seen from too: its plane stands as it
+/// happens to.
+fn path_from_the_east(pilot: &Pilot, estimate: &Estimate, states: &[PlanarState]) -> Option<Path> {
+    let plane = pilot.powered().plane()?;
+    let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
+    let mut path = Path::through(states)?;
+    for (north_m, _) in &mut path.points_m {
+        *north_m = *north_m * plane.along.x + beside_north_m;
+    }
+    Some(path)
 }
 
 /// A planar state whose velocities are through air that moves with `wind_m_s`, with velocities over the ground.

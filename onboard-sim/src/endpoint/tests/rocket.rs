@@ -1,0 +1,227 @@
+//! A rocket from apogee on the wire: what it sends in which phase, and within which budget.
+
+use campaign::dispersion::Dispersion;
+use protocol::dialect::{
+    BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA, MavSysStatusSensor,
+    SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_PREDICTED_PATH_DATA, TdChute,
+};
+
+use super::*;
+use crate::fly::{Delayed, LoadedFlight, load_profile};
+use crate::rocket::Rocket;
+use crate::streams::FROM_APOGEE;
+
+struct Airborne {
+    rocket: Rocket,
+    endpoint: VehicleEndpoint,
+    /// What the ground sends now.
+    uplink: Vec<Frame>,
+    heard: Delayed<Frame>,
+    sent: Delayed<Frame>,
+}
+
+impl Airborne {
+    fn on_the_pad(dispersion: &str) -> Self {
+        Self::with_faults(dispersion, &[])
+    }
+
+    fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
+        let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").unwrap() else {
+            panic!("from apogee")
+        };
+        flight.order.dispersion = Dispersion::builtin(dispersion).unwrap();
+        flight.order.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+        let mut rocket = Rocket::new(&flight).unwrap();
+        rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+        rocket.pull_pin();
+        let mut airborne = Self {
+            rocket,
+            endpoint: VehicleEndpoint::sending(&FROM_APOGEE),
+            uplink: Vec::new(),
+            heard: Delayed::default(),
+            sent: Delayed::default(),
+        };
+        airborne.run_while(|rocket| rocket.snapshot().checks_failed != 0);
+        airborne
+    }
+
+    fn let_go(dispersion: &str) -> Self {
+        Self::let_go_with_faults(dispersion, &[])
+    }
+
+    fn let_go_with_faults(dispersion: &str, faults: &[&str]) -> Self {
+        let mut airborne = Self::with_faults(dispersion, faults);
+        airborne.rocket.request(crate::craft::Request::Arm);
+        airborne.rocket.request(crate::craft::Request::Start);
+        airborne.run_while(|rocket| rocket.phase().on_pad());
+        airborne
+    }
+
+    fn run_while(&mut self, mut holds: impl FnMut(&Rocket) -> bool) -> Vec<Frame> {
+        let mut sent = Vec::new();
+        while holds(&self.rocket) {
+            let time_s = self.rocket.time_s();
+            let uplink = std::mem::take(&mut self.uplink);
+            for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
+                self.endpoint.on_frame(&frame, &mut self.rocket);
+            }
+            for event in self.rocket.advance_frame(&mut || Duration::ZERO) {
+                self.endpoint.on_event(&event);
+            }
+            let leaving = self.endpoint.poll(&self.rocket, &self.rocket.snapshot());
+            sent.extend(self.sent.pass(leaving, self.rocket.time_s(), self.rocket.radio()));
+        }
+        sent
+    }
+
+    fn run(&mut self, duration_s: f64) -> Vec<Frame> {
+        let end_s = self.rocket.time_s() + duration_s;
+        self.run_while(|rocket| rocket.time_s() < end_s)
+    }
+
+    /// The message, asked for once.
+    fn request(&mut self, message_id: u32) -> MavMessage {
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: 512,
+            params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            confirmation: 0,
+        };
+        self.endpoint.on_command(&request, &mut self.rocket);
+        let sent = self.run(0.3);
+        let found = sent
+            .iter()
+            .filter(|frame| frame.message_id() == message_id)
+            .find_map(|frame| frame.decode().ok());
+        found.unwrap()
+    }
+}
+
+#[test]
+fn its_standard_rates_fit_the_radio_signed_or_not() {
+    for streams in [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE)] {
+        let total = streams.bytes_s();
+        assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
+    }
+}
+
+#[test]
+fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
+    let mut airborne = Airborne::let_go("field");
+    let mut worst = 0;
+    while !airborne.rocket.is_over() {
+        let second: usize = airborne.run(1.0).iter().map(|frame| frame.as_bytes().len()).sum();
+        worst = worst.max(second);
+    }
+    assert!(worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{worst} B in one second");
+    assert!(worst > 1_200, "it had much to say: {worst} B");
+}
+
+#[test]
+fn in_the_descent_the_band_is_told_four_times_a_second() {
+    let mut airborne = Airborne::let_go("field");
+    airborne.run_while(|rocket| rocket.phase() != Phase::LandArmed);
+    let sent = airborne.run(2.0);
+    let told = count(&sent, TD_DESCENT_DATA::ID);
+    assert!((7..=9).contains(&told), "{told} in 2 s");
+    let last = sent.iter().rev().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_DESCENT(descent)) => Some(descent),
+        _ => None,
+    });
+    let last = last.unwrap();
+    assert!(last.band_low_m < last.chosen_height_m && last.chosen_height_m < last.band_high_m, "{last:?}");
+    assert!(last.height_m > last.band_high_m && last.vertical_speed_m_s < -30.0, "{last:?}");
+    assert!((60.0..120.0).contains(&last.commit_height_m), "{last:?}");
+    assert!((0.0..3.0).contains(&last.time_to_ignition_s), "{last:?}");
+    assert!((0.9..1.1).contains(&last.drag_scale) && (0.9..1.1).contains(&last.thrust_scale), "{last:?}");
+    assert_eq!(last.chute, TdChute::TD_CHUTE_STOWED);
+    let estimator = sent.iter().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::ESTIMATOR_STATUS(status)) => Some(status),
+        _ => None,
+    });
+    let estimator = estimator.unwrap();
+    assert!(estimator.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS), "{estimator:?}");
+    assert!(estimator.vel_ratio.is_nan() && (0.01..5.0).contains(&estimator.pos_vert_accuracy));
+    let sensors = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE;
+    let healthy = sent.iter().any(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::SYS_STATUS(status)) if status.onboard_control_sensors_health.contains(sensors))
+    });
+    assert!(healthy);
+}
+
+#[test]
+fn the_landing_burn_tells_its_plan() {
+    let mut airborne = Airborne::let_go("none");
+    airborne.run_while(|rocket| rocket.phase() != Phase::Powered);
+    airborne.run(0.5);
+    let sent = airborne.run(2.0);
+    assert!(count(&sent, TD_CONTROLLER_DATA::ID) >= 7 && count(&sent, TD_PREDICTED_PATH_DATA::ID) >= 1);
+    // The truth is the estimate here: there is no estimator to speak of, and no sensor.
+    assert_eq!(count(&sent, ESTIMATOR_STATUS_DATA::ID), 0);
+    let absent = sent.iter().any(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::SYS_STATUS(status))
+            if !status.onboard_control_sensors_present.contains(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS))
+    });
+    assert!(absent && count(&sent, SYS_STATUS_DATA::ID) >= 1);
+}
+
+#[test]
+fn what_is_off_can_be_asked_for_and_what_is_not_modelled_is_unknown() {
+    let mut airborne = Airborne::on_the_pad("field");
+    let MavMessage::HIGHRES_IMU(imu) = airborne.request(HIGHRES_IMU_DATA::ID) else { panic!("not the IMU") };
+    assert!((imu.xacc - 9.81).abs() < 0.3 && imu.ygyro.abs() < 0.1, "{imu:?}");
+    let MavMessage::BATTERY_STATUS(battery) = airborne.request(BATTERY_STATUS_DATA::ID) else {
+        panic!("not the battery")
+    };
+    assert_eq!((battery.voltages[0], battery.current_battery, battery.battery_remaining), (u16::MAX, -1, -1));
+}
+
+fn abort() -> Frame {
+    Encoder::new(GROUND).encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        param1: 1.0,
+        command: MavCmd::MAV_CMD_DO_FLIGHTTERMINATION,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    }))
+}
+
+/// Outcome: it lands as if nothing had happened; aborts that are not heard change nothing.
+#[test]
+fn a_link_that_is_lost_changes_nothing_about_the_flight() {
+    let mut lost = Airborne::let_go_with_faults("field", &["link-loss@descent"]);
+    lost.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
+    lost.run(0.01);
+    let mut sent = Vec::new();
+    while !lost.rocket.is_over() {
+        lost.uplink.push(abort());
+        sent.extend(lost.run(0.5));
+    }
+    assert!(sent.is_empty(), "{} frames through a silent radio", sent.len());
+    assert!(!lost.rocket.aborted());
+    let mut whole = Airborne::let_go("field");
+    whole.run_while(|rocket| !rocket.is_over());
+    assert_eq!(lost.rocket.judged(), whole.rocket.judged());
+    assert!(lost.rocket.judged().unwrap().landed);
+}
+
+/// Outcome: what is asked for happens, later by as much; its answer comes later by twice that.
+#[test]
+fn over_a_late_link_an_abort_comes_late_and_is_still_an_abort() {
+    let mut late = Airborne::let_go_with_faults("field", &["link-delay:1.5@descent"]);
+    late.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
+    late.run(0.5);
+    let asked_at_s = late.rocket.time_s();
+    late.uplink.push(abort());
+    late.run_while(|rocket| rocket.phase() != Phase::Chute);
+    let heard_after_s = late.rocket.time_s() - asked_at_s;
+    assert!((1.5..1.52).contains(&heard_after_s), "{heard_after_s}");
+    let mut answered_after_s = None;
+    while answered_after_s.is_none() {
+        let answers = late.run(0.02).iter().filter_map(CommandAnswer::from_frame).count();
+        answered_after_s = (answers > 0).then(|| late.rocket.time_s() - asked_at_s);
+    }
+    assert!((3.0..3.05).contains(&answered_after_s.unwrap()), "{answered_after_s:?}");
+}
