@@ -166,6 +166,7 @@ pub fn log_header(writer: &str, loaded: &LoadedFlight, seed: u64, start_unix_ns:
                 start_unix_ns,
                 run,
                 profile_toml: Some(loaded.toml.clone()),
+                scenario_toml: None,
             }
         }
         LoadedFlight::FromApogee(flight) => {

@@ -10,7 +10,7 @@ use campaign::order::Order;
 use campaign::sortie::Sortie;
 use flight::mission::Mission;
 use flight::phase::Phase;
-use onboard_sim::from_apogee;
+use onboard_sim::{from_apogee, pilot_log};
 use protocol::log::record::Record;
 use protocol::log::writer::LogWriter;
 use replay::evaluate::{EvaluateError, evaluate};
@@ -40,7 +40,7 @@ pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| {
     let mut sortie = Sortie::new(&order, NUMBER).unwrap();
     let file = std::fs::File::create(&log).unwrap();
     let mut writer = LogWriter::new(file, &from_apogee::header(&order, NUMBER)).unwrap();
-    writer.write(&from_apogee::start(sortie.flight()), 0).unwrap();
+    writer.write(&pilot_log::start(sortie.flight()), 0).unwrap();
     let mut phase = sortie.flight().pilot().mode().phase;
     loop {
         let goes_on = sortie.step();
