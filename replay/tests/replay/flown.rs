@@ -110,6 +110,7 @@ pub(crate) fn write_log(ticks: &[v1::ControllerTick], recipe: &Recipe) -> Writte
             ("seed".to_owned(), "7".to_owned()),
         ]),
         profile_toml: recipe.profile_toml.clone(),
+        scenario_toml: None,
     };
     let mut writer = LogWriter::new(file.try_clone().unwrap(), &header).unwrap();
     let mut synced = Vec::new();
