@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 
 use flight::phase::Phase;
+use proptest::prelude::*;
 use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::Record;
 use replay::evaluate::{EvaluateError, evaluate};
@@ -298,4 +299,59 @@ fn every_question_answers_by_the_command() {
     assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
     assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
+}
+
+/// Changes some number of a frame to any bits at all.
+fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
+    let number = f64::from_bits(bits);
+    let (input, output) = (&mut tick.input, &mut tick.output);
+    match field {
+        0 => input.time_s = number,
+        1 => input.frame = bits,
+        2 => input.fins_rad = vec![number; (bits % 6) as usize],
+        3 => input.fins_rad.fill(number),
+        4 => output.gimbal_rad = vec![number; (bits % 4) as usize],
+        5 => output.phase = bits as u32,
+        6 => output.level = bits as u32,
+        7 => input.known = None,
+        8 => input.contact = true,
+        9 => input.abort = true,
+        _ => {
+            if let Some(measured) = &mut input.measured {
+                match field {
+                    10 => measured.gyro_rad_s.y = number,
+                    11 => measured.specific_force_m_s2.x = number,
+                    12 => measured.pressure_altitude_m = Some(number),
+                    _ => measured.lidar_range_m = Some(number),
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// A flight with nonsense in it: every question has an answer or a reason.
+    #[test]
+    fn nonsense_is_answered(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
+        let mut recording = recording();
+        // Around the ignition, where plans begin.
+        let lit = |tick: &PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+        let landing = recording.frames.iter().position(lit).unwrap() - 20;
+        recording.frames.truncate(landing + 60);
+        for (place, field, bits) in spoilt {
+            spoil(&mut recording.frames[landing + place], field, bits);
+        }
+        if let Ok(report) = evaluate(&recording, &settings(&["powered.gimbal_deg=4.0"])) {
+            prop_assert_eq!(report.ticks.len(), recording.frames.len());
+        }
+        let last = recording.frames[recording.frames.len() - 1].input.frame;
+        if let Ok(report) = tick(&recording, last) {
+            prop_assert_eq!(report.tick, last);
+        }
+        if let Ok(report) = refly(&recording, &ReflyOptions::default()) {
+            prop_assert!(report.ticks > 0);
+        }
+    }
 }
