@@ -57,7 +57,9 @@ impl Remembers for usize {
 impl<T: Remembers> Remembers for [T] {
     fn remember(&self, memory: &mut Memory) {
         self.len().remember(memory);
-        self.iter().for_each(|element| element.remember(memory));
+        for element in self {
+            element.remember(memory);
+        }
     }
 }
 
@@ -69,7 +71,9 @@ impl<T: Remembers> Remembers for Vec<T> {
 
 impl<T: Remembers, const LENGTH: usize> Remembers for [T; LENGTH] {
     fn remember(&self, memory: &mut Memory) {
-        self.iter().for_each(|element| element.remember(memory));
+        for element in self {
+            element.remember(memory);
+        }
     }
 }
 
@@ -100,7 +104,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Remembers
     for Matrix<f64, Const<ROWS>, Const<COLUMNS>, ArrayStorage<f64, ROWS, COLUMNS>>
 {
     fn remember(&self, memory: &mut Memory) {
-        self.iter().for_each(|number| number.remember(memory));
+        for number in self.iter() {
+            number.remember(memory);
+        }
     }
 }
 

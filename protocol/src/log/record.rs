@@ -73,7 +73,7 @@ pub enum Record {
     PilotTick(Box<flight_v1::PilotTick>),
     /// `/pilot/estimate`.
     Estimate(Box<flight_v1::Estimate>),
-    /// `/vehicle/truth3d`.
+    /// `/vehicle/truth3d`, and with it `/tf`.
     TruthSample(Box<flight_v1::TruthSample>),
 }
 
@@ -132,6 +132,18 @@ pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform 
             z: 0.0,
             w: display_cos(half),
         }),
+    }
+}
+
+/// The pose of the vehicle in space as a Foxglove transform, in the same frames.
+pub(super) fn transform_in_space(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTransform {
+    let (place, turn) = (&truth.state.position_m, &truth.state.world_from_body);
+    FrameTransform {
+        timestamp: Some(timestamp(time_ns)),
+        parent_frame_id: "world".to_owned(),
+        child_frame_id: "rocket".to_owned(),
+        translation: Some(foxglove::messages::Vector3 { x: place.x, y: place.y, z: place.z }),
+        rotation: Some(foxglove::messages::Quaternion { x: turn.x, y: turn.y, z: turn.z, w: turn.w }),
     }
 }
 

@@ -12,7 +12,7 @@ use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
     METADATA_RUN, RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR,
     TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY,
-    TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
+    TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform, transform_in_space,
 };
 use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
@@ -152,7 +152,13 @@ impl<W: Write + Seek> LogWriter<W> {
                 self.write_message(TOPIC_ESTIMATE, (FLIGHT, "Estimate"), estimate.as_ref(), log_time)
             }
             Record::TruthSample(truth) => {
-                self.write_message(TOPIC_TRUTH_SAMPLE, (FLIGHT, "TruthSample"), truth.as_ref(), log_time)
+                self.write_message(TOPIC_TRUTH_SAMPLE, (FLIGHT, "TruthSample"), truth.as_ref(), log_time)?;
+                self.write_foxglove(
+                    TOPIC_TRANSFORM,
+                    &transform_in_space(truth, log_time),
+                    FrameTransform::get_schema().as_ref(),
+                    log_time,
+                )
             }
             Record::RawFrame(frame) => self.write_raw(frame, log_time),
             Record::Event(event) => self.write_foxglove(

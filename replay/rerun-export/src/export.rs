@@ -125,6 +125,7 @@ impl<'a> Export<'a> {
                 }
                 Entry::PilotStart(_)
                 | Entry::PilotTick(_)
+                | Entry::World(_)
                 | Entry::RawFrame
                 | Entry::Operator
                 | Entry::Event(_)

@@ -90,7 +90,7 @@ impl Seen {
                 self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
                 self.frames.insert(tick.input.frame);
             }
-            Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
+            Entry::World(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
         }
     }
 

@@ -4,7 +4,8 @@ use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
     ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
-    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_VERDICT,
+    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
+    TOPIC_VERDICT,
 };
 use protocol::log::{flight_v1, v1};
 
@@ -34,6 +35,8 @@ pub enum Entry {
     PilotStart(Box<flight_v1::PilotStart>),
     /// A frame of the flight computer from apogee to touchdown.
     PilotTick(Box<flight_v1::PilotTick>),
+    /// The simulated world of a flight from apogee.
+    World(Box<flight_v1::TruthSample>),
     /// The simulated plant.
     Truth(Box<v1::PlantTruth>),
     /// The landing verdict.
@@ -70,6 +73,7 @@ impl Entry {
             TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
             TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
             TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
+            TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
             TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
             TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
             TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
@@ -90,7 +94,8 @@ fn decoded<M: Message + Default>(
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    let package = if message_name.starts_with("Pilot") { PACKAGE_FLIGHT } else { PACKAGE };
+    let of_flight = message_name.starts_with("Pilot") || message_name == "TruthSample";
+    let package = if of_flight { PACKAGE_FLIGHT } else { PACKAGE };
     let accepted = format!("{package}.{message_name}");
     if channel.schema_name != accepted {
         // Another program may use the same topic name.

@@ -83,6 +83,8 @@ pub struct Recording {
     pub pilot_start: Option<flight_v1::PilotStart>,
     /// Its frames, in file order.
     pub frames: Vec<flight_v1::PilotTick>,
+    /// Its simulated world, in file order.
+    pub world: Vec<flight_v1::TruthSample>,
     /// The simulated plant, in file order.
     pub truth: Vec<v1::PlantTruth>,
     /// What a ground station knew, in file order.
@@ -121,6 +123,7 @@ impl Recording {
                     tick.output.plan.gimbal_rad = Vec::new();
                     recording.ticks.push(*tick);
                 }
+                Entry::World(sample) => recording.world.push(*sample),
                 Entry::Truth(truth) => recording.truth.push(*truth),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
                 Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
@@ -147,6 +150,7 @@ impl Recording {
         let kinds = [
             ("controller ticks", self.ticks.len()),
             ("frames of the flight computer", self.frames.len()),
+            ("records of the world", self.world.len()),
             ("records of the plant", self.truth.len() / 10),
             ("records of telemetry", self.telemetry.len()),
             ("events", self.events.len()),

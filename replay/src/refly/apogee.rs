@@ -118,14 +118,13 @@ impl<'a> AtStart<'a> {
                 }
             }
         }
-        let recorded = match &recording.verdict {
-            Some(verdict) => Some(VerdictFacts::of(verdict)),
+        let recorded = if let Some(verdict) = &recording.verdict {
+            Some(VerdictFacts::of(verdict))
+        } else {
             // An older log: what the flight comes to as it was.
-            None => {
-                let mut as_it_was = rerun.clone();
-                while as_it_was.step()? {}
-                from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
-            }
+            let mut as_it_was = rerun.clone();
+            while as_it_was.step()? {}
+            from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
         };
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
@@ -220,46 +219,44 @@ impl<'a> AtStart<'a> {
 
     /// What a log of this flight says beside what the recorded one says.
     fn run_facts(&self, options: &ReflyOptions) -> Result<BTreeMap<String, String>, ReflyError> {
-        let (in_flight, _) = self.in_flight(options)?;
-        let lines: Vec<String> = in_flight.iter().map(ToString::to_string).collect();
+        let lines: Vec<String> = self.in_flight(options)?.iter().map(ToString::to_string).collect();
         Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
     }
 
-    /// The settings as timed ones, those that hold from the start on half a frame before its first frame's end; and
-    /// another controller of the landing burn, if one is asked for, with the height it lights at among the settings.
-    fn in_flight(
-        &self,
-        options: &ReflyOptions,
-    ) -> Result<(Vec<Setting>, Option<Option<Baseline>>), ReflyError> {
-        let controller = match options.law {
-            Law::AsRecorded => None,
-            Law::Nmpc => Some(Controller::Nmpc),
-            Law::OpenLoop => Some(Controller::OpenLoop),
-            Law::Oscillating => Some(Controller::Oscillating),
-            Law::Stabiliser => {
-                return Err(ReflyError::OtherKind {
-                    name: self.recording.name.clone(),
-                    what: format!("controller {}", options.law.name()),
-                    of: "a planar landing",
-                    is: "a flight from apogee",
-                });
-            }
-        };
+    /// The settings as timed ones, those that hold from the start on half a frame before its first frame's end; with the
+    /// height that another controller of the landing burn lights at, if one is asked for.
+    fn in_flight(&self, options: &ReflyOptions) -> Result<Vec<Setting>, ReflyError> {
         let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
         let timed = |setting: &Setting| Setting { at_s: setting.at_s.or(Some(start_s)), ..setting.clone() };
         let mut in_flight: Vec<Setting> = options.settings.iter().map(timed).collect();
-        let Some(controller) = controller else { return Ok((in_flight, None)) };
-        let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
-        let baseline = Baseline::new(controller, &mission)?;
-        let fixed = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
-        if let (Some(baseline), None) = (&baseline, fixed) {
-            in_flight.push(Setting {
-                path: "ignition.fixed_height_m".to_owned(),
-                value: toml::Value::Float(baseline.ignition_height_m()),
-                at_s: Some(start_s),
-            });
+        if let Some(controller) = self.other_controller(options)? {
+            let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
+            let fixed_m = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
+            if let (Some(baseline), None) = (Baseline::new(controller, &mission)?, fixed_m) {
+                in_flight.push(Setting {
+                    path: "ignition.fixed_height_m".to_owned(),
+                    value: toml::Value::Float(baseline.ignition_height_m()),
+                    at_s: Some(start_s),
+                });
+            }
         }
-        Ok((in_flight, Some(baseline)))
+        Ok(in_flight)
+    }
+
+    /// Who is to fly the landing burn instead of who did.
+    fn other_controller(&self, options: &ReflyOptions) -> Result<Option<Controller>, ReflyError> {
+        match options.law {
+            Law::AsRecorded => Ok(None),
+            Law::Nmpc => Ok(Some(Controller::Nmpc)),
+            Law::OpenLoop => Ok(Some(Controller::OpenLoop)),
+            Law::Oscillating => Ok(Some(Controller::Oscillating)),
+            Law::Stabiliser => Err(ReflyError::OtherKind {
+                name: self.recording.name.clone(),
+                what: format!("controller {}", options.law.name()),
+                of: "a planar landing",
+                is: "a flight from apogee",
+            }),
+        }
     }
 
     /// The flight at the start, with what is other from there on.
@@ -272,11 +269,8 @@ impl<'a> AtStart<'a> {
             return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
         }
         let mut rerun = self.rerun.clone();
-        let (in_flight, baseline) = self.in_flight(options)?;
+        let in_flight = self.in_flight(options)?;
         rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
-        if let Some(baseline) = baseline {
-            rerun.flight = rerun.flight.with_baseline(baseline);
-        }
 
         // Of the world: the airframe by every lasting setting, chance by its own.
         let lasting = lasting(options);
@@ -284,6 +278,10 @@ impl<'a> AtStart<'a> {
             options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
         let all: Vec<Setting> = lasting.iter().chain(&of_mission).cloned().collect();
         let true_mission = mission_with(toml, &all)?;
+        if let Some(controller) = self.other_controller(options)? {
+            let believed = mission_with(toml, &lasting)?;
+            rerun.flight = rerun.flight.with_baseline(Baseline::new(controller, &believed)?);
+        }
         let other_draw =
             options.seed.map(|seed| draw(&true_mission, &self.dispersion, seed, self.number).truth);
         let truth = truth_with(&other_draw.unwrap_or(self.truth), &of_truth)?;

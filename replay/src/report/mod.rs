@@ -2,8 +2,9 @@
 //!
 //! The verdict stands first, each value against its limit; then what led to it: phases, path, states, input, tracking,
 //! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. A log that lacks something
-//! has the section say so.
+//! has the section say so. A flight from apogee is seen in the plane of its landing.
 
+mod apogee;
 mod chart;
 mod page;
 mod section;
@@ -22,6 +23,10 @@ use track::{Flight, plans_of};
 pub fn report(path: &Path) -> Result<String, RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
-    let flight = Flight::new(recording, plans_of(path)?);
+    let flight = if recording.is_from_apogee() {
+        apogee::flight(recording)
+    } else {
+        Flight::new(recording, plans_of(path)?)
+    };
     Ok(page::page(&flight, &info, &section::all(&flight, &info)))
 }

@@ -12,7 +12,7 @@ use crate::log::{Entry, FlightLog, LogError, Recording};
 pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
 
 /// Plans that are drawn.
-const PLANS_DRAWN: usize = 8;
+pub(super) const PLANS_DRAWN: usize = 8;
 
 /// Where the flight was at one time.
 #[derive(Debug, Clone, Copy)]
@@ -44,10 +44,61 @@ pub(super) enum Teller {
     Nobody,
 }
 
+/// What the report must know of the vehicle.
+pub(super) struct Vehicle {
+    pub(super) gravity_m_s2: f64,
+    /// Before ignition, N.
+    pub(super) weight_n: f64,
+    /// Half of the nominal thrust, N: from there on the motor counts as lit.
+    pub(super) half_thrust_n: f64,
+    pub(super) gimbal_limit_deg: f64,
+    pub(super) gimbal_rate_rad_s: Option<f64>,
+    pub(super) fin_rate_deg_s: f64,
+    /// Thrust expected at a time since the ignition command, s to N.
+    pub(super) expected_n: Box<dyn Fn(f64) -> f64>,
+}
+
+impl Vehicle {
+    fn of(profile: &Profile) -> Self {
+        let motor = profile.motor;
+        Self {
+            gravity_m_s2: profile.environment.gravity_m_s2,
+            weight_n: profile.vehicle.mass_kg * profile.environment.gravity_m_s2,
+            half_thrust_n: 0.5 * profile.motor.thrust_n,
+            gimbal_limit_deg: profile.gimbal.limit_deg,
+            gimbal_rate_rad_s: profile.gimbal.rate_limit_rad_s(),
+            fin_rate_deg_s: profile.fins.rate_limit_deg_s,
+            expected_n: Box::new(move |since_s| motor.thrust_at_n(since_s)),
+        }
+    }
+}
+
+/// Commanded and actual gimbal angles, rad.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GimbalAxis {
+    pub(super) name: &'static str,
+    /// Vehicle time, s, and angle, rad.
+    pub(super) commanded: Vec<(f64, f64)>,
+    pub(super) actual: Vec<(f64, f64)>,
+}
+
+/// What a flight from apogee has beside what a planar landing has.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FromApogee {
+    /// Impulse and burn time over certified ones, as inferred at the end.
+    pub(super) inferred_scales: Option<(f64, f64)>,
+    /// True impulse over the certified one.
+    pub(super) true_impulse_scale: Option<f64>,
+}
+
 /// A recorded flight and what the report derives from it.
 pub(super) struct Flight {
     pub(super) recording: Recording,
-    pub(super) profile: Option<Profile>,
+    pub(super) vehicle: Option<Vehicle>,
+    pub(super) from_apogee: Option<FromApogee>,
+    pub(super) gimbal: Vec<GimbalAxis>,
+    /// Vehicle time, s, and thrust as inferred in flight, N.
+    pub(super) inferred_n: Vec<(f64, f64)>,
     pub(super) plans: Vec<PlanSample>,
     pub(super) teller: Teller,
     pub(super) track: Vec<Sample>,
@@ -70,8 +121,23 @@ impl Flight {
                 let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
                 track.iter().find(burning).map(|sample| sample.time_s)
             });
+        let vehicle = recording.profile().ok().as_ref().map(Vehicle::of);
+        let inferred_n = match (&vehicle, ignition_s) {
+            (Some(vehicle), Some(ignition_s)) => {
+                let inferred = |tick: &v1::ControllerTick| {
+                    let input = &tick.input;
+                    (input.time_s, input.thrust_scale * (vehicle.expected_n)(input.time_s - ignition_s))
+                };
+                let burning = recording.ticks.iter().filter(|tick| tick.input.time_s >= ignition_s);
+                burning.map(inferred).collect()
+            }
+            _ => Vec::new(),
+        };
         Self {
-            profile: recording.profile().ok(),
+            vehicle,
+            from_apogee: None,
+            gimbal: vec![gimbal_of(&recording)],
+            inferred_n,
             touchdown_s: recording.verdict.as_ref().map(|verdict| verdict.time_s),
             ignition_s,
             plans,
@@ -119,6 +185,23 @@ impl Flight {
     }
 }
 
+/// The gimbal of the planar landing, else what a ground station heard of it.
+fn gimbal_of(recording: &Recording) -> GimbalAxis {
+    let truth = &recording.truth;
+    let mut axis = GimbalAxis {
+        name: "Gimbal angle",
+        commanded: truth.iter().map(|truth| (truth.time_s, truth.gimbal_commanded_rad)).collect(),
+        actual: truth.iter().map(|truth| (truth.time_s, truth.gimbal_actual_rad)).collect(),
+    };
+    if truth.is_empty() {
+        for told in &recording.telemetry {
+            axis.commanded.extend(told.gimbal_commanded_rad.map(|rad| (told.time_s, rad)));
+            axis.actual.extend(told.gimbal_measured_rad.map(|rad| (told.time_s, rad)));
+        }
+    }
+    axis
+}
+
 pub(super) fn phase_of(number: u32) -> Option<Phase> {
     u8::try_from(number).ok().and_then(Phase::from_index)
 }
@@ -128,7 +211,7 @@ pub(super) fn state_of(state: &v1::PlanarState) -> [f64; 6] {
 }
 
 /// The best that the log has: the plant, else the controller's estimate, else what a ground station heard.
-fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
+pub(super) fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
     let sample = |time_s, phase, state| Sample { time_s, phase, state };
     let plant = recording.truth.iter();
     let mut best: (Teller, Vec<Sample>) = (

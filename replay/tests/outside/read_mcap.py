@@ -10,12 +10,24 @@ with open(sys.argv[1], "rb") as file:
     reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
     assert reader.get_summary() is not None
     for schema, channel, message, decoded in reader.iter_decoded_messages(
-        topics=["/controller/tick", "/vehicle/truth", "/verdict", "/events", "/tf"]
+        topics=[
+            "/controller/tick",
+            "/vehicle/truth",
+            "/pilot/start",
+            "/pilot/tick",
+            "/pilot/estimate",
+            "/vehicle/truth3d",
+            "/verdict",
+            "/events",
+            "/tf",
+        ]
     ):
         assert message.log_time == message.publish_time
         counts[channel.topic] += 1
         if channel.topic == "/controller/tick":
             command = decoded.output.gimbal_command_rad
+        if channel.topic == "/pilot/tick":
+            command = decoded.output.gimbal_rad[0]
 for topic in sorted(counts):
     print(topic, counts[topic])
 print("gimbal", command.hex())

@@ -1,18 +1,11 @@
 //! A whole flight from apogee, as a campaign logs it: every what-if question asked of it.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
-use std::sync::LazyLock;
 
-use campaign::baseline::Controller;
-use campaign::dispersion::Dispersion;
-use campaign::order::Order;
-use campaign::sortie::Sortie;
-use flight::mission::Mission;
 use flight::phase::Phase;
-use onboard_sim::{from_apogee, pilot_log};
+use proptest::prelude::*;
+use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::Record;
-use protocol::log::writer::LogWriter;
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
@@ -20,67 +13,12 @@ use replay::settings::Setting;
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 use replay::tick::tick;
 use replay::verify::{Outcome, verify};
-use tempfile::TempDir;
 
 use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
 
-const NUMBER: u64 = 3;
-
-pub(crate) struct Logged {
-    directory: TempDir,
-    pub(crate) log: PathBuf,
-    landed: bool,
-}
-
-/// Flight 3 of the campaign with field dispersions and seed 1; it lands.
-pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| {
-    let order = order();
-    let directory = tempfile::tempdir().unwrap();
-    let log = directory.path().join("apogee.mcap");
-    let mut sortie = Sortie::new(&order, NUMBER).unwrap();
-    let file = std::fs::File::create(&log).unwrap();
-    let mut writer = LogWriter::new(file, &from_apogee::header(&order, NUMBER)).unwrap();
-    writer.write(&pilot_log::start(sortie.flight()), 0).unwrap();
-    let mut phase = sortie.flight().pilot().mode().phase;
-    loop {
-        let goes_on = sortie.step();
-        for record in from_apogee::frame(sortie.flight(), phase) {
-            writer.write(&record, from_apogee::time_ns(sortie.flight())).unwrap();
-        }
-        phase = sortie.flight().pilot().mode().phase;
-        if !goes_on {
-            break;
-        }
-    }
-    let verdict = Box::new(from_apogee::verdict(sortie.flight()).unwrap());
-    writer.write(&Record::LandingVerdict(verdict), from_apogee::time_ns(sortie.flight())).unwrap();
-    writer.finish().unwrap();
-    Logged { directory, log, landed: sortie.row().legs }
-});
-
-fn order() -> Order {
-    let toml = |texts: &[(&str, &str)], name: &str| {
-        texts.iter().find(|(known, _)| *known == name).unwrap().1.to_owned()
-    };
-    let mission_toml = toml(flight::mission::BUILTIN, "mk2");
-    let dispersion_toml = toml(campaign::dispersion::BUILTIN, "field");
-    Order {
-        mission: Mission::from_toml(&mission_toml, "mk2").unwrap(),
-        mission_toml,
-        dispersion: Dispersion::from_toml(&dispersion_toml, "field").unwrap(),
-        dispersion_name: "field".to_owned(),
-        dispersion_toml,
-        seed: 1,
-        flights: 10,
-        controller: Controller::Nmpc,
-        faults: Vec::new(),
-    }
-}
-
-impl Logged {
-    pub(crate) fn recording(&self) -> Recording {
-        Recording::open(&self.log).unwrap()
-    }
+fn recording() -> Recording {
+    Recording::open(&LANDED.log).unwrap()
 }
 
 fn settings(given: &[&str]) -> Vec<Setting> {
@@ -97,14 +35,14 @@ fn with_plant(given: &[&str]) -> ReflyOptions {
 
 #[test]
 fn it_landed_and_verifies() {
-    assert!(LANDED.landed && LANDED.recording().verdict.unwrap().landed);
+    assert!(LANDED.landed && recording().verdict.unwrap().landed);
     let report = verify(&LANDED.log).unwrap();
     assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
 }
 
 #[test]
 fn nothing_changed_decides_nothing_else() {
-    let report = evaluate(&LANDED.recording(), &[]).unwrap();
+    let report = evaluate(&recording(), &[]).unwrap();
     assert!(report.kind.starts_with("open loop"));
     assert_eq!((report.commands_different, report.levels_different), (0, 0));
     assert!(report.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
@@ -113,7 +51,7 @@ fn nothing_changed_decides_nothing_else() {
 
 #[test]
 fn other_settings_command_otherwise_from_their_time_on() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let ignited_s = evaluate(&recording, &[]).unwrap().phases;
     let entered =
         |name: &str| ignited_s.iter().find(|phase| phase.phase == name).unwrap().recorded_s.unwrap();
@@ -133,7 +71,7 @@ fn other_settings_command_otherwise_from_their_time_on() {
 
 #[test]
 fn what_the_flight_computer_does_not_have_is_refused() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let refused = |given| evaluate(&recording, &settings(&[given])).unwrap_err();
     assert!(matches!(refused("leg_limits.tilt_deg=3.0"), EvaluateError::NotTheControllers { .. }));
     assert!(matches!(refused("truth.wind_m_s=3.0"), EvaluateError::NotTheControllers { .. }));
@@ -146,7 +84,7 @@ fn what_the_flight_computer_does_not_have_is_refused() {
 /// Flown again from its landing, from frames before and during the burn: bit for bit the recorded flight.
 #[test]
 fn nothing_changed_flies_the_same_bit_for_bit() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let starts = [
         StartAt::Landing,
         StartAt::Tick(1),
@@ -175,7 +113,7 @@ fn nothing_changed_flies_the_same_bit_for_bit() {
 
 #[test]
 fn another_day_turns_the_verdict() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let report = refly(&recording, &with_plant(&["truth.impulse_scale=0.7"])).unwrap();
     assert_eq!((report.verdict_changed, report.thrust_scale.to_bits()), (Some(true), 0.7_f64.to_bits()));
     assert!(report.margin.unwrap() < 0.0);
@@ -192,7 +130,7 @@ fn another_day_turns_the_verdict() {
 
 #[test]
 fn another_controller_flies_the_burn() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let flown_by = |law| refly(&recording, &ReflyOptions { law, ..ReflyOptions::default() });
     let same = flown_by(Law::Nmpc).unwrap();
     assert_eq!((same.commands_identical, same.verdict_changed), (same.ticks, Some(false)));
@@ -209,7 +147,7 @@ fn another_controller_flies_the_burn() {
 
 #[test]
 fn what_cannot_be_flown_again_is_said() {
-    let mut recording = LANDED.recording();
+    let mut recording = recording();
     let refusal = |start| {
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap_err().to_string()
     };
@@ -230,7 +168,7 @@ fn what_cannot_be_flown_again_is_said() {
 /// A log that this build's world no longer gives: its forged frame is named, and the flight is flown on all the same.
 #[test]
 fn another_flight_before_the_start_is_named() {
-    let mut recording = LANDED.recording();
+    let mut recording = recording();
     recording.frames[99].state_digest ^= 1;
     let report = refly(&recording, &ReflyOptions::default()).unwrap();
     let reached = report.reached.unwrap();
@@ -239,7 +177,7 @@ fn another_flight_before_the_start_is_named() {
 
 #[test]
 fn a_flight_flown_again_is_a_log_that_verifies() {
-    let recording = LANDED.recording();
+    let recording = recording();
     for (name, options) in [
         ("same.mcap", ReflyOptions::default()),
         ("weights.mcap", with(&["powered.weights.theta=200", "powered.gimbal_deg=4.0@9"])),
@@ -250,7 +188,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         ),
     ] {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
-        let path = LANDED.directory.path().join(name);
+        let path = LANDED.beside(name);
         write_log(&path, &recording, &options, &report, &flown).unwrap();
         let verified = verify(&path).unwrap();
         assert_eq!((verified.outcome, verified.first_divergence), (Outcome::Identical, None), "{name}");
@@ -266,7 +204,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
 /// Every frame that plans, solved again alone: the same landing, and the warm start is worth its name.
 #[test]
 fn every_plan_solved_again_is_the_flown_one() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let (mut plans, mut warm_iterations, mut cold_iterations) = (0, 0, 0);
     let powered: Vec<u64> = recording
         .frames
@@ -297,7 +235,7 @@ fn every_plan_solved_again_is_the_flown_one() {
 
 #[test]
 fn a_sweep_does_not_depend_on_jobs() {
-    let flights = [LANDED.recording(), crate::simulated::NOMINAL.recording()];
+    let flights = [recording(), crate::simulated::NOMINAL.recording()];
     let points = grid(&[], &["truth.impulse_scale=0.8:1.0:3".parse().unwrap()]).unwrap();
     let fly = |flights: &[Recording], count: usize| {
         let jobs = NonZeroUsize::new(count).unwrap();
@@ -314,7 +252,7 @@ fn a_sweep_does_not_depend_on_jobs() {
 /// The verdict really is another on the two sides of the value found.
 #[test]
 fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
-    let recording = LANDED.recording();
+    let recording = recording();
     let options = BisectOptions {
         path: "truth.impulse_scale".to_owned(),
         plant_alone: true,
@@ -349,15 +287,71 @@ fn every_question_answers_by_the_command() {
     assert!(stdout.contains("recorded frames identical") && stdout.contains("vertical speed"), "{stdout}");
     let (code, stdout, _) = run(replay("refly", log).args(["--controller", "oscillating"]));
     assert!(code == 0 && stdout.contains("flown by oscillating"), "{stdout}");
-    let planning =
-        LANDED.recording().frames.iter().rev().map(|tick| tick.input.frame).find(|frame| {
-            frame.is_multiple_of(10) && tick(&LANDED.recording(), *frame).unwrap().warm.is_some()
-        });
-    let (code, stdout, _) = run(replay("tick", log).arg(planning.unwrap().to_string()));
+    // A plan in the middle of the burn.
+    let recording = recording();
+    let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+    let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|tick| tick.input.frame).collect();
+    let planning = burning[burning.len() / 2].next_multiple_of(10);
+    let (code, stdout, _) = run(replay("tick", log).arg(planning.to_string()));
     assert!(code == 0 && stdout.contains("identical bit for bit") && stdout.contains("cold"), "{stdout}");
     let (code, stdout, stderr) =
         run(replay("sweep", log).args(["--vary", "powered.weights.theta=80,100", "--csv", "--jobs", "2"]));
     assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
     assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
+}
+
+/// Changes some number of a frame to any bits at all.
+fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
+    let number = f64::from_bits(bits);
+    let (input, output) = (&mut tick.input, &mut tick.output);
+    match field {
+        0 => input.time_s = number,
+        1 => input.frame = bits,
+        2 => input.fins_rad = vec![number; (bits % 6) as usize],
+        3 => input.fins_rad.fill(number),
+        4 => output.gimbal_rad = vec![number; (bits % 4) as usize],
+        5 => output.phase = bits as u32,
+        6 => output.level = bits as u32,
+        7 => input.known = None,
+        8 => input.contact = true,
+        9 => input.abort = true,
+        _ => {
+            if let Some(measured) = &mut input.measured {
+                match field {
+                    10 => measured.gyro_rad_s.y = number,
+                    11 => measured.specific_force_m_s2.x = number,
+                    12 => measured.pressure_altitude_m = Some(number),
+                    _ => measured.lidar_range_m = Some(number),
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// A flight with nonsense in it: every question has an answer or a reason.
+    #[test]
+    fn nonsense_is_answered(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
+        let mut recording = recording();
+        // Around the ignition, where plans begin.
+        let lit = |tick: &PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+        let landing = recording.frames.iter().position(lit).unwrap() - 20;
+        recording.frames.truncate(landing + 60);
+        for (place, field, bits) in spoilt {
+            spoil(&mut recording.frames[landing + place], field, bits);
+        }
+        if let Ok(report) = evaluate(&recording, &settings(&["powered.gimbal_deg=4.0"])) {
+            prop_assert_eq!(report.ticks.len(), recording.frames.len());
+        }
+        let last = recording.frames[recording.frames.len() - 1].input.frame;
+        if let Ok(report) = tick(&recording, last) {
+            prop_assert_eq!(report.tick, last);
+        }
+        if let Ok(report) = refly(&recording, &ReflyOptions::default()) {
+            prop_assert!(report.ticks > 0);
+        }
+    }
 }

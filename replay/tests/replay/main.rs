@@ -8,6 +8,7 @@ mod damage;
 mod divergence;
 mod flown;
 mod foreign;
+mod from_apogee;
 mod limits;
 mod obstacles;
 mod pages;

@@ -4,6 +4,7 @@ use super::known::{Burning, Known};
 use super::{FRAMES_PER_PLAN, Pilot, PilotInput, PilotOutput};
 use crate::airframe::MassModel;
 use crate::atmosphere::Air;
+use crate::dynamics::PlanarState;
 use crate::mission::{Mission, MissionError};
 use crate::powered::{LandingSolved, Plane};
 
@@ -17,11 +18,17 @@ impl Pilot {
         let curve = mission.motor()?;
         let mass = MassModel::new(&mission.airframe.mass, curve.propellant_mass_kg());
         Ok(Self {
-            powered: self.powered.reconfigured(mission.powered),
+            powered: self.powered.reconfigured(&mission.powered),
             aim_loop: self.aim_loop.reconfigured(mission.aim),
             known: Known { mission: mission.clone(), curve, mass, ..self.known.clone() },
             ..self.clone()
         })
+    }
+
+    /// The planned states in that plane, one step apart, s, if there is a plan; see
+    /// [`PoweredGuidance::planned`](crate::powered::PoweredGuidance::planned).
+    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
+        self.powered.planned()
     }
 
     /// The plane of its landing, once there is one.

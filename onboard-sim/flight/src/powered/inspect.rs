@@ -20,8 +20,8 @@ pub struct LandingSolved {
 impl PoweredGuidance {
     /// The same memory under other settings.
     #[must_use]
-    pub(crate) fn reconfigured(&self, settings: PoweredSettings) -> Self {
-        Self { settings, ..self.clone() }
+    pub(crate) fn reconfigured(&self, settings: &PoweredSettings) -> Self {
+        Self { settings: *settings, ..self.clone() }
     }
 
     /// The landing that [`plan`](Self::plan) is about to solve, solved alone; `None` if it solves none here. `self` is as

@@ -34,7 +34,8 @@ pub(super) fn html(flight: &Flight) -> String {
     if errors.iter().flatten().all(|error| error.abs() < 1e-12) {
         html.push_str(&paragraph("This flight's estimate is the truth: it was simulated without sensors."));
     }
-    html + &paragraph(&format!("At {} ticks off the pad.", errors.len()))
+    let ticks = if flight.from_apogee.is_some() { "frames from apogee on" } else { "ticks off the pad" };
+    html + &paragraph(&format!("At {} {ticks}.", errors.len()))
 }
 
 /// The plant at the very time of a tick; in between nothing is made up.

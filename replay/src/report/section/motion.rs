@@ -3,7 +3,7 @@
 use super::{COMPONENTS, DEGREES};
 use crate::report::chart::{Chart, Line};
 use crate::report::page::{charts, paragraph};
-use crate::report::track::{Flight, Teller};
+use crate::report::track::{Flight, GimbalAxis, Teller};
 
 pub(super) fn html(flight: &Flight) -> String {
     let who = match flight.teller {
@@ -14,8 +14,12 @@ pub(super) fn html(flight: &Flight) -> String {
     };
     let mut pictures = vec![path(flight)];
     pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));
-    pictures.push(input(flight));
-    paragraph(who) + &charts(&pictures)
+    pictures.extend(flight.gimbal.iter().map(|axis| input(flight, axis)));
+    let mut words = who.to_owned();
+    if flight.from_apogee.is_some() {
+        words += " Seen in the vertical plane of the landing; velocities are through the air.";
+    }
+    paragraph(&words) + &charts(&pictures)
 }
 
 fn path(flight: &Flight) -> String {
@@ -73,32 +77,20 @@ fn state(flight: &Flight, component: usize) -> String {
     .svg()
 }
 
-fn input(flight: &Flight) -> String {
-    let recording = &flight.recording;
-    let shown = |time_s: &f64| flight.is_shown(*time_s);
-    let mut lines = Vec::new();
-    let truth = recording.truth.iter().filter(|truth| shown(&truth.time_s));
-    let (mut commanded, mut actual): (Vec<_>, Vec<_>) = truth
-        .map(|truth| {
-            let at_s = flight.axis_s(truth.time_s);
-            ((at_s, DEGREES * truth.gimbal_commanded_rad), (at_s, DEGREES * truth.gimbal_actual_rad))
-        })
-        .unzip();
-    if commanded.is_empty() {
-        let heard = recording.telemetry.iter().filter(|told| shown(&told.time_s));
-        for told in heard {
-            let at_s = flight.axis_s(told.time_s);
-            commanded.extend(told.gimbal_commanded_rad.map(|rad| (at_s, DEGREES * rad)));
-            actual.extend(told.gimbal_measured_rad.map(|rad| (at_s, DEGREES * rad)));
+fn input(flight: &Flight, axis: &GimbalAxis) -> String {
+    let line = |name, class, angles: &[(f64, f64)]| {
+        let shown = angles.iter().filter(|(time_s, _)| flight.is_shown(*time_s));
+        Line {
+            name,
+            class,
+            points: shown.map(|(time_s, rad)| (flight.axis_s(*time_s), DEGREES * rad)).collect(),
         }
-    }
-    lines.push(Line { name: "actual", class: "a", points: actual });
-    lines.push(Line { name: "commanded", class: "b", points: commanded });
-    let limit = flight.profile.as_ref().map(|profile| profile.gimbal.limit_deg);
+    };
+    let limit = flight.vehicle.as_ref().map(|vehicle| vehicle.gimbal_limit_deg);
     Chart {
-        title: "Gimbal angle, deg".to_owned(),
+        title: format!("{}, deg", axis.name),
         x_label: flight.axis_name(),
-        lines,
+        lines: vec![line("actual", "a", &axis.actual), line("commanded", "b", &axis.commanded)],
         limits: limit.into_iter().flat_map(|limit| [-limit, limit]).collect(),
         marks: flight.marks(),
         ..Chart::default()

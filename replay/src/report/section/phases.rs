@@ -87,14 +87,14 @@ fn moments(flight: &Flight) -> Vec<(&'static str, Option<f64>)> {
 }
 
 fn thrust_above_half_s(flight: &Flight) -> Option<f64> {
-    let half_n = 0.5 * flight.profile.as_ref()?.motor.thrust_n;
+    let half_n = flight.vehicle.as_ref()?.half_thrust_n;
     let lit = flight.recording.truth.iter().find(|truth| truth.thrust_n >= half_n)?;
     Some(lit.time_s)
 }
 
 /// The last time thrust falls from above the weight to below it.
 fn thrust_through_weight_s(flight: &Flight) -> Option<f64> {
-    let gravity_m_s2 = flight.profile.as_ref()?.environment.gravity_m_s2;
+    let gravity_m_s2 = flight.vehicle.as_ref()?.gravity_m_s2;
     let above = |truth: &&protocol::log::v1::PlantTruth| truth.thrust_n > truth.mass_kg * gravity_m_s2;
     let last = flight.recording.truth.iter().rposition(|truth| above(&truth))?;
     let after = flight.recording.truth.get(last + 1)?;

@@ -50,6 +50,10 @@ pub(super) fn html(flight: &Flight) -> String {
             verdict.map(|verdict| factor * state_of(&verdict.state)[component]),
         ));
     }
-    paragraph("A plan ends with its horizon; a vehicle that comes down earlier ends its burn on the ground.")
-        + &charts(&pictures)
+    let words = if flight.from_apogee.is_some() {
+        "Each plan chooses its own final time."
+    } else {
+        "A plan ends with its horizon; a vehicle that comes down earlier ends its burn on the ground."
+    };
+    paragraph(words) + &charts(&pictures)
 }

@@ -9,7 +9,7 @@ use crate::report::track::{Flight, phase_of};
 const AT_LIMIT: f64 = 0.995;
 
 pub(super) fn html(flight: &Flight) -> String {
-    let Some(profile) = &flight.profile else {
+    let Some(vehicle) = &flight.vehicle else {
         return paragraph("The log has no profile that says where the stops are.");
     };
     let moving: Vec<&PlantTruth> = flight
@@ -21,28 +21,40 @@ pub(super) fn html(flight: &Flight) -> String {
     if moving.len() < 2 {
         return paragraph("The log has no record of the actuators in flight.");
     }
-    let stop_rad = profile.gimbal.limit_rad();
-    let gimbal_rate = profile.gimbal.rate_limit_rad_s();
-    let fin_rate = profile.fins.rate_limit_rad_s();
+    let stop_rad = vehicle.gimbal_limit_deg.to_radians();
+    let fin_rate = vehicle.fin_rate_deg_s.to_radians();
     let total_s: f64 = intervals(&moving).map(|(_, _, dt_s)| dt_s).sum();
     let time = |holds: &dyn Fn(&PlantTruth, &PlantTruth, f64) -> bool| -> f64 {
         intervals(&moving).filter(|(a, b, dt_s)| holds(a, b, *dt_s)).map(|(_, _, dt_s)| dt_s).sum()
     };
     let slewing = |a: f64, b: f64, dt_s: f64, rate: f64| (b - a).abs() >= AT_LIMIT * rate * dt_s;
-    let mut rows = vec![(
-        format!("gimbal at its stop of {:.1} deg", profile.gimbal.limit_deg),
-        Some(time(&|_, b, _| b.gimbal_actual_rad.abs() >= AT_LIMIT * stop_rad)),
-    )];
-    rows.push((
-        "gimbal at its fastest slew".to_owned(),
-        gimbal_rate
-            .map(|rate| time(&|a, b, dt_s| slewing(a.gimbal_actual_rad, b.gimbal_actual_rad, dt_s, rate))),
-    ));
+    let in_air = |time_s: f64| {
+        moving.first().is_some_and(|first| first.time_s <= time_s)
+            && moving.last().is_some_and(|last| time_s <= last.time_s)
+    };
+    let mut rows = Vec::new();
+    for axis in &flight.gimbal {
+        let name = axis.name.to_lowercase().replace(" angle", "");
+        let angles: Vec<(f64, f64)> =
+            axis.actual.iter().copied().filter(|(time_s, _)| in_air(*time_s)).collect();
+        let time = |holds: &dyn Fn(f64, f64, f64) -> bool| -> f64 {
+            let pairs = angles.windows(2).map(|pair| (pair[0].1, pair[1].1, pair[1].0 - pair[0].0));
+            pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).map(|(_, _, dt_s)| dt_s).sum()
+        };
+        rows.push((
+            format!("{name} at its stop of {:.1} deg", vehicle.gimbal_limit_deg),
+            Some(time(&|_, b, _| b.abs() >= AT_LIMIT * stop_rad)),
+        ));
+        rows.push((
+            format!("{name} at its fastest slew"),
+            vehicle.gimbal_rate_rad_s.map(|rate| time(&|a, b, dt_s| slewing(a, b, dt_s, rate))),
+        ));
+    }
     let fins = moving.iter().map(|truth| truth.fin_actual_rad.len()).max().unwrap_or(0);
     for fin in 0..fins {
         let angle = |truth: &PlantTruth| truth.fin_actual_rad.get(fin).copied().unwrap_or(f64::NAN);
         rows.push((
-            format!("fin {} at its fastest slew of {:.0} deg/s", fin + 1, profile.fins.rate_limit_deg_s),
+            format!("fin {} at its fastest slew of {:.0} deg/s", fin + 1, vehicle.fin_rate_deg_s),
             Some(time(&|a, b, dt_s| slewing(angle(a), angle(b), dt_s, fin_rate))),
         ));
     }

@@ -1,11 +1,17 @@
 //! How long the ticks took and how their solves went.
 
+use flight::controller::ControlLevel;
+use protocol::log::v1;
+
 use crate::info::Info;
 use crate::report::chart::{Chart, Line};
 use crate::report::page::{charts, paragraph, table};
 use crate::report::track::Flight;
 
 pub(super) fn html(flight: &Flight, info: &Info) -> String {
+    if flight.from_apogee.is_some() {
+        return plans(flight);
+    }
     let Some(ticks) = &info.ticks else {
         return paragraph("The log has no controller ticks.");
     };
@@ -40,4 +46,38 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
             chart("Solve time of each tick, ms", over(&|tick| 1e3 * tick.solve_time_s)),
             chart("Newton iterations of each tick", over(&|tick| f64::from(tick.output.solver.iterations))),
         ])
+}
+
+/// The plans of a flight computer: every tenth frame of the burn.
+fn plans(flight: &Flight) -> String {
+    let idle = u32::from(ControlLevel::Idle.index());
+    let plans: Vec<_> = flight.recording.ticks.iter().filter(|tick| tick.output.level != idle).collect();
+    if plans.is_empty() {
+        return paragraph("The flight computer planned no landing.");
+    }
+    let count = |level: ControlLevel| {
+        plans.iter().filter(|tick| tick.output.level == u32::from(level.index())).count()
+    };
+    let mut rows = vec![vec!["plans".to_owned(), plans.len().to_string()]];
+    for level in ControlLevel::ALL {
+        if count(level) > 0 {
+            rows.push(vec![format!("decided by {}", level.name()), count(level).to_string()]);
+        }
+    }
+    let iterations = |tick: &&v1::ControllerTick| f64::from(tick.output.solver.iterations);
+    let most = plans.iter().map(iterations).fold(0.0, f64::max);
+    rows.push(vec!["most iterations of a plan".to_owned(), format!("{most:.0}")]);
+    let points = plans.iter().map(|tick| (flight.axis_s(tick.input.time_s), iterations(tick))).collect();
+    let chart = Chart {
+        title: "Newton iterations of each plan".to_owned(),
+        x_label: flight.axis_name(),
+        lines: vec![Line { name: "", class: "a", points }],
+        marks: flight.marks(),
+        ..Chart::default()
+    };
+    table(&["", "#"], &rows)
+        + &charts(&[chart.svg()])
+        + &paragraph(
+            "This flight was simulated without a clock: solve times and deadlines are not in its log.",
+        )
 }

@@ -1,0 +1,237 @@
+//! A flight from apogee as the report looks at it: seen in the plane of its landing.
+//!
+//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, and asked for them. What
+//! the sections read of a planar landing (records of the plant, ticks, plans) is made of what this flight has: a tick is a
+//! frame that plans, velocities are through the air.
+
+use flight::controller::ControlLevel;
+use flight::dynamics::PlanarState;
+use flight::estimator::Estimate;
+use flight::mission::Mission;
+use flight::pilot::{FRAMES_PER_PLAN, Pilot};
+use flight::powered::{Plane, PoweredReport};
+use flight::thrust_curve::ThrustCurve;
+use nalgebra::Vector3;
+use protocol::log::{flight_v1, v1};
+use tick_log::pilot::state_from_log;
+use tick_log::state_to_log;
+
+use super::track::{
+    AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, state_of, track_of,
+};
+use crate::controller::{LoggedPilot, Replayed as _, settings_in_flight};
+use crate::log::Recording;
+
+/// Records of the world this close to a frame are of the same moment, s.
+const SAME_MOMENT_S: f64 = 1e-4;
+
+/// What the flight computer thought at a frame that plans.
+struct Thought {
+    frame: u64,
+    time_s: f64,
+    phase: u32,
+    level: u32,
+    estimate: Option<Estimate>,
+    burning_s: f64,
+    impulse_scale: f64,
+    inferred_n: f64,
+    /// Of a plan that was made at this frame: what was found, and its path, one step apart, s.
+    plan: Option<(PoweredReport, Vec<PlanarState>, f64)>,
+}
+
+/// The flight, seen in the plane of its landing.
+pub(super) fn flight(mut recording: Recording) -> Flight {
+    let Some((mission, curve, thoughts, pilot)) = run_again(&recording) else {
+        // Without mission, start or frames: the sections say what is missing.
+        return Flight::new(recording, Vec::new());
+    };
+    let nil = Vector3::zeros();
+    let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));
+    let truth: Vec<v1::PlantTruth> =
+        recording.world.iter().map(|sample| plant(sample, &recording.frames, &plane)).collect();
+    let ignition_s = pilot.ignited_at_s();
+    let ticks = thoughts.iter().map(|thought| tick(thought, &recording.world, &plane)).collect();
+    let plans = plans(&thoughts);
+    let gimbal =
+        [("Gimbal pitch", 0), ("Gimbal yaw", 1)].map(|(name, axis)| gimbal(name, axis, &recording.world));
+    let impulse_n_s: f64 = recording
+        .world
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0].thrust_n + pair[1].thrust_n) * (pair[1].time_s - pair[0].time_s))
+        .sum();
+    let burnt_out = recording.world.last().is_some_and(|last| last.thrust_n <= 0.0);
+    let from_apogee = FromApogee {
+        inferred_scales: ignition_s
+            .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
+        true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / curve.total_impulse_n_s()),
+    };
+    recording.truth = truth;
+    recording.ticks = ticks;
+    if let Some(verdict) = &mut recording.verdict {
+        // In the same plane as everything else.
+        let contact = recording.truth.iter().rfind(|truth| truth.time_s <= verdict.time_s);
+        verdict.state = contact.map_or(verdict.state, |truth| truth.state);
+    }
+    let (teller, track) = track_of(&recording);
+    Flight {
+        vehicle: Some(vehicle(&mission, curve)),
+        from_apogee: Some(from_apogee),
+        gimbal: gimbal.into(),
+        inferred_n: thoughts
+            .iter()
+            .filter(|thought| thought.burning_s > 0.0)
+            .map(|thought| (thought.time_s, thought.inferred_n))
+            .collect(),
+        plans,
+        teller,
+        track,
+        ignition_s,
+        touchdown_s: recording.verdict.as_ref().map(|verdict| verdict.time_s),
+        recording,
+    }
+}
+
+/// The flight computer run again, and what it thought every tenth frame; `None` if the log has not what it takes.
+fn run_again(recording: &Recording) -> Option<(Mission, ThrustCurve, Vec<Thought>, Pilot)> {
+    let (start, frames) = recording.replayable_frames().ok()?;
+    let in_flight = settings_in_flight(&recording.head.run).ok()?;
+    let mut controller = LoggedPilot::new(recording.profile_toml().ok()?, start, &in_flight).ok()?;
+    let mission = controller.pilot().mission().clone();
+    let curve = mission.motor().ok()?;
+    let mut thoughts = Vec::new();
+    for recorded in frames {
+        let again = controller.run_again(recorded).ok()?;
+        if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
+            continue;
+        }
+        let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
+        let planned = again.output.level != u32::from(ControlLevel::Idle.index());
+        let plan = pilot.planned().filter(|_| planned);
+        thoughts.push(Thought {
+            frame: recorded.input.frame,
+            time_s,
+            phase: again.output.phase,
+            level: again.output.level,
+            estimate: pilot.estimate().copied(),
+            burning_s: pilot.burning_s(time_s).unwrap_or(0.0),
+            impulse_scale: pilot.motor().impulse_scale(),
+            inferred_n: pilot.motor().predict(&curve, time_s, time_s).thrust_n,
+            plan: plan.map(|(states, step_s)| (*pilot.report(), states.to_vec(), step_s)),
+        });
+    }
+    Some((mission, curve, thoughts, controller.pilot().clone()))
+}
+
+fn vehicle(mission: &Mission, curve: ThrustCurve) -> Vehicle {
+    let airframe = &mission.airframe;
+    let weight_n = airframe.mass.loaded_kg * mission.gravity_m_s2;
+    let delay_s = mission.ignition.delay_s;
+    Vehicle {
+        gravity_m_s2: mission.gravity_m_s2,
+        weight_n,
+        half_thrust_n: 0.5 * curve.total_impulse_n_s() / curve.burn_time_s(),
+        gimbal_limit_deg: airframe.gimbal.limit_deg,
+        gimbal_rate_rad_s: Some(airframe.gimbal.servo.rate_rad_s()),
+        fin_rate_deg_s: airframe.fins.servo.rate_rad_s().to_degrees(),
+        expected_n: Box::new(move |since_s| curve.thrust_at_n(since_s - delay_s)),
+    }
+}
+
+/// The state in the plane, feet's height for altitude, velocities through air that moves with `wind_m_s`.
+fn in_plane(
+    plane: &Plane,
+    state: &flight_v1::RigidState,
+    height_m: f64,
+    wind_m_s: &Vector3<f64>,
+) -> PlanarState {
+    let state = state_from_log(state);
+    PlanarState { z_m: height_m, ..plane.project(&state, 0.0, wind_m_s.dot(&plane.along)) }
+}
+
+fn plant(sample: &flight_v1::TruthSample, frames: &[flight_v1::PilotTick], plane: &Plane) -> v1::PlantTruth {
+    let wind = &sample.wind_m_s;
+    let wind_m_s = Vector3::new(wind.x, wind.y, wind.z);
+    let behind = frames.partition_point(|tick| tick.input.time_s <= sample.time_s + SAME_MOMENT_S);
+    let phase = behind.checked_sub(1).and_then(|place| frames.get(place)).map_or(0, |tick| tick.output.phase);
+    v1::PlantTruth {
+        time_s: sample.time_s,
+        phase,
+        state: state_to_log(&in_plane(plane, &sample.state, sample.height_m, &wind_m_s)),
+        gimbal_commanded_rad: sample.gimbal_commanded_rad.first().copied().unwrap_or(0.0),
+        gimbal_actual_rad: sample.gimbal_actual_rad.first().copied().unwrap_or(0.0),
+        fin_commanded_rad: sample.fins_commanded_rad.clone(),
+        fin_actual_rad: sample.fins_actual_rad.clone(),
+        thrust_n: sample.thrust_n,
+        mass_kg: sample.mass_kg,
+        in_contact: sample.in_contact,
+    }
+}
+
+fn gimbal(name: &'static str, axis: usize, world: &[flight_v1::TruthSample]) -> GimbalAxis {
+    let over = |angles: fn(&flight_v1::TruthSample) -> &Vec<f64>| {
+        world.iter().filter_map(|sample| Some((sample.time_s, *angles(sample).get(axis)?))).collect()
+    };
+    GimbalAxis {
+        name,
+        commanded: over(|sample| &sample.gimbal_commanded_rad),
+        actual: over(|sample| &sample.gimbal_actual_rad),
+    }
+}
+
+fn tick(thought: &Thought, world: &[flight_v1::TruthSample], plane: &Plane) -> v1::ControllerTick {
+    let place = world.partition_point(|sample| sample.time_s < thought.time_s - SAME_MOMENT_S);
+    let state = match (&thought.estimate, world.get(place)) {
+        (Some(estimate), sample) => {
+            // Feet below the centre of gravity, as in the record of the world; the air as it was believed to move.
+            let feet_below_m = sample.map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
+            let height_m = estimate.state.position_m.z - feet_below_m;
+            let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
+            PlanarState { z_m: height_m, ..plane.project(&estimate.state, 0.0, wind_m_s) }
+        }
+        (None, _) => PlanarState::default(),
+    };
+    let mut tick = v1::ControllerTick::default();
+    tick.input = v1::ControllerInput {
+        tick: thought.frame,
+        time_s: thought.time_s,
+        phase: thought.phase,
+        time_since_ignition_s: thought.burning_s,
+        state: state_to_log(&state),
+        thrust_scale: thought.impulse_scale,
+        ..v1::ControllerInput::default()
+    };
+    tick.output.level = thought.level;
+    if let Some((report, _, _)) = &thought.plan {
+        tick.output.solver.status = u32::from(report.status.index());
+        tick.output.solver.iterations = u32::try_from(report.iterations).unwrap_or(u32::MAX);
+        tick.output.solver.cost = report.cost;
+        tick.output.predicted_touchdown.time_from_now_s = report.touchdown_in_s;
+        tick.output.predicted_touchdown.state = state_to_log(&report.touchdown);
+    } else {
+        tick.output.level = u32::from(ControlLevel::Idle.index());
+    }
+    tick
+}
+
+fn plans(thoughts: &[Thought]) -> Vec<PlanSample> {
+    let made: Vec<&Thought> = thoughts.iter().filter(|thought| thought.plan.is_some()).collect();
+    let stride = made.len().div_ceil(PLANS_DRAWN).max(1);
+    let sample = |(place, thought): (usize, &&Thought)| {
+        let (_, states, step_s) = thought.plan.as_ref()?;
+        let states: Vec<[f64; 6]> = states.iter().map(|state| state_of(&state_to_log(state))).collect();
+        let drawn = place.is_multiple_of(stride);
+        Some(PlanSample {
+            time_s: thought.time_s,
+            ahead: AHEAD_S.map(|ahead_s| between(&states, ahead_s / step_s)),
+            path: if drawn { states.iter().map(|state| (state[0], state[1])).collect() } else { Vec::new() },
+        })
+    };
+    made.iter().enumerate().filter_map(sample).collect()
+}
+
+/// The state at so many steps, between nodes; `None` behind the last.
+fn between(states: &[[f64; 6]], steps: f64) -> Option<[f64; 6]> {
+    let share = steps.fract();
+    let (before, after) = (states.get(steps as usize)?, states.get(steps as usize + 1)?);
+    Some(core::array::from_fn(|i| (1.0 - share) * before[i] + share * after[i]))
+}
