@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use e2e::{Clients, Program, Running, free_port, program, raw_frames_of};
+use e2e::{Clients, Program, Running, SerialLine, Signal, free_port, program, raw_frames_of};
 
 fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);
@@ -32,6 +32,31 @@ fn val_pymavlink_is_answered_as_the_standard_says() {
         command.arg(port.to_string());
         command
     });
+}
+
+/// Over UDP, and over a radio's serial line.
+#[test]
+fn val_pymavlink_flies_a_rocket_and_aborts_its_descent() {
+    let Some(clients) = Clients::installed() else { return };
+    let port = free_port();
+    let line = SerialLine::new(57_600);
+    let client = || clients.python("pymavlink", "pymavlink_rocket.py");
+    let (mut over_udp, mut over_serial) = (client(), client());
+    over_udp.arg(port.to_string());
+    over_serial.args([line.far.display().to_string(), "57600".to_owned()]);
+    let links = [format!("udpin:127.0.0.1:{port}"), format!("serial:{}:57600", line.near.display())];
+    for (link, client) in links.iter().zip([over_udp, over_serial]) {
+        let folder = tempfile::tempdir().unwrap();
+        let vehicle = vehicle(folder.path(), &["--profile", "mk2", "--mavlink", link]);
+        let mut client = client;
+        let ended = Running::to_end(client.env("PYTHONUNBUFFERED", "1"));
+        assert_eq!(ended.code, Some(0), "{link}: {}", ended.output);
+        assert!(ended.output.contains("ALL OK"), "{link}: {}", ended.output);
+        vehicle.signal(Signal::SIGTERM);
+        let flight = vehicle.wait();
+        assert_eq!(flight.code, Some(4), "{link}: {}", flight.output);
+        assert!(flight.output.contains("parachute deployed"), "{link}: {}", flight.output);
+    }
 }
 
 #[test]

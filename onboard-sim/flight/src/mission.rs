@@ -137,7 +137,11 @@ pub enum MissionError {
 }
 
 /// The built-in missions: name and TOML text.
-pub const BUILTIN: &[(&str, &str)] = &[("mk2", include_str!("../missions/mk2.toml"))];
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("mk2", include_str!("../missions/mk2.toml")),
+    ("mk2-h53", include_str!("../missions/mk2-h53.toml")),
+    ("mini-f10", include_str!("../missions/mini-f10.toml")),
+];
 
 impl Mission {
     /// Reads a mission from TOML; `origin` names it in messages.
@@ -207,6 +211,22 @@ mod tests {
             let mission = Mission::from_toml(text, name).expect("sound");
             assert_eq!(mission.name, *name);
         }
+    }
+
+    #[test]
+    fn a_countdown_is_a_time_to_wait_and_five_seconds_unless_said() {
+        let (name, text) = BUILTIN[0];
+        let of = |countdown: &str| Mission::from_toml(&text.replace("[start]", countdown), name);
+        assert!((of("[start]").expect("sound").start.countdown_s - 5.0).abs() < 1e-12);
+        assert!((of("[start]\ncountdown_s = 0").expect("sound").start.countdown_s).abs() < 1e-12);
+        for wrong in ["-1.0", "nan", "601.0"] {
+            let message = of(&format!("[start]\ncountdown_s = {wrong}")).expect_err("wrong").to_string();
+            assert!(
+                message.contains("start.countdown_s") && message.contains("must be 0 to 600"),
+                "{message}"
+            );
+        }
+        assert!(Mission::is_meant(text) && !Mission::is_meant("name = \"x\"") && !Mission::is_meant("="));
     }
 
     #[test]

@@ -102,8 +102,9 @@ impl FlyArguments {
                 (0.0..=WIND_MAX_M_S).contains(&wind_m_s),
                 "--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
             );
-            order.dispersion.wind_m_s = [wind_m_s; 2];
+            order.dispersion_toml = with_wind(&order.dispersion_toml, wind_m_s);
             order.dispersion_name = format!("{} with {wind_m_s} m/s of wind", order.dispersion_name);
+            order.dispersion = Dispersion::from_toml(&order.dispersion_toml, &order.dispersion_name)?;
         }
         order.faults.clone_from(&self.faults);
         Ok(())
@@ -149,6 +150,17 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         writeln!(std::io::stdout(), "log {}", path.display())?;
     }
     Ok(exit_code(&summary.outcome))
+}
+
+/// The text of a set of dispersions with this mean wind: the log keeps the text, and a replay draws from it again.
+fn with_wind(toml: &str, wind_m_s: f64) -> String {
+    const KEY: &str = "wind_m_s";
+    let is_wind = |line: &&str| {
+        line.trim_start().strip_prefix(KEY).is_some_and(|rest| rest.trim_start().starts_with('='))
+    };
+    let others: String = toml.lines().filter(|line| !is_wind(line)).map(|line| format!("{line}\n")).collect();
+    // At the top, before any table begins.
+    format!("{KEY} = [{wind_m_s:?}, {wind_m_s:?}]\n{others}")
 }
 
 /// Waits for Ctrl-C or a request to terminate.
@@ -211,13 +223,22 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Without the digits that come from turning degrees to radians and back.
+fn round(limit: f64) -> f64 {
+    (1e9 * limit).round() / 1e9
+}
+
 fn print_limits(out: &mut impl std::io::Write, judged: &Judged) -> std::io::Result<()> {
     for limit in &judged.verdict.results {
         let mark = if limit.passed { "ok  " } else { "FAIL" };
         writeln!(
             out,
             "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
-            limit.name, limit.value, limit.unit, limit.lowest, limit.highest
+            limit.name,
+            limit.value,
+            limit.unit,
+            round(limit.lowest),
+            round(limit.highest)
         )?;
     }
     Ok(())
@@ -236,4 +257,18 @@ fn exit_code(outcome: &Outcome) -> ExitCode {
 fn unix_ns() -> u64 {
     let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     since_epoch.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wind_is_set_in_every_set_of_dispersions_and_nothing_else() {
+        for (name, text) in dispersion::BUILTIN {
+            let before = Dispersion::from_toml(text, name).unwrap();
+            let after = Dispersion::from_toml(&with_wind(text, 4.5), name).unwrap();
+            assert_eq!(after, Dispersion { wind_m_s: [4.5; 2], ..before }, "{name}");
+        }
+    }
 }

@@ -132,6 +132,16 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
 }
 
 #[test]
+fn every_built_in_mission_is_ready_on_its_pad() {
+    for (name, _) in flight::mission::BUILTIN {
+        let LoadedFlight::FromApogee(flight) = load_profile(name).unwrap() else { panic!("from apogee") };
+        let mut rocket = rocket_of(&flight);
+        run_until(&mut rocket, |rocket| rocket.time_s() > rocket.ready_within_s());
+        assert_eq!(rocket.snapshot().checks_failed, 0, "{name}: {:?}", rocket.arming_checks());
+    }
+}
+
+#[test]
 fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
     let mut flight = flight_of("none", &[]);
     // Far below the ignition band.
