@@ -66,12 +66,17 @@ impl IgnitionSettings {
         let [weak, strong] = self.impulse_scales;
         let [short, long] = self.burn_time_scales;
         let extremes = [(weak, 1.0), (strong, 1.0), (1.0, short), (1.0, long)];
-        let common = certified.and_then(|certified| {
-            extremes.iter().try_fold(certified, |common, (impulse, time)| common.and(&band(*impulse, *time)?))
-        });
-        // Where no height suits all of them, what suits the certified motor has to do.
+        let bands = extremes.map(|(impulse, time)| band(impulse, time));
+        let common = certified
+            .and_then(|certified| bands.iter().try_fold(certified, |common, band| common.and(&(*band)?)));
+        // Where no height suits all of them, the middle ground between the highest low end and the lowest high end
+        // is as near to all as can be.
         let chosen_m = self.fixed_height_m.or_else(|| {
-            common.or(certified).map(|band| band.low_m + self.place * (band.high_m - band.low_m))
+            let nearest = bands.iter().flatten().fold(certified?, |nearest, band| Band {
+                low_m: nearest.low_m.max(band.low_m),
+                high_m: nearest.high_m.min(band.high_m),
+            });
+            Some(nearest.low_m + self.place * (nearest.high_m - nearest.low_m))
         });
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));

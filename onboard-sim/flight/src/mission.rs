@@ -10,6 +10,7 @@ use crate::airframe::{Airframe, AirframeError};
 use crate::descent::DescentGains;
 use crate::estimator::EstimatorConfig;
 use crate::ignition::IgnitionSettings;
+use crate::motor_estimate::MotorPrior;
 use crate::motors::{self, MotorError};
 use crate::powered::PoweredSettings;
 use crate::profile::{ArmingLimits, GateLimits, TouchdownBox};
@@ -71,8 +72,19 @@ pub struct Mission {
     pub steered: bool,
     /// Place of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
-    /// Standard deviations of the thrust ahead that the motor is taken to be weaker than estimated.
+    /// What is believed of the motor before it is lit.
+    #[serde(default)]
+    pub motor: MotorPrior,
+    /// Standard deviations of the impulse to come that a plan takes the motor to be weaker than estimated.
     pub caution_sigmas: f64,
+    /// The caution fades over so long before the thrust falls through the weight, s.
+    pub caution_fades_s: f64,
+    /// Standard deviations of the impulse to come, either way, that the fins leave room for.
+    pub fin_sigmas: f64,
+    /// Where the fins keep the vehicle in the band that is then left, 0 at its low end, 1 at its high end.
+    pub fin_place: f64,
+    /// Experiment.
+    pub fin_gain: f64,
     /// How much of the fins' present opening a plan expects to last; the rest is expected to be half open.
     pub fins_kept: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.

@@ -12,7 +12,8 @@ mod ignition;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4, Vector2, Vector4};
+use serde::Deserialize;
 
 use self::ignition::Detector;
 use crate::thrust_curve::ThrustCurve;
@@ -53,7 +54,8 @@ pub struct MotorSample {
 }
 
 /// What is believed before the motor is lit, and of its noise. Standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct MotorPrior {
     /// Length of a frame, s.
     pub frame_s: f64,
@@ -191,6 +193,18 @@ impl MotorEstimate {
     /// Standard deviations of impulse scale, burn-time stretch, ignition, s, and air scale.
     pub fn sigmas(&self) -> [f64; 4] {
         core::array::from_fn(|index| self.covariance[(index, index)].max(0.0).sqrt())
+    }
+
+    /// Impulse scale and burn-time stretch of the motor that, so many standard deviations from the expected one,
+    /// changes a quantity most which has these derivatives by the two; positive deviations raise it.
+    pub fn doubted(&self, derivatives: [f64; 2], sigmas: f64) -> [f64; 2] {
+        let with = self.covariance.fixed_view::<2, 2>(0, 0) * Vector2::from(derivatives);
+        let variance = with.dot(&Vector2::from(derivatives));
+        let moved = if variance > 0.0 { with * (sigmas / variance.sqrt()) } else { Vector2::zeros() };
+        [
+            (self.mean[IMPULSE] + moved.x).clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]),
+            (self.mean[STRETCH] + moved.y).clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]),
+        ]
     }
 
     /// Takes one frame. A sample that is not finite teaches nothing.

@@ -32,7 +32,7 @@ remembers!(Pilot {
 });
 
 // The mission, its motor and its masses are what a log's profile says; they do not change in flight.
-remembers!(Known { motor, caution } but { mission, curve, mass });
+remembers!(Known { motor } but { mission, curve, mass });
 
 remembers!(Outlook { ignition, commit_height_m, height_m, predicted_speed_m_s, touchdown_distance_m });
 remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });

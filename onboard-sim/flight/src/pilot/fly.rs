@@ -16,13 +16,10 @@ use crate::gate::{GateInput, gate_checks};
 use crate::motor_estimate::MotorSample;
 use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
 
+/// Frames between outlooks while the ignition is seconds away.
+const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// A fin that is farther than this from its command is not there, rad.
 const FIN_THERE_RAD: f64 = 0.1;
-/// The thrust's uncertainty is looked up so far ahead, s, and never taken for more than this share.
-const CAUTION_AHEAD_S: f64 = 1.0;
-const LARGEST_CAUTION: f64 = 0.06;
-/// It fades over so long before the thrust falls through the weight, s.
-const CAUTION_FADES_S: f64 = 2.0;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -36,7 +33,9 @@ impl Pilot {
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         self.feel(input, &estimate, density_kg_m3);
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
-        if planning && self.mode.phase.in_descent() {
+        let far = self.mode.phase == Phase::AeroDescent;
+        let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
+        if looking && self.mode.phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }
         self.move_through_phases(input, &estimate);
@@ -93,14 +92,13 @@ impl Pilot {
         }
         let mass = self.known.mass_now(self.known.burning_s(input.time_s));
         let burning = self.mode.phase.in_landing_burn();
-        let mission = &self.known.mission;
         let vehicle = VehicleNow::of(
             self.known.airframe(),
             &mass,
             density_kg_m3,
             input.fins_rad,
             burning,
-            mission.lidar_ahead_of_feet_m,
+            self.known.mission.lidar_ahead_of_feet_m,
         );
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
@@ -113,22 +111,6 @@ impl Pilot {
             may_burn: burning,
         };
         self.known.motor.update(&self.known.curve, &sample);
-        self.known.caution = self.caution(input.time_s);
-    }
-
-    /// How much less impulse than estimated to plan with; none before the motor burns, when nothing is planned.
-    fn caution(&self, time_s: f64) -> f64 {
-        let Some(burning_s) = self.known.burning_s(time_s) else { return 0.0 };
-        let ahead = self.known.motor.predict(&self.known.curve, time_s + CAUTION_AHEAD_S, time_s);
-        if ahead.thrust_n > 0.0 {
-            // Nothing is thrown away late when it is late already.
-            let carried_until_s = self.known.carried_until_s().unwrap_or(0.0) - burning_s;
-            let early = (carried_until_s / CAUTION_FADES_S).clamp(0.0, 1.0);
-            let sigmas = self.known.mission.caution_sigmas;
-            early * (sigmas * ahead.sigma_n / ahead.thrust_n).min(LARGEST_CAUTION)
-        } else {
-            0.0
-        }
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
@@ -257,18 +239,26 @@ impl Pilot {
         let column = self.known.column(situation.density_kg_m3);
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
-        let burn = self.known.burn();
+        let sigmas = self.known.mission.fin_sigmas;
+        let [weak, strong] =
+            [-sigmas, sigmas].map(|sigmas| self.known.doubted_burn(situation.burning_s, sigmas));
         self.fin_share = column.fin_share(
-            &burn,
+            [&weak, &strong],
             situation.burning_s,
             state.velocity_m_s.z,
             height_m,
-            self.known.mission.ignition.place,
+            self.known.mission.fin_place,
+            self.known.mission.fin_gain,
         );
         if self.mode.interlocks.degraded {
             return;
         }
-        let situation = self.known.powered_situation(estimate, situation, fins_rad);
+        let situation = self.known.powered_situation(
+            estimate,
+            situation,
+            fins_rad,
+            self.known.cautious_burn(situation.burning_s),
+        );
         self.powered.plan(time_s, state, &situation);
     }
 
@@ -283,7 +273,7 @@ impl Pilot {
         let aim: Aim = self.powered.aim(
             time_s,
             &estimate.state,
-            &self.known.powered_situation(estimate, situation, fins_rad),
+            &self.known.powered_situation(estimate, situation, fins_rad, self.known.burn()),
         );
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
             thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2

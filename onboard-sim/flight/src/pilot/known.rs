@@ -17,9 +17,6 @@ pub(super) struct Known {
     pub(super) mass: MassModel,
     /// Motor and scale of the air's forces, as felt.
     pub(super) motor: MotorEstimate,
-    /// How much less impulse than estimated is planned with, as a share: what turns out to be too much can be thrown
-    /// away late, what is missing cannot be had.
-    pub(super) caution: f64,
 }
 
 /// The burning vehicle of a frame.
@@ -65,14 +62,43 @@ impl Known {
     pub(super) fn burn(&self) -> Burn<'_> {
         Burn {
             curve: &self.curve,
-            impulse_scale: self.motor.impulse_scale() - self.caution,
+            impulse_scale: self.motor.impulse_scale(),
             time_scale: self.motor.burn_time_stretch(),
         }
     }
 
-    /// When thrust falls through the weight, s since it began.
-    pub(super) fn carried_until_s(&self) -> Option<f64> {
-        self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)
+    /// The motor that is so many standard deviations weaker (below zero) or stronger than expected in what it has yet
+    /// to give until its thrust falls through the weight. What is measured tells thrust, not how long it lasts: while
+    /// that is so, the weaker motor burns out sooner.
+    pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
+        let burn = self.burn();
+        let carried_until_s =
+            burn.falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let Some(until_s) = carried_until_s.filter(|until_s| *until_s > burning_s) else { return burn };
+        let to_come_n_s = burn.mean_thrust_n(burning_s, until_s - burning_s) * (until_s - burning_s);
+        let derivatives = [
+            to_come_n_s / burn.impulse_scale,
+            (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
+        ];
+        let [impulse_scale, time_scale] = self.motor.doubted(derivatives, sigmas);
+        Burn { impulse_scale, time_scale, ..burn }
+    }
+
+    /// The motor that is planned with: what turns out to be too much can be thrown away late, what is missing cannot
+    /// be had.
+    pub(super) fn cautious_burn(&self, burning_s: f64) -> Burn<'_> {
+        let fades_s = self.mission.caution_fades_s;
+        let early = if fades_s > 0.0 {
+            let left_s = self
+                .burn()
+                .falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)
+                .unwrap_or(0.0)
+                - burning_s;
+            (left_s / fades_s).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        self.doubted_burn(burning_s, -self.mission.caution_sigmas * early)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64) -> Column {
@@ -101,9 +127,10 @@ impl Known {
         estimate: &Estimate,
         situation: &Burning,
         fins_rad: &[f64; 4],
+        burn: Burn<'a>,
     ) -> PoweredSituation<'a> {
         PoweredSituation {
-            burn: self.burn(),
+            burn,
             burning_s: situation.burning_s,
             mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
             inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,

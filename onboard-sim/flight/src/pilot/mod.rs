@@ -130,8 +130,7 @@ impl Pilot {
                 mission: mission.clone(),
                 mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
                 curve,
-                motor: MotorEstimate::new(&MotorPrior { frame_s, ..MotorPrior::default() }),
-                caution: 0.0,
+                motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
             },
         })
     }

@@ -13,7 +13,7 @@ use crate::nmpc::{Solution, SolveStatus};
 remembers!(PoweredGuidance { plane, flown, report } but { settings, workspace, trial });
 
 remembers!(Plane { along, across });
-remembers!(Flown { plane, begins_s, turning_rad_s2, plan });
+remembers!(Flown { begins_s, turning_rad_s2, plan });
 remembers!(FreeTimeSolution { solution, final_time_s, earliest_s, price_slope, solves });
 remembers!(Solution {
     status,

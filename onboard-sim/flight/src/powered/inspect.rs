@@ -1,7 +1,8 @@
 //! The guidance looked at, and its settings changed, from outside the flight: for those who replay it.
 
 use super::situation::Ahead;
-use super::{PoweredGuidance, PoweredSettings, PoweredSituation, UPRIGHT_DEARER, largest_tilt_rad};
+use super::{Plane, PoweredGuidance, PoweredSettings, PoweredSituation, UPRIGHT_DEARER, largest_tilt_rad};
+use crate::dynamics::PlanarState;
 use crate::nmpc::Problem;
 use crate::nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, Motor as _, solve_free_time};
 use crate::rigid::RigidState;
@@ -18,6 +19,18 @@ pub struct LandingSolved {
 }
 
 impl PoweredGuidance {
+    /// The plane of the landing, once there is one.
+    pub fn plane(&self) -> Option<&Plane> {
+        self.plane.as_ref()
+    }
+
+    /// The planned planar states, one step apart, s, if there is a plan: positions over the ground, velocities through
+    /// the air.
+    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
+        let flown = self.flown.as_ref()?;
+        Some((&flown.plan.solution.states, flown.plan.solution.step_s))
+    }
+
     /// The same memory under other settings.
     #[must_use]
     pub(crate) fn reconfigured(&self, settings: &PoweredSettings) -> Self {

@@ -125,9 +125,9 @@ impl Fall {
             }
             // `other` is the newest.
             if miss_m_s * other.1 < 0.0 {
-                one = other
+                one = other;
             } else {
-                one.1 *= 0.5
+                one.1 *= 0.5;
             }
             other = (parameter, miss_m_s);
         }

@@ -119,31 +119,33 @@ impl Column {
         (height_m, vertical_m_s)
     }
 
-    /// How much of the fins to open, 0 to 1, to stay at a place in the band, from the height the vehicle has.
+    /// How much of the fins to open, 0 to 1, from the height the vehicle has: to stay at a place between the lowest start
+    /// that suits the weaker of two motors and the highest that suits the stronger.
     ///
     /// Without a band the vehicle is too fast or too slow for any landing, and the answer is an end of the range.
     pub fn fin_share(
         &self,
-        burn: &Burn<'_>,
+        burns: [&Burn<'_>; 2],
         burning_s: f64,
         vertical_m_s: f64,
         height_m: f64,
         place: f64,
+        gain: f64,
     ) -> f64 {
-        /// Share of the fins per share of the band.
-        const GAIN: f64 = 1.5;
         /// A band is taken to be at least this wide, in time at the present speed, s: above a narrow band lies hardly
         /// a landing, but closing the fins would only make the vehicle faster.
         const NARROW_S: f64 = 0.25;
-        match self.band(burn, burning_s, vertical_m_s) {
-            Some(band) => {
-                let at_least = Band { high_m: band.high_m.max(band.low_m - NARROW_S * vertical_m_s), ..band };
-                (0.5 + GAIN * (place - at_least.place(height_m))).clamp(0.0, 1.0)
-            }
+        let [weak, strong] = burns.map(|burn| self.band(burn, burning_s, vertical_m_s));
+        let Some(weak) = weak else {
             // Falling slower than a landing would: let it fall.
-            None if vertical_m_s > -1.0 || self.stops_too_soon(burn, burning_s, vertical_m_s) => 0.0,
-            None => 1.0,
-        }
+            let close = vertical_m_s > -1.0 || self.stops_too_soon(burns[0], burning_s, vertical_m_s);
+            return if close { 0.0 } else { 1.0 };
+        };
+        let strong = strong.unwrap_or(weak);
+        let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
+        let width_m = (high_m - low_m).max(-NARROW_S * vertical_m_s).max(1e-3);
+        let at_m = low_m + place * width_m;
+        (0.5 + gain * (at_m - height_m) / width_m).clamp(0.0, 1.0)
     }
 
     /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.
