@@ -1,5 +1,4 @@
 //! A rocket from apogee on the wire: by itself, with the ground station over UDP and over a radio's serial line, and aborted.
-#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::Path;
 

@@ -58,7 +58,8 @@ impl AbortChord {
         };
     }
 
-    /// Enter was pressed. Returns whether it completes the chord, which is over then.
+    /// A key was pressed that cannot be a repeat of the first: Enter, or Ctrl-X where repeats are told apart. Returns
+    /// whether it completes the chord, which is over then.
     pub fn confirm(&mut self, now: Duration) -> bool {
         let complete = self.is_begun(now);
         if complete {

@@ -12,6 +12,8 @@ use crate::model::link::LinkState;
 
 /// An abort that was sent more often than this without an answer is an alarm.
 const UNANSWERED_ATTEMPTS: u32 = 3;
+/// Under thrust, until the first plan acts: the stabiliser bridges that by design.
+const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
 /// A reboot is an alarm for this long, and until it is acknowledged.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
@@ -88,7 +90,9 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
         if controller.value.deadline_margin_us < 0 {
             found.push((AlarmKind::DeadlineMissed, "controller DEADLINE MISSED".to_owned()));
         }
+        let lit_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
         if controller.value.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER
+            && now.saturating_sub(lit_at) >= FIRST_PLAN_WITHIN
             && !found.iter().any(|(kind, _)| *kind == AlarmKind::Degraded)
         {
             found.push((AlarmKind::Degraded, "DEGRADED: the stabiliser flies".to_owned()));

@@ -33,10 +33,11 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         return model.info(now, why);
     }
     if key == Key::CtrlX {
-        model.abort_chord.press(now);
-        // A terminal that tells repeats apart has shown that this was a press: nothing is waited for.
-        if model.repeats_told && model.abort_chord.acts_at().is_some() && model.abort_chord.end() {
+        // Where the terminal tells repeats apart, a second Ctrl-X was pressed, however soon it came.
+        if model.repeats_told && model.abort_chord.confirm(now) {
             abort(model, now);
+        } else {
+            model.abort_chord.press(now);
         }
         return;
     }

@@ -24,7 +24,7 @@ pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<L
     let mut rows = limit_rows(model, &prediction.value.touchdown, theme, mark, role);
     rows.push(Line::from(vec![
         Span::styled("in      ", theme.style(Role::Label)),
-        Span::styled(format!("{mark}{:>7}", fixed(prediction.value.time_to_go_s, 2)), theme.style(role)),
+        Span::styled(format!("{mark}{:>6}", fixed(prediction.value.time_to_go_s, 2)), theme.style(role)),
         Span::styled(" s", theme.style(Role::Label)),
     ]));
     rows.push(match prediction.value.touchdown.violations() {
@@ -39,9 +39,13 @@ pub fn verdict_word(landed: bool) -> (&'static str, Role) {
     if landed { ("LANDED inside every limit", Role::Good) } else { ("NOT LANDED", Role::Alarm) }
 }
 
-/// Three decimals decide about a speed; a large value needs its room for the digits before.
+/// Six characters with the sign, whatever the size: three decimals decide about a speed, two about an angle.
 fn decimals(value: f64) -> usize {
-    if value.abs() < 100.0 { 3 } else { 1 }
+    match value.abs() {
+        0.0..10.0 => 3,
+        10.0..100.0 => 2,
+        _ => 1,
+    }
 }
 
 fn limit_rows(
@@ -57,7 +61,7 @@ fn limit_rows(
         Line::from(vec![
             Span::styled(word, theme.style(word_role)),
             Span::styled(format!(" {:<5}", row.name), theme.style(Role::Label)),
-            Span::styled(format!("{mark}{:>7}", fixed(row.value, decimals(row.value))), theme.style(role)),
+            Span::styled(format!("{mark}{:>6}", fixed(row.value, decimals(row.value))), theme.style(role)),
             Span::styled(format!(" {} {}", row.limit, row.unit), theme.style(Role::Label)),
         ])
     };

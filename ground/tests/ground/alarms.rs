@@ -4,7 +4,7 @@ use ground::key::Key;
 use ground::model::alarm::{AlarmKind, RING_EVERY};
 use ground::model::command::CommandKind;
 use ground::update::Action;
-use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdPhase};
+use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
 
 use crate::bench::Bench;
 use crate::hand::ladder;
@@ -63,6 +63,28 @@ fn what_the_vehicle_latches_is_an_alarm() {
     bench.interlocks |= TdInterlock::TD_INTERLOCK_NO_LIGHT;
     bench.run(0.1);
     assert!(bench.screen(80, 24).contains("ALARM NO LIGHT"));
+}
+
+/// Until the first plan acts the stabiliser flies by design; a stabiliser that goes on flying is an alarm.
+#[test]
+fn a_stabiliser_that_goes_on_flying_is_an_alarm_and_its_first_moment_is_none() {
+    let stabiliser = TdControlLevel::TD_CONTROL_LEVEL_STABILISER;
+    let mut bench = Bench::crewed();
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.run(0.1);
+    bench.controller(stabiliser);
+    assert!(bench.model.alarms.list().is_empty());
+    bench.run(0.3);
+    bench.controller(stabiliser);
+    assert!(bench.screen(80, 24).contains("ALARM DEGRADED"), "{}", bench.screen(80, 24));
+    let mut bench = Bench::crewed();
+    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.run(0.1);
+    bench.controller(stabiliser);
+    bench.run(0.1);
+    bench.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
+    bench.run(2.0);
+    assert!(bench.model.alarms.list().is_empty());
 }
 
 #[test]

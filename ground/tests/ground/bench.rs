@@ -223,10 +223,10 @@ impl Bench {
         }));
     }
 
-    pub(crate) fn plan(&mut self, violated: TdLimit) {
-        let time_boot_ms = self.boot_ms();
+    /// What acts, and how its solver does.
+    pub(crate) fn controller(&mut self, level: TdControlLevel) {
         self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
-            time_boot_ms,
+            time_boot_ms: self.boot_ms(),
             tick: 12,
             cost: 8465.2,
             kkt_stationarity: 2.4e-7,
@@ -235,9 +235,14 @@ impl Bench {
             solve_time_us: 1_234,
             deadline_margin_us: 98_766,
             iterations: 3,
-            level: TdControlLevel::TD_CONTROL_LEVEL_CONVERGED,
+            level,
             solver_status: TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
         }));
+    }
+
+    pub(crate) fn plan(&mut self, violated: TdLimit) {
+        let time_boot_ms = self.boot_ms();
+        self.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
         self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
             time_boot_ms,
             time_to_go_ms: 2_300,

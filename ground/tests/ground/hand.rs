@@ -314,14 +314,17 @@ fn nothing_takes_back_a_complete_abort_chord() {
 /// Where repeats are told apart, the second press is one, and is not waited for.
 #[test]
 fn the_second_press_acts_at_once_where_the_terminal_tells_repeats() {
-    let mut bench = Bench::crewed();
-    bench.model.repeats_told = true;
-    bench.key(Key::CtrlX);
-    bench.run(0.3);
-    assert!(!bench.take_commands().iter().any(is_abort));
-    bench.key(Key::CtrlX);
-    assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
-    bench.answer(ABORT, ACCEPTED);
-    bench.run(3.0);
-    assert!(bench.take_commands().is_empty(), "once");
+    // A busy machine may hand over both at once.
+    for pause_s in [0.0, 0.1, 0.3, 1.9] {
+        let mut bench = Bench::crewed();
+        bench.model.repeats_told = true;
+        bench.key(Key::CtrlX);
+        bench.run(pause_s);
+        assert!(!bench.take_commands().iter().any(is_abort));
+        bench.key(Key::CtrlX);
+        assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
+        bench.answer(ABORT, ACCEPTED);
+        bench.run(3.0);
+        assert!(bench.take_commands().is_empty(), "once");
+    }
 }

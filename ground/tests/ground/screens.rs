@@ -85,12 +85,12 @@ fn limits_are_shown_once_the_vehicle_has_said_them() {
     bench.plan(TdLimit::TD_LIMIT_AXIAL_SPEED);
     let screen = bench.screen(80, 24);
     assert!(
-        screen.contains("NO u      -0.050 -- m/s") && screen.contains(" -         0         +"),
+        screen.contains("NO u     -0.050 -- m/s") && screen.contains(" -         0         +"),
         "{screen}"
     );
     bench.limits();
     let screen = bench.screen(80, 24);
-    assert!(screen.contains("NO u      -0.050 ±0.4 m/s") && screen.contains("+20 deg"), "{screen}");
+    assert!(screen.contains("NO u     -0.050 ±0.4 m/s") && screen.contains("+20 deg"), "{screen}");
 }
 
 /// A serial line's capacity stands beside its rate; a network's is unknown.
