@@ -118,13 +118,15 @@ impl<'a> AtStart<'a> {
                 }
             }
         }
-        let recorded = if let Some(verdict) = &recording.verdict {
-            Some(VerdictFacts::of(verdict))
-        } else {
-            // An older log: what the flight comes to as it was.
-            let mut as_it_was = rerun.clone();
-            while as_it_was.step()? {}
-            from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+        let recorded = match &recording.verdict {
+            Some(verdict) => Some(VerdictFacts::of(verdict)),
+            // An older log: what the flight comes to as it was, if it is still the same flight.
+            None if reached.first_different.is_none() => {
+                let mut as_it_was = rerun.clone();
+                while as_it_was.step()? {}
+                from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+            }
+            None => None,
         };
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
