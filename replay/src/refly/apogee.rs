@@ -270,6 +270,7 @@ impl<'a> AtStart<'a> {
             let reason = format!("{setting}: the estimator is set up at apogee; evaluate takes it");
             return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
         }
+        refuse_misplaced(options)?;
         let mut rerun = self.rerun.clone();
         let in_flight = self.in_flight(options)?;
         rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
@@ -294,6 +295,22 @@ impl<'a> AtStart<'a> {
         }
         Ok(rerun)
     }
+}
+
+/// The plant has an airframe and what chance decided, the controller everything but the latter.
+fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
+    let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
+    let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
+    if let Some(setting) = options.settings.iter().find(of_truth) {
+        let belongs = "what chance decided is the plant's alone (--plant, --vary-plant, --of-plant)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {
+        let belongs =
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set, --vary)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    Ok(())
 }
 
 /// The settings without a time.

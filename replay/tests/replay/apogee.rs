@@ -159,6 +159,8 @@ fn what_cannot_be_flown_again_is_said() {
     assert!(refused(&with_plant(&["truth.wind=3"])).contains("`truth.wind_m_s`"));
     assert!(refused(&with_plant(&["truth.wind_m_s=3@4"])).contains("from the beginning"));
     assert!(refused(&with_plant(&["truth.wind_m_s=99"])).contains("0 to 60 is accepted"));
+    assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
+    assert!(refused(&with(&["truth.wind_m_s=3"])).contains("the plant's alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
     recording.head.run.remove("flight");
     let message = refly(&recording, &ReflyOptions::default()).unwrap_err().to_string();
