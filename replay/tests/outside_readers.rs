@@ -106,7 +106,8 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
         let (topic, count, command_rad) = commands(&recording);
         assert!(read.contains(&format!("{topic} {count}\n")), "{read}");
         assert!(read.contains(&format!("gimbal {}\n", hex(folder, command_rad))), "{read}");
-        assert_eq!(read.lines().find_map(|line| line.strip_prefix("/verdict ")), Some("1"), "{read}");
+        // The recovered log was cut before its verdict.
+        assert_eq!(read.contains("/verdict 1\n"), recording.verdict.is_some(), "{read}");
     }
 }
 
