@@ -60,7 +60,9 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         .sum();
     let burnt_out = recording.world.last().is_some_and(|last| last.thrust_n <= 0.0);
     let from_apogee = FromApogee {
-        inferred_scales: ignition_s
+        inferred_scales: pilot
+            .motor()
+            .ignition_s()
             .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
         true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / curve.total_impulse_n_s()),
     };
