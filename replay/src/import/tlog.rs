@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use protocol::frame::{Frame, Framer};
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::tlog::{TlogFrame, TlogReader};
-use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+use protocol::log::writer::{LogHeader, LogWriteError};
 use serde::Serialize;
 
 use super::fold::Fold;
+use crate::log::{NewLog, NewLogError};
 
 /// A ground station's system number, by convention.
 const GROUND_SYSTEM: u8 = 255;
@@ -77,16 +77,17 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
         return Err(ImportError::NoFrames { path: input.to_owned() });
     };
     let start_us = first.time_us;
-    let create = |source| ImportError::Create { path: output.to_owned(), source };
-    let file = File::options().write(true).create_new(true).open(output).map_err(create)?;
     let header = LogHeader {
         writer: "replay".to_owned(),
         start_unix_ns: start_us.saturating_mul(1000),
         run: BTreeMap::from([("imported_from".to_owned(), input.display().to_string())]),
         ..LogHeader::default()
     };
-    let write = |source| ImportError::Write { path: output.to_owned(), source };
-    let mut writer = LogWriter::new(BufWriter::new(file), &header).map_err(write)?;
+    let failed = |error| match error {
+        NewLogError::Create(source) => ImportError::Create { path: output.to_owned(), source },
+        NewLogError::Write(source) => ImportError::Write { path: output.to_owned(), source },
+    };
+    let mut log = NewLog::create(output, &header).map_err(failed)?;
     let link = format!("file:{}", input.file_name().unwrap_or_default().to_string_lossy());
     let mut imported = ImportedTlog::default();
     let mut fold = Fold::default();
@@ -100,19 +101,18 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
         let source = bytes.get(5).copied();
         let direction = if source == Some(GROUND_SYSTEM) { Direction::Tx } else { Direction::Rx };
         let raw = RawFrame { direction, endpoint: "ground", link: link.clone(), bytes };
-        writer.write(&Record::RawFrame(raw), time_ns).map_err(write)?;
+        log.write(&Record::RawFrame(raw), time_ns).map_err(failed)?;
         if let Some(frame) = understood.filter(|_| direction == Direction::Rx) {
             for record in fold.take(&frame, since_us as f64 / 1e6) {
                 imported.telemetry += u64::from(matches!(record, Record::Telemetry(_)));
-                writer.write(&record, time_ns).map_err(write)?;
+                log.write(&record, time_ns).map_err(failed)?;
             }
         }
         next = frames.next_frame().map_err(read)?;
     }
     imported.mavlink1 = frames.mavlink1();
     imported.garbage_bytes = frames.garbage_bytes();
-    let mut file = writer.finish().map_err(write)?;
-    file.flush().map_err(|error| write(mcap::McapError::from(error).into()))?;
+    log.finish().map_err(failed)?;
     Ok(imported)
 }
 
