@@ -10,7 +10,7 @@ mod simulated;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::log::{FlightLog, Recording};
@@ -69,7 +69,7 @@ fn hex(folder: &Path, number: f64) -> String {
 }
 
 /// The recorder's log, one flown again and one recovered; and of a flight from apogee.
-fn logs() -> Vec<PathBuf> {
+static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     let recording = NOMINAL.recording();
     let options = ReflyOptions::default();
     let (report, flight) = refly_flight(&recording, &options).unwrap();
@@ -81,12 +81,10 @@ fn logs() -> Vec<PathBuf> {
     std::fs::write(&cut, &bytes[..bytes.len() * 4 / 5]).unwrap();
     let recovered = NOMINAL.beside("recovered.mcap");
     recover(&cut, &recovered).unwrap();
-    let mut logs =
-        vec![NOMINAL.log.clone(), DISPERSED.log.clone(), WITH_FRAMES.log.clone(), again, recovered];
     assert!(LANDED.landed);
-    logs.push(LANDED.log.clone());
-    logs
-}
+    let planar = [&NOMINAL, &DISPERSED, &WITH_FRAMES].map(|flight| flight.log.clone());
+    planar.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
+});
 
 /// A topic's messages, and the last gimbal command, rad.
 fn commands(recording: &Recording) -> (&'static str, usize, f64) {
@@ -100,15 +98,16 @@ fn commands(recording: &Recording) -> (&'static str, usize, f64) {
 #[test]
 fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
     let Some(folder) = readers() else { return };
-    for log in logs() {
-        let read = said(python(folder, "readers", "python").arg(script("read_mcap.py")).arg(&log));
+    for log in LOGS.iter() {
+        let read = said(python(folder, "readers", "python").arg(script("read_mcap.py")).arg(log));
         assert!(read.contains("/vehicle/truth"), "{read}");
-        said(python(folder, "readers", "pymcap-cli").arg("doctor").arg(&log));
-        let recording = Recording::open(&log).unwrap();
+        said(python(folder, "readers", "pymcap-cli").arg("doctor").arg(log));
+        let recording = Recording::open(log).unwrap();
         let (topic, count, command_rad) = commands(&recording);
         assert!(read.contains(&format!("{topic} {count}\n")), "{read}");
         assert!(read.contains(&format!("gimbal {}\n", hex(folder, command_rad))), "{read}");
-        assert_eq!(read.lines().find_map(|line| line.strip_prefix("/verdict ")), Some("1"), "{read}");
+        // The recovered log was cut before its verdict.
+        assert_eq!(read.contains("/verdict 1\n"), recording.verdict.is_some(), "{read}");
     }
 }
 
@@ -116,10 +115,10 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
 #[test]
 fn logs_are_read_by_foxgloves_library() {
     let Some(folder) = readers() else { return };
-    for log in logs() {
+    for log in LOGS.iter() {
         let node = folder.join("node");
-        let read = said(Command::new("node").arg(script("read_mcap.mjs")).arg(&log).current_dir(node));
-        let (topic, count, _) = commands(&Recording::open(&log).unwrap());
+        let read = said(Command::new("node").arg(script("read_mcap.mjs")).arg(log).current_dir(node));
+        let (topic, count, _) = commands(&Recording::open(log).unwrap());
         let mut channels = read.lines().map(|line| line.split(' ').collect::<Vec<_>>());
         let of_commands = channels.clone().find(|channel| channel[0] == topic).unwrap();
         assert_eq!(of_commands[2], count.to_string(), "{read}");
@@ -134,8 +133,8 @@ fn logs_are_read_by_foxgloves_library() {
 #[test]
 fn logs_pass_rerun_mcap_check() {
     let Some(folder) = readers() else { return };
-    for log in logs() {
-        let checked = said(python(folder, "rerun", "rerun").args(["mcap", "check"]).arg(&log));
+    for log in LOGS.iter() {
+        let checked = said(python(folder, "rerun", "rerun").args(["mcap", "check"]).arg(log));
         let accepted = |line: &str| line.starts_with("ok ") && line.contains("/vehicle/truth");
         assert!(checked.lines().any(accepted), "{checked}");
         assert!(!checked.lines().any(|line| line.starts_with("error")), "{checked}");
@@ -166,7 +165,7 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
     check(&NOMINAL.log, NOMINAL.beside("tables"), "vehicle_truth.parquet", recording.truth.len(), &values);
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.world.last().unwrap();
-    let values = [("state.position_m.x_m", last.state.position_m.x), ("height_m", last.height_m)];
+    let values = [("state.position_m.x", last.state.position_m.x), ("height_m", last.height_m)];
     check(&LANDED.log, LANDED.beside("tables"), "vehicle_truth3d.parquet", recording.world.len(), &values);
 }
 

@@ -59,6 +59,9 @@ enum Question {
     ///
     /// The plant starts in the recorded state of that moment and the controller with what it remembered; nothing of
     /// the record is used afterwards. With nothing changed, a simulated flight comes out the same bit for bit.
+    ///
+    /// A flight from apogee is flown again from apogee with the recorded draw up to that moment, since a log does not
+    /// hold the memory of gusts, servos and sensors; the answer says how many recorded frames came out the same.
     Refly(refly::Ask),
     /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.
     Sweep(sweep::Ask),

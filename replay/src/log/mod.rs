@@ -6,6 +6,7 @@
 mod entry;
 mod error;
 mod head;
+mod new_log;
 mod recording;
 mod schema;
 mod summary;
@@ -15,6 +16,7 @@ mod tick_ranges;
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
+pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
 pub(crate) use schema::{pilot_descriptor, tick_descriptor};
 pub(crate) use summary::chunk_offsets;

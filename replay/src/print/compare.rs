@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
+use super::verdicts::{self, LimitRow};
 use super::{JunitCase, JunitOutcome, counted, shown};
 use crate::compare::{Align, Comparison};
-use crate::info::VerdictFacts;
 
 /// Signals listed of those that differ within their tolerance or without one.
 const SIGNALS_SHOWN: usize = 60;
@@ -61,38 +61,12 @@ fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()>
 
 fn print_verdicts(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
     let (a, b) = (comparison.verdicts.0.as_ref(), comparison.verdicts.1.as_ref());
-    let words = |verdict: Option<&VerdictFacts>| match verdict {
-        None => "none".to_owned(),
-        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
-        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
-    };
+    let words = |verdict| verdicts::words(verdict, "none");
     writeln!(output, "| | first | second | limit |\n|---|---|---|---|")?;
     writeln!(output, "| verdict | {} | {} | |", words(a), words(b))?;
-    for limit in a.or(b).map(|verdict| verdict.limits.as_slice()).unwrap_or_default() {
-        let value = |verdict: Option<&VerdictFacts>| {
-            let found =
-                verdict.and_then(|verdict| verdict.limits.iter().find(|other| other.name == limit.name));
-            found.map_or_else(
-                || "-".to_owned(),
-                |found| {
-                    format!(
-                        "{:.4} {}{}",
-                        found.value,
-                        cell(&found.unit),
-                        if found.passed { "" } else { " **outside**" }
-                    )
-                },
-            )
-        };
+    for LimitRow { limit, values: [first, second] } in verdicts::rows(a.or(b), [a, b], cell, " **outside**") {
         let name = cell(&limit.name);
-        writeln!(
-            output,
-            "| {name} | {} | {} | {:.4} to {:.4} |",
-            value(a),
-            value(b),
-            limit.minimum,
-            limit.maximum
-        )?;
+        writeln!(output, "| {name} | {first} | {second} | {:.4} to {:.4} |", limit.minimum, limit.maximum)?;
     }
     writeln!(output)
 }

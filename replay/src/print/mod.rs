@@ -10,6 +10,7 @@ mod recover;
 mod refly;
 mod sweep;
 mod tick;
+mod verdicts;
 mod verify;
 
 pub use compare::{compare_cases, print_compare};

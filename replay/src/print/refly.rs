@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::verdicts::{self, LimitRow};
 use super::{counted, shown};
 use crate::info::VerdictFacts;
 use crate::refly::{Law, Reached, ReflyReport};
@@ -72,36 +73,16 @@ pub(super) fn print_verdicts(
     now: Option<&VerdictFacts>,
     output: &mut impl Write,
 ) -> io::Result<()> {
-    let words = |verdict: Option<&VerdictFacts>| match verdict {
-        None => "no verdict".to_owned(),
-        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
-        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
-    };
-    writeln!(output, "{:<12} {:>22} {:>22}", "", "recorded", "flown again")?;
-    writeln!(output, "{:<12} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
-    let limits = now.or(recorded).map(|verdict| verdict.limits.as_slice()).unwrap_or_default();
-    for limit in limits {
-        let value = |verdict: Option<&VerdictFacts>| {
-            let found =
-                verdict.and_then(|verdict| verdict.limits.iter().find(|other| other.name == limit.name));
-            found.map_or_else(
-                || "-".to_owned(),
-                |found| {
-                    format!(
-                        "{:.4} {}{}",
-                        found.value,
-                        shown(&found.unit),
-                        if found.passed { "" } else { " OUTSIDE" }
-                    )
-                },
-            )
-        };
+    let words = |verdict| verdicts::words(verdict, "no verdict");
+    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
+    writeln!(output, "{:<14} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
+    for LimitRow { limit, values: [then, now] } in
+        verdicts::rows(now.or(recorded), [recorded, now], shown, " OUTSIDE")
+    {
         writeln!(
             output,
-            "{:<12} {:>22} {:>22}   limit {:.4} to {:.4}",
+            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
             shown(&limit.name),
-            value(recorded),
-            value(now),
             limit.minimum,
             limit.maximum
         )?;

@@ -139,6 +139,14 @@ pub enum ReflyError {
         /// Which kind this is.
         is: &'static str,
     },
+    /// A setting of the controller given to the plant, or the other way round.
+    #[error("{setting}: {belongs}")]
+    Misplaced {
+        /// The setting.
+        setting: String,
+        /// Whose it is.
+        belongs: &'static str,
+    },
     /// A timed setting of the plant.
     #[error(
         "{setting}: the plant's settings hold from the beginning; only the controller's can change in flight"

@@ -1,15 +1,13 @@
 //! A flight flown again, as a log of its own.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use protocol::log::record::{Event, EventLevel, Record};
-use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+use protocol::log::writer::{LogHeader, LogWriteError};
 
 use super::{Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
-use crate::log::Recording;
+use crate::log::{NewLog, NewLogError, Recording};
 use crate::settings::{Setting, profile_toml_with};
 
 /// Why a log could not be written.
@@ -45,16 +43,15 @@ pub fn write_log(
     report: &ReflyReport,
     flight: &ReflownFlight,
 ) -> Result<(), ReflyLogError> {
-    let create = |source| ReflyLogError::Create { path: path.to_owned(), source };
-    let write = |source| ReflyLogError::Write { path: path.to_owned(), source };
-    let file = File::options().write(true).create_new(true).open(path).map_err(create)?;
-    let mut writer =
-        LogWriter::new(BufWriter::new(file), &header(recording, options, report, flight)).map_err(write)?;
+    let failed = |error| match error {
+        NewLogError::Create(source) => ReflyLogError::Create { path: path.to_owned(), source },
+        NewLogError::Write(source) => ReflyLogError::Write { path: path.to_owned(), source },
+    };
+    let mut log = NewLog::create(path, &header(recording, options, report, flight)).map_err(failed)?;
     for (time_s, record) in records(report, flight) {
-        writer.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(write)?;
+        log.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(failed)?;
     }
-    let mut output = writer.finish().map_err(write)?;
-    output.flush().map_err(|error| write(mcap::McapError::from(error).into()))
+    log.finish().map_err(failed)
 }
 
 fn header(

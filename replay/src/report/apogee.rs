@@ -2,7 +2,7 @@
 //!
 //! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, and asked for them. What
 //! the sections read of a planar landing (records of the plant, ticks, plans) is made of what this flight has: a tick is a
-//! frame that plans, velocities are through the air.
+//! frame that plans. Plans are made in the air's own frame; here they are brought back over the ground.
 
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
@@ -10,15 +10,14 @@ use flight::estimator::Estimate;
 use flight::mission::Mission;
 use flight::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::powered::{Plane, PoweredReport};
+use flight::rigid::RigidState;
 use flight::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use protocol::log::{flight_v1, v1};
 use tick_log::pilot::state_from_log;
 use tick_log::state_to_log;
 
-use super::track::{
-    AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, state_of, track_of,
-};
+use super::track::{AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, track_of};
 use crate::controller::{LoggedPilot, Replayed as _, settings_in_flight};
 use crate::log::Recording;
 
@@ -51,7 +50,7 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         recording.world.iter().map(|sample| plant(sample, &recording.frames, &plane)).collect();
     let ignition_s = pilot.ignited_at_s();
     let ticks = thoughts.iter().map(|thought| tick(thought, &recording.world, &plane)).collect();
-    let plans = plans(&thoughts);
+    let plans = plans(&thoughts, &plane);
     let gimbal =
         [("Gimbal pitch", 0), ("Gimbal yaw", 1)].map(|(name, axis)| gimbal(name, axis, &recording.world));
     let impulse_n_s: f64 = recording
@@ -61,7 +60,9 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         .sum();
     let burnt_out = recording.world.last().is_some_and(|last| last.thrust_n <= 0.0);
     let from_apogee = FromApogee {
-        inferred_scales: ignition_s
+        inferred_scales: pilot
+            .motor()
+            .ignition_s()
             .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
         true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / curve.total_impulse_n_s()),
     };
@@ -98,7 +99,7 @@ fn run_again(recording: &Recording) -> Option<(Mission, ThrustCurve, Vec<Thought
     let mut controller = LoggedPilot::new(recording.profile_toml().ok()?, start, &in_flight).ok()?;
     let mission = controller.pilot().mission().clone();
     let curve = mission.motor().ok()?;
-    let mut thoughts = Vec::new();
+    let (mut thoughts, mut flown) = (Vec::new(), Vec::new());
     for recorded in frames {
         let again = controller.run_again(recorded).ok()?;
         if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
@@ -106,7 +107,11 @@ fn run_again(recording: &Recording) -> Option<(Mission, ThrustCurve, Vec<Thought
         }
         let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
         let planned = again.output.level != u32::from(ControlLevel::Idle.index());
-        let plan = pilot.planned().filter(|_| planned);
+        // A plan that is flown out, or flown on for want of a better one, was made at an earlier frame.
+        let plan = pilot.planned().filter(|(states, _)| planned && *states != flown.as_slice());
+        if let Some((states, _)) = plan {
+            flown = states.to_vec();
+        }
         thoughts.push(Thought {
             frame: recorded.input.frame,
             time_s,
@@ -137,26 +142,37 @@ fn vehicle(mission: &Mission, curve: ThrustCurve) -> Vehicle {
     }
 }
 
-/// The state in the plane, feet's height for altitude, velocities through air that moves with `wind_m_s`.
-fn in_plane(
-    plane: &Plane,
-    state: &flight_v1::RigidState,
-    height_m: f64,
-    wind_m_s: &Vector3<f64>,
-) -> PlanarState {
-    let state = state_from_log(state);
-    PlanarState { z_m: height_m, ..plane.project(&state, 0.0, wind_m_s.dot(&plane.along)) }
+/// The state in the plane over the ground, with feet's height for altitude.
+fn in_plane(plane: &Plane, state: &RigidState, height_m: f64) -> PlanarState {
+    PlanarState { z_m: height_m, ..plane.project(state, 0.0, 0.0) }
+}
+
+/// A state of a plan over the ground: the plan's frame moves with the air along the plane, from where it began `since_s`
+/// before.
+fn over_ground(planned: &PlanarState, wind_m_s: f64, since_s: f64) -> PlanarState {
+    let (sin, cos) = libm::sincos(planned.theta_rad);
+    PlanarState {
+        x_m: planned.x_m + wind_m_s * since_s,
+        u_m_s: planned.u_m_s + wind_m_s * cos,
+        w_m_s: planned.w_m_s + wind_m_s * sin,
+        ..*planned
+    }
+}
+
+impl Thought {
+    /// The wind along the plane that a plan of this frame was made in, m/s.
+    fn wind_m_s(&self, plane: &Plane) -> f64 {
+        self.estimate.as_ref().map_or(0.0, |estimate| estimate.wind_m_s.push(0.0).dot(&plane.along))
+    }
 }
 
 fn plant(sample: &flight_v1::TruthSample, frames: &[flight_v1::PilotTick], plane: &Plane) -> v1::PlantTruth {
-    let wind = &sample.wind_m_s;
-    let wind_m_s = Vector3::new(wind.x, wind.y, wind.z);
     let behind = frames.partition_point(|tick| tick.input.time_s <= sample.time_s + SAME_MOMENT_S);
     let phase = behind.checked_sub(1).and_then(|place| frames.get(place)).map_or(0, |tick| tick.output.phase);
     v1::PlantTruth {
         time_s: sample.time_s,
         phase,
-        state: state_to_log(&in_plane(plane, &sample.state, sample.height_m, &wind_m_s)),
+        state: state_to_log(&in_plane(plane, &state_from_log(&sample.state), sample.height_m)),
         gimbal_commanded_rad: sample.gimbal_commanded_rad.first().copied().unwrap_or(0.0),
         gimbal_actual_rad: sample.gimbal_actual_rad.first().copied().unwrap_or(0.0),
         fin_commanded_rad: sample.fins_commanded_rad.clone(),
@@ -180,16 +196,11 @@ fn gimbal(name: &'static str, axis: usize, world: &[flight_v1::TruthSample]) -> 
 
 fn tick(thought: &Thought, world: &[flight_v1::TruthSample], plane: &Plane) -> v1::ControllerTick {
     let place = world.partition_point(|sample| sample.time_s < thought.time_s - SAME_MOMENT_S);
-    let state = match (&thought.estimate, world.get(place)) {
-        (Some(estimate), sample) => {
-            // Feet below the centre of gravity, as in the record of the world; the air as it was believed to move.
-            let feet_below_m = sample.map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
-            let height_m = estimate.state.position_m.z - feet_below_m;
-            let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
-            PlanarState { z_m: height_m, ..plane.project(&estimate.state, 0.0, wind_m_s) }
-        }
-        (None, _) => PlanarState::default(),
-    };
+    // Feet below the centre of gravity, as in the record of the world.
+    let feet_below_m = world.get(place).map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
+    let state = thought.estimate.as_ref().map_or_else(PlanarState::default, |estimate| {
+        in_plane(plane, &estimate.state, estimate.state.position_m.z - feet_below_m)
+    });
     let mut tick = v1::ControllerTick::default();
     tick.input = v1::ControllerInput {
         tick: thought.frame,
@@ -206,19 +217,24 @@ fn tick(thought: &Thought, world: &[flight_v1::TruthSample], plane: &Plane) -> v
         tick.output.solver.iterations = u32::try_from(report.iterations).unwrap_or(u32::MAX);
         tick.output.solver.cost = report.cost;
         tick.output.predicted_touchdown.time_from_now_s = report.touchdown_in_s;
-        tick.output.predicted_touchdown.state = state_to_log(&report.touchdown);
+        let touchdown = over_ground(&report.touchdown, thought.wind_m_s(plane), report.touchdown_in_s);
+        tick.output.predicted_touchdown.state = state_to_log(&touchdown);
     } else {
         tick.output.level = u32::from(ControlLevel::Idle.index());
     }
     tick
 }
 
-fn plans(thoughts: &[Thought]) -> Vec<PlanSample> {
+fn plans(thoughts: &[Thought], plane: &Plane) -> Vec<PlanSample> {
     let made: Vec<&Thought> = thoughts.iter().filter(|thought| thought.plan.is_some()).collect();
     let stride = made.len().div_ceil(PLANS_DRAWN).max(1);
     let sample = |(place, thought): (usize, &&Thought)| {
         let (_, states, step_s) = thought.plan.as_ref()?;
-        let states: Vec<[f64; 6]> = states.iter().map(|state| state_of(&state_to_log(state))).collect();
+        let wind_m_s = thought.wind_m_s(plane);
+        let nodes = states.iter().enumerate();
+        let states: Vec<[f64; 6]> = nodes
+            .map(|(node, state)| over_ground(state, wind_m_s, node as f64 * step_s).to_array())
+            .collect();
         let drawn = place.is_multiple_of(stride);
         Some(PlanSample {
             time_s: thought.time_s,

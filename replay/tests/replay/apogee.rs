@@ -6,6 +6,7 @@ use flight::phase::Phase;
 use proptest::prelude::*;
 use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::Record;
+use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
@@ -159,6 +160,8 @@ fn what_cannot_be_flown_again_is_said() {
     assert!(refused(&with_plant(&["truth.wind=3"])).contains("`truth.wind_m_s`"));
     assert!(refused(&with_plant(&["truth.wind_m_s=3@4"])).contains("from the beginning"));
     assert!(refused(&with_plant(&["truth.wind_m_s=99"])).contains("0 to 60 is accepted"));
+    assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
+    assert!(refused(&with(&["truth.wind_m_s=3"])).contains("the plant's alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
     recording.head.run.remove("flight");
     let message = refly(&recording, &ReflyOptions::default()).unwrap_err().to_string();
@@ -299,6 +302,40 @@ fn every_question_answers_by_the_command() {
     assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
     assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
+}
+
+/// The record claims another command; this build, flying on from there, lands as the vehicle did.
+#[test]
+fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
+    let recording = recording();
+    let path = LANDED.beside("forged.mcap");
+    let header = LogHeader {
+        run: recording.head.run.clone(),
+        profile_toml: Some(recording.profile_toml().unwrap().to_owned()),
+        scenario_toml: recording.head.scenario_toml.clone(),
+        ..LogHeader::default()
+    };
+    let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
+    writer.write(&Record::PilotStart(Box::new(recording.pilot_start.unwrap())), 0).unwrap();
+    let forged = recording.frames.len() / 2;
+    for (place, tick) in recording.frames.iter().enumerate() {
+        let mut tick = tick.clone();
+        if place == forged {
+            tick.output.gimbal_rad[1] += 0.1;
+        }
+        let time_ns = tick.input.frame * 5_000_000;
+        writer.write(&Record::PilotTick(Box::new(tick)), time_ns).unwrap();
+    }
+    writer.write(&Record::LandingVerdict(Box::new(recording.verdict.unwrap())), 15_000_000_000).unwrap();
+    writer.finish().unwrap();
+    let (code, stdout, _) = run(&mut replay("verify", &path));
+    assert_eq!(code, 1);
+    let first = format!("first at tick {}", recording.frames[forged].input.frame);
+    assert!(stdout.contains(&first) && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
+    assert!(
+        stdout.contains("verdict: would not change: recorded LANDED, flown on by this build"),
+        "{stdout}"
+    );
 }
 
 /// Changes some number of a frame to any bits at all.

@@ -4,6 +4,7 @@ use quick_xml::events::Event as Xml;
 use replay::report::report;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+use crate::from_apogee::LANDED;
 use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
 
 /// Every tag is closed, and nothing outside the page is named.
@@ -58,6 +59,33 @@ fn the_report_says_the_verdict_first_and_then_why() {
         assert!(page.contains("prefers-color-scheme: dark"));
     }
     assert!(report(&WITH_FRAMES.log).unwrap().contains("/mavlink/tx/raw"));
+}
+
+/// A flight from apogee is seen in the plane of its landing; its plans are those that the flight computer makes again.
+#[test]
+fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
+    let page = report(&LANDED.log).unwrap();
+    check(&page);
+    let order = [
+        "LANDED at",
+        "vertical speed",
+        "ignition delay",
+        "thrust fell through weight",
+        "Path in the pitch plane",
+        "Gimbal pitch, deg",
+        "Gimbal yaw, deg",
+        "Tracking error by phase",
+        "gimbal yaw at its stop of 7.0 deg",
+        "Newton iterations of each plan",
+        "x at touchdown, m",
+        "inferred impulse at the end, of certified",
+        "Thrust, N",
+        "estimate less truth",
+        "every checksum holds",
+    ];
+    let places: Vec<usize> = order.iter().map(|words| page.find(words).unwrap()).collect();
+    assert!(places.is_sorted(), "{places:?}");
+    assert!(page.contains(">planned<"));
 }
 
 /// Ticks alone, a log that is cut, one of no flight at all, and names that are markup.

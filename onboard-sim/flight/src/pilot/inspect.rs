@@ -25,8 +25,8 @@ impl Pilot {
         })
     }
 
-    /// The planned states in that plane, one step apart, s, if there is a plan; see
-    /// [`PoweredGuidance::planned`](crate::powered::PoweredGuidance::planned).
+    /// The states of the plan that is flown, one step apart, s, if there is one: in that plane, in the frame that moves with
+    /// the wind along it and was the ground's where the plan began.
     pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
         self.powered.planned()
     }

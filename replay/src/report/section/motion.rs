@@ -17,7 +17,7 @@ pub(super) fn html(flight: &Flight) -> String {
     pictures.extend(flight.gimbal.iter().map(|axis| input(flight, axis)));
     let mut words = who.to_owned();
     if flight.from_apogee.is_some() {
-        words += " Seen in the vertical plane of the landing; velocities are through the air.";
+        words += " Seen in the vertical plane of the landing; the plans were made in air that moves over the ground.";
     }
     paragraph(&words) + &charts(&pictures)
 }

@@ -25,7 +25,7 @@ pub(super) fn html(flight: &Flight) -> String {
     let fin_rate = vehicle.fin_rate_deg_s.to_radians();
     let total_s: f64 = intervals(&moving).map(|(_, _, dt_s)| dt_s).sum();
     let time = |holds: &dyn Fn(&PlantTruth, &PlantTruth, f64) -> bool| -> f64 {
-        intervals(&moving).filter(|(a, b, dt_s)| holds(a, b, *dt_s)).map(|(_, _, dt_s)| dt_s).sum()
+        intervals(&moving).filter(|(a, b, dt_s)| holds(a, b, *dt_s)).fold(0.0, |sum, (_, _, dt_s)| sum + dt_s)
     };
     let slewing = |a: f64, b: f64, dt_s: f64, rate: f64| (b - a).abs() >= AT_LIMIT * rate * dt_s;
     let in_air = |time_s: f64| {
@@ -39,7 +39,8 @@ pub(super) fn html(flight: &Flight) -> String {
             axis.actual.iter().copied().filter(|(time_s, _)| in_air(*time_s)).collect();
         let time = |holds: &dyn Fn(f64, f64, f64) -> bool| -> f64 {
             let pairs = angles.windows(2).map(|pair| (pair[0].1, pair[1].1, pair[1].0 - pair[0].0));
-            pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).map(|(_, _, dt_s)| dt_s).sum()
+            // From a positive nought: the sum of nothing is a negative one.
+            pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).fold(0.0, |sum, (_, _, dt_s)| sum + dt_s)
         };
         rows.push((
             format!("{name} at its stop of {:.1} deg", vehicle.gimbal_limit_deg),

@@ -73,6 +73,7 @@ fn plans(flight: &Flight) -> String {
         x_label: flight.axis_name(),
         lines: vec![Line { name: "", class: "a", points }],
         marks: flight.marks(),
+        full: true,
         ..Chart::default()
     };
     table(&["", "#"], &rows)

@@ -1,13 +1,13 @@
 //! A flight from apogee, flown again up to a moment with the recorded draw, and from there on with what is other.
 
+mod place;
+mod rerun;
+
 use std::collections::BTreeMap;
 
 use campaign::baseline::{Baseline, Controller};
 use campaign::dispersion::Dispersion;
 use campaign::draw::draw;
-use campaign::fault::{Injector, TimedFault};
-use campaign::fly::Flight;
-use flight::mission::Mission;
 use flight::phase::Phase;
 use onboard_sim::from_apogee;
 use prost::Message as _;
@@ -16,26 +16,20 @@ use protocol::log::record::Record;
 use tick_log::pilot::tick_to_log;
 use world::Truth;
 
-use super::start::{From, StartAt, StartState};
+use self::place::{find, phase_of};
+use self::rerun::{Recipe, Rerun};
+use super::start::{From, StartState};
 use super::{Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report};
-use crate::controller::{LoggedPilot, Moment, Replayed as _, SETTINGS_IN_FLIGHT};
+use crate::controller::{LoggedPilot, SETTINGS_IN_FLIGHT};
 use crate::info::VerdictFacts;
 use crate::log::Recording;
-use crate::settings::{Schedule, Setting, mission_with, truth_with};
+use crate::settings::{Setting, mission_with, truth_with};
 
 /// Length of a frame, s.
 const FRAME_S: f64 = 0.005;
 
 /// Number and time of what is kept of a flight.
 type Kept = Vec<(f64, Record)>;
-
-/// A flight on its way, with what still breaks and changes in it.
-#[derive(Debug, Clone)]
-struct Rerun {
-    flight: Flight,
-    injector: Injector,
-    schedule: Option<Schedule<Mission>>,
-}
 
 /// A recorded flight, flown again up to the moment of the start.
 #[derive(Debug)]
@@ -53,53 +47,16 @@ pub(super) struct AtStart<'a> {
     recorded: Option<VerdictFacts>,
 }
 
-impl Rerun {
-    /// `false` when there is no more to fly.
-    fn step(&mut self) -> Result<bool, ReflyError> {
-        let time_s = (self.flight.frame() + 1) as f64 * FRAME_S;
-        // As the flight computer of a log is changed: before the frame in whose time the change falls.
-        if let Some(mission) = self.schedule.as_mut().and_then(|schedule| schedule.due(time_s)) {
-            self.flight.reconfigure(mission)?;
-        }
-        self.injector.step(&mut self.flight);
-        Ok(self.flight.step())
-    }
-}
-
 impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.replayable_frames()?;
-        let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
-        let run = &recording.head.run;
-        if let Some(original) = run.get("reflown_from") {
-            return Err(lacking(format!("it was flown again from {original}; fly that one again")));
-        }
         if options.from == From::Estimate {
-            return Err(lacking(
-                "the world at the start is the true one; --from estimate is for planar landings".to_owned(),
-            ));
+            let reason =
+                "the world at the start is the true one; --from estimate is for planar landings".to_owned();
+            return Err(ReflyError::Recipe { name: recording.name.clone(), reason });
         }
-        let number_of = |fact: &str| {
-            let number = run.get(fact).and_then(|text| text.parse::<u64>().ok());
-            number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
-        };
-        let (seed, number) = (number_of("seed")?, number_of("flight")?);
-        let dispersion = from_apogee::dispersion_of(run, recording.head.scenario_toml.as_deref())
-            .map_err(|error| lacking(error.to_string()))?;
-        let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
-        let controller = from_apogee::controller_of(run).ok_or_else(unknown)?;
-        let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
-        let faults: Vec<TimedFault> = faults
-            .map(str::parse)
-            .collect::<Result<_, _>>()
-            .map_err(|error: campaign::fault::FaultError| lacking(error.to_string()))?;
-        let mission = LoggedPilot::schedule(recording.profile_toml()?, pilot_start, &[])?.base().clone();
-        let drawn = draw(&mission, &dispersion, seed, number);
-        let flight =
-            Flight::new(&mission, &dispersion, &drawn)?.with_baseline(Baseline::new(controller, &mission)?);
-        let mut rerun = Rerun { flight, injector: Injector::new(&faults), schedule: None };
-
+        let Recipe { dispersion, number, mut rerun } = Recipe::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
@@ -118,13 +75,15 @@ impl<'a> AtStart<'a> {
                 }
             }
         }
-        let recorded = if let Some(verdict) = &recording.verdict {
-            Some(VerdictFacts::of(verdict))
-        } else {
-            // An older log: what the flight comes to as it was.
-            let mut as_it_was = rerun.clone();
-            while as_it_was.step()? {}
-            from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+        let recorded = match &recording.verdict {
+            Some(verdict) => Some(VerdictFacts::of(verdict)),
+            // An older log: what the flight comes to as it was, if it is still the same flight.
+            None if reached.first_different.is_none() => {
+                let mut as_it_was = rerun.clone();
+                while as_it_was.step()? {}
+                from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+            }
+            None => None,
         };
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
@@ -268,6 +227,7 @@ impl<'a> AtStart<'a> {
             let reason = format!("{setting}: the estimator is set up at apogee; evaluate takes it");
             return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
         }
+        refuse_misplaced(options)?;
         let mut rerun = self.rerun.clone();
         let in_flight = self.in_flight(options)?;
         rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
@@ -294,49 +254,23 @@ impl<'a> AtStart<'a> {
     }
 }
 
+/// The plant has an airframe and what chance decided, the controller everything but the latter.
+fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
+    let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
+    let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
+    if let Some(setting) = options.settings.iter().find(of_truth) {
+        let belongs = "what chance decided is the plant's alone (--plant, --vary-plant, --of-plant)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {
+        let belongs =
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set, --vary)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    Ok(())
+}
+
 /// The settings without a time.
 fn lasting(options: &ReflyOptions) -> Vec<Setting> {
     options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect()
-}
-
-fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
-    u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
-}
-
-/// The place of the frame to start with. Of a phase it is the frame behind the one that entered it: what is other can
-/// change nothing before.
-fn find(
-    recording: &Recording,
-    frames: &[flight_v1::PilotTick],
-    start: &StartAt,
-) -> Result<usize, ReflyError> {
-    let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
-        let entered = frames.iter().position(|tick| phase_of(tick).is_some_and(wanted))?;
-        Some(entered + 1).filter(|place| *place < frames.len())
-    };
-    let found = match start {
-        StartAt::Landing => in_phase(&Phase::is_landing),
-        StartAt::Tick(number) => frames.iter().position(|tick| tick.input.frame == *number),
-        StartAt::Time(time_s) => frames.iter().position(|tick| tick.input.time_s >= *time_s),
-        StartAt::Phase(phase) => in_phase(&|found| found == *phase),
-    };
-    found.ok_or_else(|| {
-        let first = frames.first().map(LoggedPilot::moment);
-        let last = frames.last().map(LoggedPilot::moment);
-        let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
-        let reason = match start {
-            StartAt::Landing => "no frame of a landing to start from".to_owned(),
-            StartAt::Tick(asked) => {
-                format!("no frame {asked}; there are {} to {}", number(first), number(last))
-            }
-            StartAt::Time(time_s) => {
-                format!(
-                    "no frame at or after {time_s} s; the last is at {:.3} s",
-                    last.map_or(0.0, |moment| moment.time_s)
-                )
-            }
-            StartAt::Phase(phase) => format!("no frame in phase {}", phase.name()),
-        };
-        ReflyError::Start { name: recording.name.clone(), reason }
-    })
 }

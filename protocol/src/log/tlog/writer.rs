@@ -1,11 +1,8 @@
-//! The telemetry log that other ground stations write and read: `.tlog`.
-//!
-//! Microseconds since the Unix epoch (eight bytes, big-endian), then the raw frame; again and again. MAVProxy's
-//! `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's `mavlogfile` read it.
+//! Frames into a `.tlog`.
 
 use std::io::{self, Write};
 
-use super::record::Record;
+use crate::log::record::Record;
 
 /// Writes the frames that a ground station received and sent.
 pub struct TlogWriter<W: Write> {

@@ -1,0 +1,44 @@
+//! Two verdicts side by side, limit by limit.
+
+use crate::info::{VerdictFacts, VerdictLimit};
+
+/// A limit that both were judged by.
+pub(super) struct LimitRow<'a> {
+    pub(super) limit: &'a VerdictLimit,
+    /// Each verdict's value with its unit, marked if outside.
+    pub(super) values: [String; 2],
+}
+
+/// A verdict in short; `none` if there is none.
+pub(super) fn words(verdict: Option<&VerdictFacts>, none: &str) -> String {
+    match verdict {
+        None => none.to_owned(),
+        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
+        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
+    }
+}
+
+/// The limits of `named`, with the values of both; `shown` makes text fit for where it is printed, `outside` marks a value
+/// that is.
+pub(super) fn rows<'a>(
+    named: Option<&'a VerdictFacts>,
+    both: [Option<&VerdictFacts>; 2],
+    shown: fn(&str) -> String,
+    outside: &str,
+) -> Vec<LimitRow<'a>> {
+    let value = |verdict: Option<&VerdictFacts>, name: &str| {
+        let found = verdict.and_then(|verdict| verdict.limits.iter().find(|limit| limit.name == name));
+        found.map_or_else(
+            || "-".to_owned(),
+            |found| {
+                let mark = if found.passed { "" } else { outside };
+                format!("{:.4} {}{mark}", found.value, shown(&found.unit))
+            },
+        )
+    };
+    let limits = named.map(|verdict| verdict.limits.as_slice()).unwrap_or_default();
+    limits
+        .iter()
+        .map(|limit| LimitRow { limit, values: both.map(|verdict| value(verdict, &limit.name)) })
+        .collect()
+}

@@ -1,0 +1,50 @@
+//! The frame to start with.
+
+use flight::phase::Phase;
+use protocol::log::flight_v1;
+
+use crate::controller::{LoggedPilot, Moment, Replayed as _};
+use crate::log::Recording;
+use crate::refly::{ReflyError, StartAt};
+
+pub(super) fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
+    u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
+}
+
+/// The place of the frame to start with. Of a phase it is the frame behind the one that entered it: what is other can
+/// change nothing before.
+pub(super) fn find(
+    recording: &Recording,
+    frames: &[flight_v1::PilotTick],
+    start: &StartAt,
+) -> Result<usize, ReflyError> {
+    let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
+        let entered = frames.iter().position(|tick| phase_of(tick).is_some_and(wanted))?;
+        Some(entered + 1).filter(|place| *place < frames.len())
+    };
+    let found = match start {
+        StartAt::Landing => in_phase(&Phase::is_landing),
+        StartAt::Tick(number) => frames.iter().position(|tick| tick.input.frame == *number),
+        StartAt::Time(time_s) => frames.iter().position(|tick| tick.input.time_s >= *time_s),
+        StartAt::Phase(phase) => in_phase(&|found| found == *phase),
+    };
+    found.ok_or_else(|| {
+        let first = frames.first().map(LoggedPilot::moment);
+        let last = frames.last().map(LoggedPilot::moment);
+        let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
+        let reason = match start {
+            StartAt::Landing => "no frame of a landing to start from".to_owned(),
+            StartAt::Tick(asked) => {
+                format!("no frame {asked}; there are {} to {}", number(first), number(last))
+            }
+            StartAt::Time(time_s) => {
+                format!(
+                    "no frame at or after {time_s} s; the last is at {:.3} s",
+                    last.map_or(0.0, |moment| moment.time_s)
+                )
+            }
+            StartAt::Phase(phase) => format!("no frame in phase {}", phase.name()),
+        };
+        ReflyError::Start { name: recording.name.clone(), reason }
+    })
+}
