@@ -1,13 +1,15 @@
 //! One flight, from apogee until it lies still.
 
+mod errors;
+
 use std::time::Duration;
 
-use flight::estimator::{Estimate, Health, HeightSources, Measurements, Sigmas, StartUncertainty};
+pub use self::errors::EstimatorErrors;
+use flight::estimator::{Measurements, StartUncertainty};
 use flight::mission::{Mission, MissionError};
 use flight::phase::Phase;
 use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
 use flight::rigid::RigidState;
-use nalgebra::{Vector2, Vector3};
 use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
 use world::world::WorldError;
 use world::{Actuators, World};
@@ -66,19 +68,6 @@ pub struct Flight {
     abort: bool,
     finite: bool,
     largest_errors: EstimatorErrors,
-}
-
-/// Errors of the estimate against the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct EstimatorErrors {
-    /// Vertical velocity, m/s.
-    pub vertical_m_s: f64,
-    /// Horizontal velocity, m/s.
-    pub lateral_m_s: f64,
-    /// Height, m.
-    pub height_m: f64,
-    /// Angle between the estimated and the true nose, rad.
-    pub nose_rad: f64,
 }
 
 impl Flight {
@@ -229,13 +218,7 @@ impl Flight {
         for _ in 0..FRAME_MS {
             self.world.step(&self.command);
             if let Some(sensors) = &mut self.sensors {
-                let truth = SensorTruth {
-                    state: *self.world.state(),
-                    specific_force_m_s2: *self.world.specific_force_m_s2(),
-                    airspeed_m_s: self.world.air_velocity_m_s().norm(),
-                    cg_over_feet_m: self.world.cg_above_feet_m(),
-                };
-                measured = sensors.observe(&truth, &self.sensor_faults).or(measured);
+                measured = sensors.observe(&SensorTruth::of(&self.world), &self.sensor_faults).or(measured);
             }
         }
         self.frame += 1;
@@ -250,7 +233,7 @@ impl Flight {
         let input = PilotInput {
             frame: self.frame,
             time_s: self.world.time_s(),
-            sensed: measured.map_or_else(|| Sensed::Known(self.known()), Sensed::Measured),
+            sensed: measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured),
             fins_rad: self.world.fins_rad(),
             contact: self.world.touchdown().is_some(),
             igniter_continuity: true,
@@ -274,12 +257,7 @@ impl Flight {
         self.finite &= self.world.state().is_finite()
             && output.gimbal_rad.iter().chain(&output.fins_rad).all(|angle| angle.is_finite());
         if self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
-            let errors = self.errors();
-            let largest = &mut self.largest_errors;
-            largest.vertical_m_s = largest.vertical_m_s.max(errors.vertical_m_s);
-            largest.lateral_m_s = largest.lateral_m_s.max(errors.lateral_m_s);
-            largest.height_m = largest.height_m.max(errors.height_m);
-            largest.nose_rad = largest.nose_rad.max(errors.nose_rad);
+            self.largest_errors = self.largest_errors.or_larger(&self.errors());
         }
         self.goes_on()
     }
@@ -287,56 +265,6 @@ impl Flight {
     /// Whether there is more to fly: it is not at rest, and not to be given up.
     pub fn goes_on(&self) -> bool {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
-    }
-
-    /// The truth as an estimate.
-    fn known(&self) -> Estimate {
-        let world = &self.world;
-        let zero = Vector3::zeros();
-        Estimate {
-            time_s: world.time_s(),
-            state: *world.state(),
-            specific_force_m_s2: *world.specific_force_m_s2(),
-            wind_m_s: Vector2::new(world.wind_m_s().x, world.wind_m_s().y),
-            gyro_bias_rad_s: zero,
-            accelerometer_bias_m_s2: zero,
-            sigmas: Sigmas {
-                position_m: zero,
-                velocity_m_s: zero,
-                attitude_rad: zero,
-                gyro_bias_rad_s: zero,
-                accelerometer_bias_m_s2: zero,
-                wind_m_s: Vector2::zeros(),
-            },
-            heights: HeightSources {
-                inertial_m: world.state().position_m.z,
-                inertial_sigma_m: 0.0,
-                barometric_m: Some(world.state().position_m.z),
-            },
-            health: Health::Good,
-        }
-    }
-
-    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` where the truth is
-    /// what the pilot was given, and while its computer is dead.
-    ///
-    /// [`Estimator::nees_of_motion`]: flight::estimator::Estimator::nees_of_motion
-    pub fn nees_of_motion(&self) -> Option<f64> {
-        let measured = matches!(self.input.as_ref()?.sensed, Sensed::Measured(_));
-        measured.then(|| self.pilot.estimator().nees_of_motion(self.world.state())).flatten()
-    }
-
-    /// Errors of the estimate at this moment.
-    pub fn errors(&self) -> EstimatorErrors {
-        let Some(estimate) = self.pilot.estimate() else { return EstimatorErrors::default() };
-        let truth = self.world.state();
-        let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
-        EstimatorErrors {
-            vertical_m_s: velocity.z.abs(),
-            lateral_m_s: libm::hypot(velocity.x, velocity.y),
-            height_m: (estimate.state.position_m.z - truth.position_m.z).abs(),
-            nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
-        }
     }
 
     /// The largest errors of the estimate in the last ten metres.

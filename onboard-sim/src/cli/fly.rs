@@ -158,7 +158,7 @@ fn with_wind(toml: &str, wind_m_s: f64) -> String {
     let is_wind = |line: &&str| {
         line.trim_start().strip_prefix(KEY).is_some_and(|rest| rest.trim_start().starts_with('='))
     };
-    let others: String = toml.lines().filter(|line| !is_wind(line)).map(|line| format!("{line}\n")).collect();
+    let others: String = toml.split_inclusive('\n').filter(|line| !is_wind(line)).collect();
     // At the top, before any table begins.
     format!("{KEY} = [{wind_m_s:?}, {wind_m_s:?}]\n{others}")
 }

@@ -68,7 +68,5 @@ pub enum VehicleEvent {
         impact: Impact,
         /// Limit by limit.
         verdict: Box<LandingVerdict>,
-        /// It landed: inside every limit, and it stands.
-        landed: bool,
     },
 }

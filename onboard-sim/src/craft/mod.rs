@@ -15,6 +15,7 @@ use flight::arming::Check;
 use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
 use flight::profile::StateWeights;
 use protocol::log::record::Record;
+use protocol::log::v1;
 
 pub use answer::{Answer, Request, Result};
 pub use campaign::fly::Radio;
@@ -115,6 +116,12 @@ pub trait Craft {
     /// The landing by the landing paper's Table 2, where [`Craft::judged`] goes by what the legs take.
     fn judged_by_table_2(&self) -> Option<Judged> {
         None
+    }
+
+    /// The landing as a log's record, once it is judged.
+    fn verdict_record(&self) -> Option<v1::LandingVerdict> {
+        let Judged { impact, verdict, .. } = self.judged()?;
+        Some(tick_log::verdict_to_log(impact.time_s, &impact.state, &verdict))
     }
 
     /// What the radio does to what is sent and heard.

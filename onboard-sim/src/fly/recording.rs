@@ -45,11 +45,10 @@ pub(super) fn record(recorder: &Recorder, craft: &dyn Craft, events: &[VehicleEv
                 tick.solve_time_s,
                 tick.deadline_s,
             )),
-            VehicleEvent::Verdict { impact, verdict, landed } => {
-                let mut record = tick_log::verdict_to_log(impact.time_s, &impact.state, verdict);
-                record.landed = *landed;
-                Record::LandingVerdict(Box::new(record))
-            }
+            VehicleEvent::Verdict { .. } => match craft.verdict_record() {
+                Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
+                None => continue,
+            },
             VehicleEvent::Planned { .. } => continue,
             VehicleEvent::Text { severity, text } => Record::Event(Event {
                 level: match severity {

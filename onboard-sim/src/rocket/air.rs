@@ -131,8 +131,8 @@ impl Rocket {
             let by_table_2 = judged(self.limits.by_table_2(touchdown), outcome.strict);
             let words = outcome_in_words(&outcome, world.rest().map(|rest| rest.outcome));
             air.judged = Some((by_legs, by_table_2));
-            let Judged { impact, verdict, landed } = by_legs;
-            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict), landed });
+            let Judged { impact, verdict, .. } = by_legs;
+            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
             self.say(Severity::Notice, words);
         }
         if self.mode.phase == Phase::Touchdown {

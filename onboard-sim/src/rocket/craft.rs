@@ -7,14 +7,15 @@ use flight::arming::{ArmingInput, Check, arming_checks};
 use flight::phase::{Event, Mode, Phase, Refusal, StartPoint, transition};
 use flight::profile::StateWeights;
 use protocol::log::record::Record;
+use protocol::log::v1;
 
 use super::{Air, FRAME_S, Rocket};
 use crate::craft::{
     Craft, Judged, LogState, Radio, Severity, Snapshot, TestStep, VehicleEvent, self_test_failed, words_of,
 };
-use crate::pilot_log;
 use crate::streams::{FROM_APOGEE, Standard};
 use crate::vehicle::LOG_STOPPED;
+use crate::{from_apogee, pilot_log};
 
 impl Craft for Rocket {
     /// A product rather than a sum, so that it does not drift.
@@ -155,6 +156,11 @@ impl Craft for Rocket {
 
     fn judged_by_table_2(&self) -> Option<Judged> {
         Some(self.air.as_ref()?.judged?.1)
+    }
+
+    /// In the words of every flight from apogee; its time counts from there, as that of the frames.
+    fn verdict_record(&self) -> Option<v1::LandingVerdict> {
+        from_apogee::verdict(self.air.as_ref()?.sortie.flight())
     }
 
     fn radio(&self) -> Radio {

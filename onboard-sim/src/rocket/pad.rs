@@ -79,13 +79,8 @@ impl Pad {
         for _ in 0..FRAME_MS {
             self.world.step(&self.command);
             if let Some(sensors) = &mut self.sensors {
-                let truth = SensorTruth {
-                    state: *self.world.state(),
-                    specific_force_m_s2: *self.world.specific_force_m_s2(),
-                    airspeed_m_s: self.world.air_velocity_m_s().norm(),
-                    cg_over_feet_m: self.world.cg_above_feet_m(),
-                };
-                measured = sensors.observe(&truth, &SensorFaults::default()).or(measured);
+                measured =
+                    sensors.observe(&SensorTruth::of(&self.world), &SensorFaults::default()).or(measured);
             }
         }
         self.feel(&measured.unwrap_or_else(|| self.perfect()));

@@ -143,7 +143,11 @@ impl Rocket {
     fn prediction(&self, air: &Air, pilot: &Pilot, estimate: &Estimate, time_s: f64) -> Option<Prediction> {
         let plane = pilot.powered().plane()?;
         let wind: Vector3<f64> = estimate.wind_m_s.push(0.0);
-        let state = over_ground(&air.report.touchdown, wind.dot(&plane.along));
+        let mut state = over_ground(&air.report.touchdown, wind.dot(&plane.along));
+        // A plan that misses its end by no more than this counts as a landing: it ends on the ground.
+        if state.z_m.abs() <= self.flight.order.mission.powered.landing_miss {
+            state.z_m = 0.0;
+        }
         Some(Prediction {
             time_to_go_s: air.report.touchdown_in_s - (time_s - air.reported_at_s),
             state,

@@ -245,7 +245,7 @@ impl Vehicle {
         if let Some((impact, verdict)) = worst.copied() {
             let landed = verdict.landed();
             self.verdict = Some(Judged { impact, verdict, landed });
-            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict), landed });
+            self.events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
         }
     }
 }

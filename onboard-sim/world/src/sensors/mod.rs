@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 use self::noise::{Normal, Wander};
 pub use self::params::{BarometerParams, GnssParams, ImuParams, LidarParams, SensorParamError, SensorParams};
 pub use self::start::believed_start;
+use crate::world::World;
 
 /// Milliseconds of truth in one frame of the flight computer.
 pub const FRAME_MS: u32 = 5;
@@ -33,6 +34,18 @@ pub struct SensorTruth {
     pub airspeed_m_s: f64,
     /// Height of the centre of gravity over the feet when upright, m.
     pub cg_over_feet_m: f64,
+}
+
+impl SensorTruth {
+    /// The truth of a world.
+    pub fn of(world: &World) -> Self {
+        Self {
+            state: *world.state(),
+            specific_force_m_s2: *world.specific_force_m_s2(),
+            airspeed_m_s: world.air_velocity_m_s().norm(),
+            cg_over_feet_m: world.cg_above_feet_m(),
+        }
+    }
 }
 
 /// What is broken at this moment.

@@ -1,0 +1,84 @@
+//! The estimate against the truth.
+
+use flight::estimator::{Estimate, Health, HeightSources, Sigmas};
+use flight::pilot::Sensed;
+use nalgebra::{Vector2, Vector3};
+use world::World;
+
+use super::Flight;
+
+/// Errors of the estimate against the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EstimatorErrors {
+    /// Vertical velocity, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal velocity, m/s.
+    pub lateral_m_s: f64,
+    /// Height, m.
+    pub height_m: f64,
+    /// Angle between the estimated and the true nose, rad.
+    pub nose_rad: f64,
+}
+
+impl EstimatorErrors {
+    /// Each the larger of two.
+    pub(super) fn or_larger(self, other: &Self) -> Self {
+        Self {
+            vertical_m_s: self.vertical_m_s.max(other.vertical_m_s),
+            lateral_m_s: self.lateral_m_s.max(other.lateral_m_s),
+            height_m: self.height_m.max(other.height_m),
+            nose_rad: self.nose_rad.max(other.nose_rad),
+        }
+    }
+}
+
+impl Flight {
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` where the truth is
+    /// what the pilot was given, and while its computer is dead.
+    ///
+    /// [`Estimator::nees_of_motion`]: flight::estimator::Estimator::nees_of_motion
+    pub fn nees_of_motion(&self) -> Option<f64> {
+        let measured = matches!(self.input.as_ref()?.sensed, Sensed::Measured(_));
+        measured.then(|| self.pilot.estimator().nees_of_motion(self.world.state())).flatten()
+    }
+
+    /// Errors of the estimate at this moment.
+    pub fn errors(&self) -> EstimatorErrors {
+        let Some(estimate) = self.pilot.estimate() else { return EstimatorErrors::default() };
+        let truth = self.world.state();
+        let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
+        EstimatorErrors {
+            vertical_m_s: velocity.z.abs(),
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            height_m: (estimate.state.position_m.z - truth.position_m.z).abs(),
+            nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
+        }
+    }
+}
+
+/// The truth as an estimate.
+pub(super) fn known(world: &World) -> Estimate {
+    let zero = Vector3::zeros();
+    Estimate {
+        time_s: world.time_s(),
+        state: *world.state(),
+        specific_force_m_s2: *world.specific_force_m_s2(),
+        wind_m_s: Vector2::new(world.wind_m_s().x, world.wind_m_s().y),
+        gyro_bias_rad_s: zero,
+        accelerometer_bias_m_s2: zero,
+        sigmas: Sigmas {
+            position_m: zero,
+            velocity_m_s: zero,
+            attitude_rad: zero,
+            gyro_bias_rad_s: zero,
+            accelerometer_bias_m_s2: zero,
+            wind_m_s: Vector2::zeros(),
+        },
+        heights: HeightSources {
+            inertial_m: world.state().position_m.z,
+            inertial_sigma_m: 0.0,
+            barometric_m: Some(world.state().position_m.z),
+        },
+        health: Health::Good,
+    }
+}
