@@ -5,6 +5,7 @@ use std::path::Path;
 
 use flight::dynamics::PlanarState as FlightState;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
+use protocol::log::flight_v1::{PilotTick, TruthSample};
 use protocol::log::v1::{
     ControllerTick, LandingVerdict as RecordedVerdict, PlanarState, PlantTruth, Telemetry,
 };
@@ -13,7 +14,10 @@ use replay::log::{Entry, FlightLog, StampedEntry};
 
 use crate::ExportError;
 use crate::layout::send_layout;
-use crate::plots::{PlotLimit, Plots, plot_of_verdict};
+use crate::plots::{FROM_APOGEE, PLANAR, PlotLimit, Plots, plot_of_verdict};
+use crate::pose::{
+    Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket, world_from_rocket_in_space,
+};
 use crate::rrd::RrdWriter;
 use crate::scene::{Scene, Seen};
 use crate::survey::{PoseSource, StampedEvent, Survey};
@@ -94,7 +98,7 @@ impl<'a> Export<'a> {
             survey,
             waiting: survey.events.iter().peekable(),
             times: Times::default(),
-            scene: Scene::new(recording, survey.profile.as_ref())?,
+            scene: Scene::new(recording, survey)?,
             plots: Plots::new(recording),
             verdict: None,
             done: Exported {
@@ -123,13 +127,10 @@ impl<'a> Export<'a> {
                     self.done.unreadable += 1;
                     self.done.first_unreadable.get_or_insert(reason);
                 }
-                Entry::PilotStart(_)
-                | Entry::PilotTick(_)
-                | Entry::World(_)
-                | Entry::RawFrame
-                | Entry::Operator
-                | Entry::Event(_)
-                | Entry::Other => {}
+                Entry::PilotTick(tick) => self.frame(&tick, log_time_ns)?,
+                Entry::World(truth) => self.world(&truth, log_time_ns)?,
+                Entry::PilotStart(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {
+                }
             }
         }
         self.events_until(u64::MAX)?;
@@ -140,7 +141,8 @@ impl<'a> Export<'a> {
         let Self { recording, survey, scene, verdict, done, .. } = self;
         words::report(recording, log.name(), survey, verdict.as_ref(), done.damage.as_deref())?;
         let extent = scene.finish()?;
-        send_layout(recording, APPLICATION, &extent, survey.events.is_empty())?;
+        let plots = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
+        send_layout(recording, APPLICATION, &extent, plots, survey.events.is_empty())?;
         Ok(done)
     }
 
@@ -155,7 +157,7 @@ impl<'a> Export<'a> {
         self.scene.plan(tick)?;
         if alone {
             let gimbal_rad = Some(tick.input.gimbal_applied_rad);
-            self.rocket(&Seen { state: &tick.input.state, gimbal_rad, thrust_in_weights: None })?;
+            self.planar_rocket(&tick.input.state, gimbal_rad, None)?;
         }
         Ok(())
     }
@@ -165,11 +167,28 @@ impl<'a> Export<'a> {
         self.times.at_vehicle_time(self.recording, truth.time_s);
         self.phase(truth.phase)?;
         self.plots.truth(truth)?;
-        self.rocket(&Seen {
-            state: &truth.state,
-            gimbal_rad: Some(truth.gimbal_actual_rad),
-            thrust_in_weights: Some(self.scene.in_weights(truth.thrust_n, truth.mass_kg)),
-        })
+        let weights = self.scene.in_weights(truth.thrust_n, truth.mass_kg);
+        self.planar_rocket(&truth.state, Some(truth.gimbal_actual_rad), Some(weights))
+    }
+
+    /// A frame of a flight from apogee; its numbers stand beside the truth.
+    fn frame(&mut self, tick: &PilotTick, log_time_ns: u64) -> RecordingStreamResult<()> {
+        self.times.learn(tick.input.time_s, log_time_ns);
+        self.times.tick(tick.input.frame);
+        self.times.at_vehicle_time(self.recording, tick.input.time_s);
+        self.done.ticks += 1;
+        self.phase(tick.output.phase)?;
+        self.plots.level(tick.output.level)
+    }
+
+    fn world(&mut self, truth: &TruthSample, log_time_ns: u64) -> RecordingStreamResult<()> {
+        self.times.learn(truth.time_s, log_time_ns);
+        self.times.at_vehicle_time(self.recording, truth.time_s);
+        self.plots.in_space(truth)?;
+        let angle = |axis: usize| truth.gimbal_actual_rad.get(axis).copied().unwrap_or(0.0);
+        let nozzle = rocket_from_nozzle_in_space([angle(0), angle(1)], self.scene.pivot_x_m());
+        let weights = self.scene.in_weights(truth.thrust_n, truth.mass_kg);
+        self.rocket(world_from_rocket_in_space(&truth.state), nozzle, Some(weights))
     }
 
     fn telemetry(&mut self, telemetry: &Telemetry, log_time_ns: u64) -> RecordingStreamResult<()> {
@@ -189,12 +208,28 @@ impl<'a> Export<'a> {
         let x_m = telemetry.x_m.unwrap_or(0.0);
         let state = PlanarState { x_m, z_m, theta_rad, ..PlanarState::default() };
         let gimbal_rad = telemetry.gimbal_measured_rad;
-        self.rocket(&Seen { state: &state, gimbal_rad, thrust_in_weights: None })
+        self.planar_rocket(&state, gimbal_rad, None)
     }
 
-    fn rocket(&mut self, seen: &Seen<'_>) -> RecordingStreamResult<()> {
+    fn planar_rocket(
+        &mut self,
+        state: &PlanarState,
+        gimbal_rad: Option<f64>,
+        thrust_in_weights: Option<f64>,
+    ) -> RecordingStreamResult<()> {
+        let gimbal_rad = gimbal_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0);
+        let nozzle = rocket_from_nozzle(gimbal_rad, self.scene.pivot_x_m());
+        self.rocket(world_from_rocket(state), nozzle, thrust_in_weights)
+    }
+
+    fn rocket(
+        &mut self,
+        rocket: Pose,
+        nozzle: Pose,
+        thrust_in_weights: Option<f64>,
+    ) -> RecordingStreamResult<()> {
         self.done.poses += 1;
-        self.scene.rocket(seen)
+        self.scene.rocket(&Seen { rocket, nozzle, thrust_in_weights })
     }
 
     fn phase(&mut self, phase: u32) -> RecordingStreamResult<()> {
@@ -237,6 +272,12 @@ impl<'a> Export<'a> {
             }
             (None, None) => Vec::new(),
         };
+        if let Some(mission) = &self.survey.mission {
+            let limit_deg = mission.airframe.gimbal.limit_rad().to_degrees();
+            for plot in ["gimbal_pitch_deg", "gimbal_yaw_deg"] {
+                limits.push(PlotLimit { plot, lowest: -limit_deg, highest: limit_deg });
+            }
+        }
         if let Some(profile) = profile {
             let limit_deg = profile.gimbal.limit_deg;
             limits.push(PlotLimit { plot: "gimbal_deg", lowest: -limit_deg, highest: limit_deg });

@@ -21,7 +21,7 @@ use re_sdk_types::components::Plane3D;
 use re_sdk_types::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, Uuid, VisibleTimeRange};
 
 use crate::entity;
-use crate::plots::PLOTS;
+use crate::plots::Plot;
 use crate::scene::Extent;
 
 /// Sends the layout of a recording.
@@ -29,6 +29,7 @@ pub(crate) fn send_layout(
     recording: &RecordingStream,
     application: &'static str,
     extent: &Extent,
+    plots: &[Plot],
     phases_as_text: bool,
 ) -> RecordingStreamResult<()> {
     let blueprint_id = StoreId::random(StoreKind::Blueprint, application);
@@ -36,7 +37,7 @@ pub(crate) fn send_layout(
         RecordingStreamBuilder::from_store_id(&blueprint_id).send_properties(false).enabled(true).memory()?;
     stream.set_time_sequence("blueprint", 0);
     let mut layout = Layout { stream: &stream, made: 0 };
-    let root = layout.whole(extent, phases_as_text)?;
+    let root = layout.whole(extent, plots, phases_as_text)?;
     stream.log("viewport", &ViewportBlueprint::new().with_root_container(root).with_auto_views(false))?;
     for panel in ["blueprint_panel", "selection_panel"] {
         stream.log(panel, &PanelBlueprint::new().with_state(PanelState::Hidden))?;
@@ -66,7 +67,12 @@ struct Part {
 type Properties<'p> = [(&'p str, &'p dyn AsComponents)];
 
 impl Layout<'_> {
-    fn whole(&mut self, extent: &Extent, phases_as_text: bool) -> RecordingStreamResult<RootContainer> {
+    fn whole(
+        &mut self,
+        extent: &Extent,
+        plots: &[Plot],
+        phases_as_text: bool,
+    ) -> RecordingStreamResult<RootContainer> {
         let overview = self.overview(extent)?;
         let close_up = self.close_up(extent)?;
         let spaces = self.container(ContainerKind::Horizontal, &[&overview, &close_up], &[3.0, 2.0])?;
@@ -82,7 +88,7 @@ impl Layout<'_> {
         let report = self.view("TextDocument", "Verdict and run", entity::REPORT, &["$origin"], &[])?;
         let words = self.container(ContainerKind::Horizontal, &[&log, &report], &[3.0, 2.0])?;
         let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[5.0, 1.2, 2.6])?;
-        let plots = PLOTS
+        let plots = plots
             .iter()
             .map(|plot| {
                 let origin = format!("{}/{}", entity::PLOTS, plot.name);

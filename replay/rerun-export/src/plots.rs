@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use flight::controller::ControlLevel;
 use flight::phase::Phase;
+use protocol::log::flight_v1::TruthSample;
 use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
 use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Scalars, SeriesLines, StateChange};
@@ -27,8 +28,8 @@ pub(crate) struct Plot {
     pub(crate) legend: bool,
 }
 
-/// Every plot, in the order of the layout.
-pub(crate) const PLOTS: [Plot; 10] = [
+/// Every plot of a planar landing, in the order of the layout.
+pub(crate) const PLANAR: [Plot; 10] = [
     Plot { name: "altitude_m", title: "Altitude, m", legend: true },
     Plot { name: "x_m", title: "Horizontal position, m", legend: false },
     Plot { name: "u_m_s", title: "Axial velocity u, m/s", legend: false },
@@ -39,6 +40,20 @@ pub(crate) const PLOTS: [Plot; 10] = [
     Plot { name: "solve_time_ms", title: "Solve time, ms", legend: false },
     Plot { name: "iterations", title: "Newton iterations", legend: false },
     Plot { name: "level", title: "Control level (0 idle, 2 converged, 5 stabiliser)", legend: false },
+];
+
+/// Every plot of a flight from apogee, in the order of the layout.
+pub(crate) const FROM_APOGEE: [Plot; 10] = [
+    Plot { name: "altitude_m", title: "Height of the feet, m", legend: false },
+    Plot { name: "vertical_m_s", title: "Vertical speed, m/s", legend: false },
+    Plot { name: "x_m", title: "Position x, m", legend: false },
+    Plot { name: "y_m", title: "Position y, m", legend: false },
+    Plot { name: "lateral_m_s", title: "Lateral speed, m/s", legend: false },
+    Plot { name: "tilt_deg", title: "Tilt, deg", legend: false },
+    Plot { name: "gimbal_pitch_deg", title: "Gimbal in pitch, deg", legend: true },
+    Plot { name: "gimbal_yaw_deg", title: "Gimbal in yaw, deg", legend: false },
+    Plot { name: "fins_mean_deg", title: "Fins, mean opening, deg", legend: false },
+    Plot { name: "thrust_n", title: "Thrust, N", legend: false },
 ];
 
 /// Whose number it is, or what else a line shows.
@@ -104,6 +119,9 @@ pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
         "u" => "u_m_s",
         "w" => "w_m_s",
         "pitch rate" => "q_deg_s",
+        "vertical speed" => "vertical_m_s",
+        "lateral speed" => "lateral_m_s",
+        "tilt" => "tilt_deg",
         _ => return None,
     })
 }
@@ -126,6 +144,31 @@ impl<'a> Plots<'a> {
         self.state(&truth.state, Line::Truth)?;
         self.draw("gimbal_deg", Line::Commanded, truth.gimbal_commanded_rad.to_degrees())?;
         self.draw("gimbal_deg", Line::Actual, truth.gimbal_actual_rad.to_degrees())
+    }
+
+    /// What really happens on a flight from apogee, and what its servos were told.
+    pub(crate) fn in_space(&mut self, truth: &TruthSample) -> RecordingStreamResult<()> {
+        let (at, moving) = (&truth.state.position_m, &truth.state.velocity_m_s);
+        let turned = &truth.state.world_from_body;
+        let nose_up = 2.0 * (turned.x * turned.z - turned.w * turned.y);
+        let degrees = |angles_rad: &[f64], axis: usize| angles_rad.get(axis).copied().map(f64::to_degrees);
+        let mean_deg = |angles_rad: &[f64]| {
+            let sum_rad: f64 = angles_rad.iter().sum();
+            (!angles_rad.is_empty()).then(|| (sum_rad / angles_rad.len() as f64).to_degrees())
+        };
+        self.draw("altitude_m", Line::Truth, truth.height_m)?;
+        self.draw("x_m", Line::Truth, at.x)?;
+        self.draw("y_m", Line::Truth, at.y)?;
+        self.draw("vertical_m_s", Line::Truth, moving.z)?;
+        self.draw("lateral_m_s", Line::Truth, libm::hypot(moving.x, moving.y))?;
+        self.draw("tilt_deg", Line::Truth, libm::acos(nose_up.clamp(-1.0, 1.0)).to_degrees())?;
+        self.draw("thrust_n", Line::Truth, truth.thrust_n)?;
+        for (axis, plot) in ["gimbal_pitch_deg", "gimbal_yaw_deg"].into_iter().enumerate() {
+            self.maybe(plot, Line::Commanded, degrees(&truth.gimbal_commanded_rad, axis))?;
+            self.maybe(plot, Line::Actual, degrees(&truth.gimbal_actual_rad, axis))?;
+        }
+        self.maybe("fins_mean_deg", Line::Commanded, mean_deg(&truth.fins_commanded_rad))?;
+        self.maybe("fins_mean_deg", Line::Actual, mean_deg(&truth.fins_actual_rad))
     }
 
     /// What the controller sees and does. `alone`: nobody else tells the gimbal angles.
@@ -202,7 +245,8 @@ impl<'a> Plots<'a> {
         self.draw("q_deg_s", line, state.q_rad_s.to_degrees())
     }
 
-    fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
+    /// The control level now.
+    pub(crate) fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
         if self.level == Some(level) {
             return Ok(());
         }
@@ -238,7 +282,11 @@ mod tests {
         let limits = TouchdownLimits::from_profile(&Profile::builtin("paper-calibrated").unwrap());
         for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
             let plot = plot_of_verdict(result.name).unwrap();
-            assert!(PLOTS.iter().any(|known| known.name == plot), "{plot}");
+            assert!(PLANAR.iter().any(|known| known.name == plot), "{plot}");
+        }
+        for judged in ["vertical speed", "lateral speed", "tilt"] {
+            let plot = plot_of_verdict(judged).unwrap();
+            assert!(FROM_APOGEE.iter().any(|known| known.name == plot), "{plot}");
         }
         assert_eq!(plot_of_verdict("colour"), None);
     }

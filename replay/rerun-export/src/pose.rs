@@ -2,10 +2,11 @@
 //!
 //! The world is x as in the log, y to the left of it and z up. The rocket's own axes are x towards the nose, y as
 //! the world's, and z to complete them; the pitch from the horizontal turns about -y. In these axes the second
-//! body axis of the equations of motion is -z.
+//! body axis of the equations of motion is -z. A flight from apogee has the viewer's axes already.
 
 use std::f64::consts::FRAC_PI_2;
 
+use protocol::log::flight_v1::RigidState;
 use protocol::log::v1::PlanarState;
 
 /// Where something is and how it is turned.
@@ -26,6 +27,27 @@ pub fn world_from_rocket(state: &PlanarState) -> Pose {
 /// the tail so that the nose pitches down.
 pub fn rocket_from_nozzle(gimbal_rad: f64, pivot_x_m: f64) -> Pose {
     Pose { translation_m: [pivot_x_m as f32, 0.0, 0.0], quaternion_xyzw: about_y_xyzw(-gimbal_rad) }
+}
+
+/// The pose of a rocket that turns in space.
+pub fn world_from_rocket_in_space(state: &RigidState) -> Pose {
+    let (at, turned) = (&state.position_m, &state.world_from_body);
+    Pose {
+        translation_m: [at.x, at.y, at.z].map(|value| value as f32),
+        quaternion_xyzw: [turned.x, turned.y, turned.z, turned.w].map(|value| value as f32),
+    }
+}
+
+/// The pose of a nozzle with two axes in the rocket: its x axis, the direction of the thrust, is
+/// `(cos pitch cos yaw, sin yaw, -sin pitch cos yaw)` in body axes.
+pub fn rocket_from_nozzle_in_space([pitch_rad, yaw_rad]: [f64; 2], pivot_x_m: f64) -> Pose {
+    let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) =
+        (libm::sincos(pitch_rad / 2.0), libm::sincos(yaw_rad / 2.0));
+    let quaternion = [sin_pitch * sin_yaw, sin_pitch * cos_yaw, cos_pitch * sin_yaw, cos_pitch * cos_yaw];
+    Pose {
+        translation_m: [pivot_x_m as f32, 0.0, 0.0],
+        quaternion_xyzw: quaternion.map(|value| value as f32),
+    }
 }
 
 /// The position of a state, m.
@@ -53,6 +75,7 @@ fn about_y_xyzw(angle_rad: f64) -> [f32; 4] {
 mod tests {
     use super::*;
     use flight::dynamics::PlanarState as FlightState;
+    use protocol::log::flight_v1::{Quaternion, Vector3};
 
     /// `v + 2 q x (q x v + w v)`.
     fn rotate([qx, qy, qz, qw]: [f32; 4], [x, y, z]: [f32; 3]) -> [f32; 3] {
@@ -99,6 +122,29 @@ mod tests {
             let turned = rotate(pose.quaternion_xyzw, [u_m_s as f32, 0.0, -w_m_s as f32]);
             assert_close(turned, [vx as f32, 0.0, vz as f32]);
         }
+    }
+
+    #[test]
+    fn the_thrust_follows_both_axes_of_the_gimbal() {
+        let (pitch_rad, yaw_rad) = (0.2_f64, -0.1_f64);
+        let thrust =
+            rotate(rocket_from_nozzle_in_space([pitch_rad, yaw_rad], -0.4).quaternion_xyzw, [1.0, 0.0, 0.0]);
+        let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
+        assert_close(thrust, [cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw].map(|value| value as f32));
+    }
+
+    #[test]
+    fn a_rocket_in_space_is_where_and_how_its_state_says() {
+        let half = f64::sqrt(0.5);
+        let state = RigidState {
+            position_m: Vector3 { x: 1.0, y: -2.0, z: 30.0 },
+            // Turned by -90 degrees about y: the nose points up.
+            world_from_body: Quaternion { w: half, x: 0.0, y: -half, z: 0.0 },
+            ..RigidState::default()
+        };
+        let pose = world_from_rocket_in_space(&state);
+        assert_close(pose.translation_m, [1.0, -2.0, 30.0]);
+        assert_close(rotate(pose.quaternion_xyzw, [1.0, 0.0, 0.0]), [0.0, 0.0, 1.0]);
     }
 
     /// `w' = -(T/m) sin(delta)` along the second body axis, which is -z here.

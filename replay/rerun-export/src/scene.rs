@@ -2,8 +2,7 @@
 
 use flight::controller::ControlLevel;
 use flight::phase::Phase;
-use flight::profile::Profile;
-use protocol::log::v1::{ControllerTick, PlanarState};
+use protocol::log::v1::ControllerTick;
 use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
 use re_sdk_types::components::Radius;
@@ -11,8 +10,9 @@ use re_sdk_types::datatypes::{Quaternion, Rgba32};
 
 use crate::entity;
 use crate::flown::FlownPath;
-use crate::pose::{Pose, path_in_world_m, point_in_world_m, rocket_from_nozzle, world_from_rocket};
+use crate::pose::{Pose, path_in_world_m};
 use crate::shape::RocketShape;
+use crate::survey::Survey;
 
 const PAD: Rgba32 = Rgba32::from_rgb(150, 158, 168);
 const LIMIT: Rgba32 = Rgba32::from_rgb(220, 70, 70);
@@ -29,11 +29,11 @@ const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
 /// Where the rocket is and what drives it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Seen<'a> {
-    /// Its state.
-    pub(crate) state: &'a PlanarState,
-    /// Angle of the gimbal, rad, if known.
-    pub(crate) gimbal_rad: Option<f64>,
+pub(crate) struct Seen {
+    /// The rocket in the world.
+    pub(crate) rocket: Pose,
+    /// The nozzle in the rocket.
+    pub(crate) nozzle: Pose,
     /// Thrust over weight, if known.
     pub(crate) thrust_in_weights: Option<f64>,
 }
@@ -56,6 +56,7 @@ pub(crate) struct Extent {
 pub(crate) struct Scene<'a> {
     recording: &'a RecordingStream,
     shape: RocketShape,
+    ground_z_m: f32,
     gravity_m_s2: f64,
     flown: FlownPath,
     planned_under_thrust: bool,
@@ -63,18 +64,24 @@ pub(crate) struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     /// Records what never moves.
-    pub(crate) fn new(
-        recording: &'a RecordingStream,
-        profile: Option<&Profile>,
-    ) -> RecordingStreamResult<Self> {
-        let shape = profile.map_or_else(RocketShape::unknown, |profile| RocketShape::of(&profile.vehicle));
+    pub(crate) fn new(recording: &'a RecordingStream, survey: &Survey) -> RecordingStreamResult<Self> {
+        let profile = survey.profile.as_ref();
+        let shape = match (profile, &survey.mission) {
+            (Some(profile), _) => RocketShape::of(&profile.vehicle),
+            (None, Some(mission)) => {
+                let propellant_mass_kg = mission.motor().map_or(0.0, |motor| motor.propellant_mass_kg());
+                RocketShape::of_airframe(&mission.airframe, propellant_mass_kg)
+            }
+            (None, None) => RocketShape::unknown(),
+        };
         recording.log_static(entity::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         recording.log_static(entity::BODY, &shape.body())?;
         recording.log_static(entity::LEGS, &shape.legs())?;
         recording.log_static(entity::BELL, &shape.bell())?;
         let marker = Points3D::new([[0.0; 3]]).with_colors([MARKER]);
         recording.log_static(entity::MARKER, &marker.with_radii([Radius::new_ui_points(5.0)]))?;
-        let ground_z_m = -shape.standing_height_m();
+        // The altitude of a planar landing is 0 when it stands; heights from apogee are above the pad.
+        let ground_z_m = if survey.from_apogee { 0.0 } else { -shape.standing_height_m() };
         let pad_m = shape.length_m();
         let cross = [[[-pad_m, 0.0], [pad_m, 0.0]], [[0.0, -pad_m], [0.0, pad_m]]]
             .map(|ends| ends.map(|[x, y]| [x, y, ground_z_m]).to_vec());
@@ -84,13 +91,24 @@ impl<'a> Scene<'a> {
             entity::PAD,
             &LineStrips3D::new(strips).with_colors([PAD]).with_radii([Radius::new_ui_points(1.0)]),
         )?;
-        if let Some(profile) = profile {
-            let limit = circle(profile.touchdown_limits.x_m as f32, ground_z_m);
+        let limits = survey.mission.as_ref().map(|mission| &mission.touchdown_limits);
+        if let Some(limits) = profile.map(|profile| &profile.touchdown_limits).or(limits) {
+            let limit = circle(limits.x_m as f32, ground_z_m);
             let limit = LineStrips3D::new([limit]).with_colors([LIMIT]);
             recording.log_static(entity::PAD_LIMIT, &limit.with_radii([Radius::new_ui_points(1.0)]))?;
         }
-        let gravity_m_s2 = profile.map_or(STANDARD_GRAVITY_M_S2, |profile| profile.environment.gravity_m_s2);
-        Ok(Self { recording, shape, gravity_m_s2, flown: FlownPath::new(), planned_under_thrust: false })
+        let gravity_m_s2 = profile
+            .map(|profile| profile.environment.gravity_m_s2)
+            .or(survey.mission.as_ref().map(|mission| mission.gravity_m_s2))
+            .unwrap_or(STANDARD_GRAVITY_M_S2);
+        Ok(Self {
+            recording,
+            shape,
+            ground_z_m,
+            gravity_m_s2,
+            flown: FlownPath::new(),
+            planned_under_thrust: false,
+        })
     }
 
     /// Thrust over weight.
@@ -98,20 +116,20 @@ impl<'a> Scene<'a> {
         thrust_n / (mass_kg * self.gravity_m_s2)
     }
 
+    /// Where the nozzle turns, m ahead of the centre of gravity.
+    pub(crate) fn pivot_x_m(&self) -> f64 {
+        f64::from(self.shape.pivot_x_m)
+    }
+
     /// Records where the rocket is now.
-    pub(crate) fn rocket(&mut self, seen: &Seen<'_>) -> RecordingStreamResult<()> {
-        let pose = world_from_rocket(seen.state);
-        self.recording.log(entity::ROCKET, &transform(&pose))?;
-        self.recording.log(entity::FOLLOWED, &Transform3D::from_translation(pose.translation_m))?;
-        let nozzle = rocket_from_nozzle(
-            seen.gimbal_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0),
-            f64::from(self.shape.pivot_x_m),
-        );
-        self.recording.log(entity::NOZZLE, &transform(&nozzle))?;
+    pub(crate) fn rocket(&mut self, seen: &Seen) -> RecordingStreamResult<()> {
+        self.recording.log(entity::ROCKET, &transform(&seen.rocket))?;
+        self.recording.log(entity::FOLLOWED, &Transform3D::from_translation(seen.rocket.translation_m))?;
+        self.recording.log(entity::NOZZLE, &transform(&seen.nozzle))?;
         if let Some(weights) = seen.thrust_in_weights {
             self.recording.log(entity::THRUST, &self.thrust_arrow(weights))?;
         }
-        let here_m = point_in_world_m(seen.state);
+        let here_m = seen.rocket.translation_m;
         if let Some(from_m) = self.flown.push(here_m) {
             let piece = LineStrips3D::new([vec![from_m, here_m]]).with_colors([TRAIL]);
             self.recording.log(entity::TRAIL, &piece.with_radii([Radius::new_ui_points(2.0)]))?;
@@ -150,7 +168,7 @@ impl<'a> Scene<'a> {
         let extent = Extent {
             top_m: points_m.iter().map(|[_, _, z]| *z).fold(0.0, f32::max),
             x_m: (all_x_m().fold(0.0, f32::min), all_x_m().fold(0.0, f32::max)),
-            ground_z_m: -self.shape.standing_height_m(),
+            ground_z_m: self.ground_z_m,
             rocket_m: self.shape.length_m(),
         };
         if points_m.len() > 1 {

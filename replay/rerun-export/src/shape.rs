@@ -1,5 +1,6 @@
 //! What the rocket looks like: bodies of revolution about its x axis, which points to the nose.
 
+use flight::airframe::{Airframe, MassModel};
 use flight::profile::Vehicle;
 use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
 use re_sdk_types::components::Color;
@@ -25,24 +26,52 @@ pub(crate) struct RocketShape {
     pub(crate) tail_x_m: f32,
     /// Where the nozzle turns, m.
     pub(crate) pivot_x_m: f32,
+    /// Where the feet are, m.
+    pub(crate) foot_x_m: f32,
     /// Radius of the body, m.
     pub(crate) radius_m: f32,
 }
 
+/// Length of the nozzle's bell, in radii of the body.
+const BELL_RADII: f32 = 1.2;
+
 impl RocketShape {
     pub(crate) fn of(vehicle: &Vehicle) -> Self {
         let middle_x_m = -vehicle.cg_from_mid_m;
+        let tail_x_m = (middle_x_m - vehicle.length_m / 2.0) as f32;
+        let pivot_x_m = -vehicle.thrust_arm_m() as f32;
+        let radius_m = (vehicle.diameter_m / 2.0) as f32;
         Self {
             nose_x_m: (middle_x_m + vehicle.length_m / 2.0) as f32,
-            tail_x_m: (middle_x_m - vehicle.length_m / 2.0) as f32,
-            pivot_x_m: -vehicle.thrust_arm_m() as f32,
-            radius_m: (vehicle.diameter_m / 2.0) as f32,
+            tail_x_m,
+            pivot_x_m,
+            foot_x_m: below_the_bell_m(tail_x_m, pivot_x_m, radius_m),
+            radius_m,
+        }
+    }
+
+    /// An airframe with its landing motor burnt out, as it touches down.
+    pub(crate) fn of_airframe(airframe: &Airframe, propellant_mass_kg: f64) -> Self {
+        let cg_station_m =
+            MassModel::new(&airframe.mass, propellant_mass_kg).at(propellant_mass_kg).cg_station_m;
+        Self {
+            nose_x_m: (airframe.body.length_m - cg_station_m) as f32,
+            tail_x_m: -cg_station_m as f32,
+            pivot_x_m: -cg_station_m as f32,
+            foot_x_m: -airframe.above_feet_m(cg_station_m) as f32,
+            radius_m: (airframe.body.diameter_m / 2.0) as f32,
         }
     }
 
     /// For logs that do not say: a metre long.
     pub(crate) fn unknown() -> Self {
-        Self { nose_x_m: 0.5, tail_x_m: -0.5, pivot_x_m: -0.5, radius_m: 0.05 }
+        Self {
+            nose_x_m: 0.5,
+            tail_x_m: -0.5,
+            pivot_x_m: -0.5,
+            foot_x_m: below_the_bell_m(-0.5, -0.5, 0.05),
+            radius_m: 0.05,
+        }
     }
 
     /// Length of the body, m.
@@ -52,12 +81,12 @@ impl RocketShape {
 
     /// Length of the nozzle's bell, m.
     pub(crate) fn bell_m(&self) -> f32 {
-        1.2 * self.radius_m
+        BELL_RADII * self.radius_m
     }
 
     /// Height of the centre of gravity above the ground when the rocket stands, m.
     pub(crate) fn standing_height_m(&self) -> f32 {
-        1.4 * self.bell_m() - self.tail_x_m.min(self.pivot_x_m)
+        -self.foot_x_m
     }
 
     pub(crate) fn body(&self) -> Mesh3D {
@@ -96,18 +125,22 @@ impl RocketShape {
 
     /// Four legs from the body to the ground.
     pub(crate) fn legs(&self) -> LineStrips3D {
-        let foot_x_m = -self.standing_height_m();
         let hip_x_m = self.tail_x_m + 0.2 * self.length_m();
         let out_m = 4.5 * self.radius_m;
         let strips = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(y, z): (f32, f32)| {
             [
                 [hip_x_m, y * self.radius_m, z * self.radius_m],
-                [foot_x_m, y * out_m, z * out_m],
+                [self.foot_x_m, y * out_m, z * out_m],
                 [self.tail_x_m, y * self.radius_m, z * self.radius_m],
             ]
         });
         LineStrips3D::new(strips).with_colors([METAL]).with_radii([0.1 * self.radius_m])
     }
+}
+
+/// Where the feet of a rocket stand whose legs nobody describes, m: clear of the bell.
+fn below_the_bell_m(tail_x_m: f32, pivot_x_m: f32, radius_m: f32) -> f32 {
+    tail_x_m.min(pivot_x_m) - 1.4 * BELL_RADII * radius_m
 }
 
 /// A ring about the x axis.
@@ -152,6 +185,7 @@ fn body_of_revolution(rings: &[Ring]) -> Mesh3D {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flight::mission::Mission;
     use flight::profile::Profile;
 
     #[test]
@@ -160,6 +194,16 @@ mod tests {
         assert!((shape.length_m() - 0.7).abs() < 1e-6);
         assert!((shape.tail_x_m + 0.52).abs() < 1e-6 && (shape.pivot_x_m + 0.52).abs() < 1e-6);
         assert!(shape.standing_height_m() > 0.52 + shape.bell_m());
+    }
+
+    #[test]
+    fn an_airframe_stands_on_its_own_feet() {
+        let mission = Mission::builtin("mk2").unwrap().unwrap();
+        let propellant_kg = mission.motor().unwrap().propellant_mass_kg();
+        let shape = RocketShape::of_airframe(&mission.airframe, propellant_kg);
+        let airframe = &mission.airframe;
+        assert!((f64::from(shape.length_m()) - airframe.body.length_m).abs() < 1e-6);
+        assert!((f64::from(shape.foot_x_m - shape.tail_x_m) - airframe.legs.foot_station_m).abs() < 1e-6);
     }
 
     #[test]

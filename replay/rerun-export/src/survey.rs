@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::Read;
 
+use flight::mission::Mission;
 use flight::profile::Profile;
 use foxglove::messages::Log;
 use foxglove::messages::log::Level;
@@ -11,7 +12,7 @@ use prost::Message as _;
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{
     ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS,
-    TOPIC_PLANT_TRUTH, TOPIC_TELEMETRY,
+    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
 };
 use protocol::text::printable;
 
@@ -52,6 +53,10 @@ pub struct Survey {
     pub build: BTreeMap<String, String>,
     /// The profile, if the log has one that this build can use.
     pub profile: Option<Profile>,
+    /// The mission, if it is a flight from apogee and this build can use it.
+    pub mission: Option<Mission>,
+    /// Whether it is a flight from apogee.
+    pub from_apogee: bool,
     /// What keeps this build from using the profile.
     pub profile_problem: Option<String>,
     /// Whose word the pose of the rocket is.
@@ -72,11 +77,12 @@ impl Survey {
     pub fn of(input: impl Read) -> std::io::Result<Self> {
         let mut reader = LogReader::new(input);
         let mut survey = Self::default();
+        let mut profile = None;
         while let Some(item) = reader.next_item()? {
             match item {
                 LogItem::Metadata { name, entries } if name == METADATA_RUN => survey.run = entries,
                 LogItem::Metadata { name, entries } if name == METADATA_BUILD => survey.build = entries,
-                LogItem::Attachment { name, data } if name == ATTACHMENT_PROFILE => survey.take_profile(data),
+                LogItem::Attachment { name, data } if name == ATTACHMENT_PROFILE => profile = Some(data),
                 LogItem::Message { channel_id, log_time_ns, data, .. } => {
                     survey.first_log_time_ns.get_or_insert(log_time_ns);
                     if let Some(channel) = reader.channel(channel_id) {
@@ -87,6 +93,9 @@ impl Survey {
             }
         }
         survey.events.sort_by_key(|event| event.log_time_ns);
+        if let Some(data) = profile {
+            survey.take_profile(data);
+        }
         Ok(survey)
     }
 
@@ -96,19 +105,28 @@ impl Survey {
     }
 
     fn take_profile(&mut self, data: Vec<u8>) {
-        let parsed = String::from_utf8(data).map_err(|error| error.to_string()).and_then(|text| {
-            Profile::from_toml(&text, ATTACHMENT_PROFILE).map_err(|error| error.to_string())
-        });
-        match parsed {
-            Ok(profile) => self.profile = Some(profile),
-            Err(problem) => self.profile_problem = Some(problem),
-        }
+        let text = match String::from_utf8(data) {
+            Ok(text) => text,
+            Err(error) => {
+                self.profile_problem = Some(error.to_string());
+                return;
+            }
+        };
+        let problem = if self.from_apogee {
+            let parsed = Mission::from_toml(&text, ATTACHMENT_PROFILE);
+            parsed.map(|mission| self.mission = Some(mission)).map_err(|error| error.to_string())
+        } else {
+            let parsed = Profile::from_toml(&text, ATTACHMENT_PROFILE);
+            parsed.map(|profile| self.profile = Some(profile)).map_err(|error| error.to_string())
+        };
+        self.profile_problem = problem.err();
     }
 
     fn take_message(&mut self, topic: &str, schema_name: &str, log_time_ns: u64, data: &[u8]) {
         let ours = schema_name.starts_with("touchdown.");
+        self.from_apogee |= ours && matches!(topic, TOPIC_PILOT_TICK | TOPIC_TRUTH_SAMPLE);
         let source = match topic {
-            TOPIC_PLANT_TRUTH if ours => PoseSource::Truth,
+            TOPIC_PLANT_TRUTH | TOPIC_TRUTH_SAMPLE if ours => PoseSource::Truth,
             TOPIC_CONTROLLER_TICK if ours => PoseSource::Estimate,
             TOPIC_TELEMETRY if ours => PoseSource::Telemetry,
             TOPIC_EVENTS if schema_name == "foxglove.Log" => return self.take_event(log_time_ns, data),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use replay_rerun::{Overwrite, entity, export_file};
 
-use crate::logs::{START_UNIX_NS, TICKS, folder, write_log, write_telemetry_log};
+use crate::logs::{START_UNIX_NS, TICKS, folder, write_apogee_log, write_log, write_telemetry_log};
 use crate::read_back::Recording;
 
 #[test]
@@ -67,6 +67,32 @@ fn without_a_plant_the_estimate_is_shown() {
     assert_eq!(recording.rows(entity::ROCKET), TICKS as usize);
     assert_eq!(recording.rows(entity::THRUST), 0);
     assert_eq!(recording.rows("plots/gimbal_deg/actual"), TICKS as usize);
+}
+
+#[test]
+fn a_flight_from_apogee_is_shown_in_space() {
+    let (_folder, log, rrd) = folder();
+    write_apogee_log(&log);
+    let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
+    assert_eq!((exported.ticks, exported.poses, exported.profile_problem), (TICKS, TICKS, None));
+    let recording = Recording::read(&rrd);
+    assert_eq!(recording.layouts, 1);
+    for path in [
+        entity::ROCKET,
+        entity::NOZZLE,
+        "plots/altitude_m/true",
+        "plots/y_m/true",
+        "plots/vertical_m_s/true",
+        "plots/tilt_deg/true",
+        "plots/gimbal_yaw_deg/actual",
+        "plots/fins_mean_deg/commanded",
+    ] {
+        assert_eq!(recording.rows(path), TICKS as usize, "{path}");
+    }
+    assert_eq!(recording.rows(entity::PHASE), 1);
+    assert_eq!(recording.rows("plots/gimbal_yaw_deg/limit_high"), 2);
+    assert!(recording.is_static(entity::FLOWN) && recording.is_static(entity::PAD_LIMIT));
+    assert_eq!(recording.times(entity::ROCKET, entity::TIMELINE_TICK), [1, 2, 3, 4]);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use flight::dynamics::PlanarModel;
 use flight::phase::Phase;
 use flight::profile::Profile;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
+use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
@@ -91,6 +92,45 @@ pub(crate) fn folder() -> (tempfile::TempDir, PathBuf, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let (log, rrd) = (folder.path().join("flight.mcap"), folder.path().join("flight.rrd"));
     (folder, log, rrd)
+}
+
+/// A log of a flight from apogee: 2 s of an upright fall, a frame every 0.5 s.
+pub(crate) fn write_apogee_log(path: &Path) {
+    let (_, mission_toml) = flight::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
+    let header = LogHeader {
+        writer: "test".to_owned(),
+        start_unix_ns: START_UNIX_NS,
+        profile_toml: Some((*mission_toml).to_owned()),
+        ..LogHeader::default()
+    };
+    let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
+    let half = f64::sqrt(0.5);
+    for frame in 0..TICKS {
+        let time_s = 0.5 * frame as f64;
+        let mut tick = flight_v1::PilotTick::default();
+        tick.input.frame = frame + 1;
+        tick.input.time_s = time_s;
+        tick.output.phase = u32::from(Phase::AeroDescent.index());
+        log.write(&Record::PilotTick(Box::new(tick)), nanoseconds(time_s)).unwrap();
+        let truth = flight_v1::TruthSample {
+            time_s,
+            state: flight_v1::RigidState {
+                position_m: flight_v1::Vector3 { x: 3.0, y: -4.0, z: 100.0 - 10.0 * time_s },
+                velocity_m_s: flight_v1::Vector3 { x: 3.0, y: 4.0, z: -10.0 },
+                world_from_body: flight_v1::Quaternion { w: half, x: 0.0, y: -half, z: 0.0 },
+                ..flight_v1::RigidState::default()
+            },
+            height_m: 99.0 - 10.0 * time_s,
+            mass_kg: 3.0,
+            gimbal_commanded_rad: vec![0.01, -0.02],
+            gimbal_actual_rad: vec![0.01, -0.02],
+            fins_commanded_rad: vec![1.0; 4],
+            fins_actual_rad: vec![1.0; 4],
+            ..flight_v1::TruthSample::default()
+        };
+        log.write(&Record::TruthSample(Box::new(truth)), nanoseconds(time_s)).unwrap();
+    }
+    log.finish().unwrap();
 }
 
 /// A log as a ground station writes it: what it knew, and when.
