@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 use e2e::{BareGround, Program, Running, Terminal, free_port, program};
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavResult,
-    TD_FLIGHT_STATUS_DATA, TdPhase,
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavModeFlag,
+    MavResult, TD_FLIGHT_STATUS_DATA, TdPhase,
 };
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
@@ -228,7 +228,14 @@ fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Fai
     std::thread::sleep(watched);
     idle.add(&terminal, before);
     terminal.type_bytes(b"AARM\r");
-    watch.wait_for_phase(TdPhase::TD_PHASE_PAD_ARMED);
+    // The ground offers to start once a heartbeat says armed, and it hears the vehicle when we do.
+    watch.wait_for("an armed heartbeat", |_, message| match message {
+        Some(MavMessage::HEARTBEAT(beat)) => {
+            beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED).then_some(())
+        }
+        _ => None,
+    });
+    std::thread::sleep(Duration::from_millis(500));
     terminal.type_bytes(b"S");
     std::thread::sleep(Duration::from_millis(200));
     terminal.type_bytes(b"\r");
