@@ -1,0 +1,42 @@
+//! When there is no use in waiting for the ignition gate: the parachute, while it has room.
+
+use super::{Pilot, PilotInput};
+use crate::estimator::Estimate;
+use crate::phase::Phase;
+
+/// What stands in the gate's way so long, s, will not step aside before the ignition.
+const LASTS_S: f64 = 0.5;
+/// The decision falls so long before the commit height is passed, s.
+const BEFORE_COMMIT_S: f64 = 0.1;
+/// Beyond the gate's limit of the tilt times this, the vehicle does not steer, it tumbles.
+const TUMBLING: f64 = 2.0;
+
+impl Pilot {
+    /// The gate has been shut for a reason that lasts, and the parachute's last chance has come.
+    ///
+    /// Reasons that last are fins that do not answer, an estimate that is not healthy, an attitude out of hand, and a
+    /// speed that no landing begins with. Operations: above the commit height that means the parachute.
+    pub(super) fn gate_will_not_open(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
+        let waiting = matches!(self.mode.phase, Phase::Deploy | Phase::AeroDescent | Phase::LandArmed);
+        let limits = &self.known.mission.gate;
+        let state = &estimate.state;
+        let rate_rad_s = libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z);
+        let shut = !self.fins_there(&input.fins_rad)
+            || !estimate.health.is_good()
+            || state.tilt_rad() > TUMBLING * limits.tilt_max_deg.to_radians()
+            || rate_rad_s > TUMBLING * limits.pitch_rate_max_deg_s.to_radians()
+            || self.outlook.ignition.band.is_none();
+        if !(waiting && shut) {
+            self.gate_shut_since_s = None;
+            return false;
+        }
+        let since_s = *self.gate_shut_since_s.get_or_insert(input.time_s);
+        let feet_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
+        let sinking_m_s = (-state.velocity_m_s.z).max(0.0);
+        let above_commit_m = feet_m - self.outlook.commit_height_m;
+        input.time_s - since_s >= LASTS_S
+            && self.outlook.commit_height_m > 0.0
+            && above_commit_m > 0.0
+            && above_commit_m < BEFORE_COMMIT_S * sinking_m_s
+    }
+}
