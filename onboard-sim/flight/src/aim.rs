@@ -136,7 +136,8 @@ impl AimLoop {
         }
     }
 
-    /// The acceleration about body y and z that the model does not explain, rad/s^2.
+    /// The acceleration about body y and z that the model does not explain, rad/s^2: what a crooked nozzle, a centre of
+    /// gravity off the axis and the air amount to.
     pub fn disturbance_rad_s2(&self) -> [f64; 2] {
         self.disturbance_rad_s2
     }
@@ -252,7 +253,7 @@ mod tests {
     }
 
     /// A body that turns as commanded some frames ago, with a constant disturbance.
-    fn fly(disturbance_rad_s2: f64) -> (f64, f64) {
+    fn fly(disturbance_rad_s2: f64) -> (f64, f64, f64) {
         let (frame_s, turning) = (0.005, 200.0);
         let mut aim_loop = AimLoop::new(GAINS, frame_s);
         let mut attitude = upright() * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.3);
@@ -274,16 +275,17 @@ mod tests {
             overshoot = overshoot.max(-turn_to_aim_rad(&attitude, &Vector3::z()).y * -1.0);
         }
         let error = turn_to_aim_rad(&attitude, &Vector3::z()).norm();
-        (error, overshoot)
+        (error, overshoot, aim_loop.disturbance_rad_s2()[0])
     }
 
     #[test]
     fn it_settles_in_spite_of_latency_and_disturbance() {
         for disturbance in [0.0, 3.0, -3.0] {
-            let (error, _) = fly(disturbance);
+            let (error, _, found) = fly(disturbance);
+            assert!((found - disturbance).abs() < 0.1, "{found} rad/s^2 found of {disturbance}");
             assert!(error < 2e-3, "{error} rad left under {disturbance} rad/s^2");
         }
-        let (_, overshoot) = fly(0.0);
+        let (_, overshoot, _) = fly(0.0);
         assert!(overshoot < 0.03, "{overshoot} rad");
     }
 

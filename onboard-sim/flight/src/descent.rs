@@ -4,8 +4,8 @@
 //! angle of attack, the air on its side pushes it the other way, by `1/2 rho V^2 S_n sin^2`. The law asks for the
 //! horizontal acceleration that brings position and velocity to rest over the pad at the ignition (the least-effort
 //! law `a = -(6 p / t^2 + 4 v / t)`), turns it into a lean, the lean into a turning moment, and leaves it to the
-//! [allocation](crate::fins) to find four openings. Beyond some 15 degrees the body's own moment overcomes the fins',
-//! so the lean is limited.
+//! [allocation](crate::fins) to find four openings. The lean is limited: the body's own moment grows with it, the fins'
+//! does not.
 
 use nalgebra::Vector3;
 use serde::Deserialize;

@@ -16,7 +16,7 @@
 //! * [`nmpc`]: the landing optimal-control problem and its solver.
 //! * [`stabiliser`]: the upright law that flies when no plan can be had.
 //! * [`thrust_estimate`]: how strong the motor is, from the accelerometer.
-//! * [`motor_estimate`] and [`thrust_offset`]: impulse, burn time, ignition and direction of the thrust, in space.
+//! * [`motor_estimate`]: impulse, burn time and ignition of the motor, in space.
 //! * [`controller`]: one tick of the controller, from estimate to gimbal command.
 //! * [`verdict`]: the touchdown limits and whether a landing kept them.
 //!
@@ -49,6 +49,5 @@ pub mod rigid;
 pub mod stabiliser;
 pub mod thrust_curve;
 pub mod thrust_estimate;
-pub mod thrust_offset;
 pub mod verdict;
 pub mod vertical;

@@ -83,12 +83,13 @@ pub struct Mission {
     pub fin_sigmas: f64,
     /// Where the fins keep the vehicle in the band that is then left, 0 at its low end, 1 at its high end.
     pub fin_place: f64,
-    /// Experiment.
-    pub fin_gain: f64,
     /// How much of the fins' present opening a plan expects to last; the rest is expected to be half open.
     pub fins_kept: f64,
-    /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed, degrees.
+    /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed before the
+    /// ignition, degrees.
     pub soft_tilt_deg: f64,
+    /// The same for the fins after it: what is left of the tilt is kept for the planner, degrees.
+    pub fin_soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright already in that band, s.
     pub settle_s: f64,
     /// Where it begins.

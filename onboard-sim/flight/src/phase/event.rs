@@ -47,7 +47,7 @@ pub enum Event {
     ThrustConfirmed,
     /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition command.
     NoThrustTimeout,
-    /// Radio command: abort.
+    /// Abort: by radio, or by the vehicle itself when its ignition gate will not open any more.
     AbortRequested {
         /// The parachute still has room to open.
         above_commit_height: bool,

@@ -29,6 +29,7 @@ remembers!(Pilot {
     fins_rad,
     gimbal_rad,
     gate_refusal,
+    gate_shut_since_s,
 });
 
 // The mission, its motor and its masses are what a log's profile says; they do not change in flight.

@@ -23,6 +23,20 @@ const FIN_THERE_RAD: f64 = 0.1;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
+/// Lying across the air by more than this, the body turns the vehicle harder than a fin that gives way lets it be
+/// turned back, rad: all of them are opened then.
+const ACROSS_THE_AIR_RAD: f64 = 0.65;
+/// Slower than this, air turns nothing, m/s.
+const AIR_TURNS_M_S: f64 = 12.0;
+
+/// Whether the air comes so much from the side that only open fins turn the vehicle back.
+fn lies_across_the_air(estimate: &Estimate) -> bool {
+    let through_air = estimate.velocity_through_air_m_s();
+    let airspeed_m_s = through_air.norm();
+    let along_m_s = -through_air.dot(&estimate.state.nose_in_world());
+    airspeed_m_s > AIR_TURNS_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
+}
+
 impl Pilot {
     /// One frame.
     pub fn step(&mut self, input: &PilotInput) -> PilotOutput {
@@ -114,7 +128,7 @@ impl Pilot {
     }
 
     fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
-        let column = self.known.column(density_kg_m3);
+        let column = self.known.column(density_kg_m3, self.known.mission.soft_tilt_deg);
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let vertical_m_s = state.velocity_m_s.z;
@@ -148,6 +162,9 @@ impl Pilot {
         if input.abort {
             let gate_open = self.gate_open(input, estimate);
             self.happen(Event::AbortRequested { above_commit_height, gate_open }, time_s);
+        }
+        if self.gate_will_not_open(input, estimate) {
+            self.happen(Event::AbortRequested { above_commit_height: true, gate_open: false }, time_s);
         }
         match self.mode.phase {
             Phase::Deploy if self.fins_there(&input.fins_rad) => self.happen(Event::FinsConfirmed, time_s),
@@ -220,7 +237,7 @@ impl Pilot {
         self.gate_refusal.is_none()
     }
 
-    fn fins_there(&self, fins_rad: &[f64; 4]) -> bool {
+    pub(super) fn fins_there(&self, fins_rad: &[f64; 4]) -> bool {
         fins_rad.iter().zip(&self.fins_rad).all(|(there, wanted)| (there - wanted).abs() < FIN_THERE_RAD)
     }
 
@@ -236,7 +253,7 @@ impl Pilot {
     }
 
     fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
-        let column = self.known.column(situation.density_kg_m3);
+        let column = self.known.column(situation.density_kg_m3, self.known.mission.fin_soft_tilt_deg);
         let state = &estimate.state;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
         let sigmas = self.known.mission.fin_sigmas;
@@ -248,7 +265,6 @@ impl Pilot {
             state.velocity_m_s.z,
             height_m,
             self.known.mission.fin_place,
-            self.known.mission.fin_gain,
         );
         if self.mode.interlocks.degraded {
             return;
@@ -322,7 +338,7 @@ impl Pilot {
         let (moments, drag_area_m2, min_rad) = if burning {
             // The gimbal turns the vehicle now; the fins brake, and keep it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
-        } else if self.known.mission.steered {
+        } else if self.known.mission.steered && !lies_across_the_air(estimate) {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())
         } else {
             return [fins.open_rad(); 4];

@@ -87,21 +87,14 @@ impl Known {
     /// The motor that is planned with: what turns out to be too much can be thrown away late, what is missing cannot
     /// be had.
     pub(super) fn cautious_burn(&self, burning_s: f64) -> Burn<'_> {
-        let fades_s = self.mission.caution_fades_s;
-        let early = if fades_s > 0.0 {
-            let left_s = self
-                .burn()
-                .falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)
-                .unwrap_or(0.0)
-                - burning_s;
-            (left_s / fades_s).clamp(0.0, 1.0)
-        } else {
-            1.0
-        };
+        let carried_until_s =
+            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
+        let early = (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0);
         self.doubted_burn(burning_s, -self.mission.caution_sigmas * early)
     }
 
-    pub(super) fn column(&self, density_kg_m3: f64) -> Column {
+    pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {
         let mission = &self.mission;
         let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;
         Column {
@@ -110,7 +103,7 @@ impl Known {
             air_density_kg_m3: density_kg_m3,
             body_drag_area_m2: scaled(self.body_drag_area_m2()),
             crossflow_area_m2: self.crossflow_area_m2(),
-            soft: Braking { tilt_rad: mission.soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
+            soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
             touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
             latest_after_s: mission.powered.latest_after_s,

@@ -6,6 +6,7 @@
 
 mod digest;
 mod fly;
+mod hopeless;
 mod inspect;
 mod known;
 mod outlook;
@@ -88,6 +89,8 @@ pub struct Pilot {
     fins_rad: [f64; 4],
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
+    /// Since when something lasting has stood in the gate's way, s.
+    gate_shut_since_s: Option<f64>,
 }
 
 impl Pilot {
@@ -126,6 +129,7 @@ impl Pilot {
             fins_rad: [airframe.fins.closed_rad(); 4],
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
+            gate_shut_since_s: None,
             known: Known {
                 mission: mission.clone(),
                 mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),

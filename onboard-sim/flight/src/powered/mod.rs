@@ -52,6 +52,9 @@ const END_LEAN_MAX_RAD: f64 = 0.05;
 /// How much dearer a tilt becomes when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
 
+/// A plan that touches down faster than this is not flown, m/s: upright brakes as well.
+const HARD_M_S: f64 = -1.2;
+
 /// A plan that tilts further than this even so is not flown, rad.
 const TILT_BELIEVED_RAD: f64 = 1.6;
 
@@ -171,6 +174,10 @@ impl PoweredGuidance {
                 Some(flown) if flown.left_s(time_s) > 0.0 => ControlLevel::ShiftedPlan,
                 _ => ControlLevel::Stabiliser,
             },
+            // Too low for any landing: a plan would lie across the air to brake, and gain as much sideways.
+            () if solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S) => {
+                ControlLevel::Stabiliser
+            }
             () if solution.status == SolveStatus::Converged
                 && solution.condition_miss <= self.settings.landing_miss =>
             {

@@ -130,8 +130,9 @@ impl Column {
         vertical_m_s: f64,
         height_m: f64,
         place: f64,
-        gain: f64,
     ) -> f64 {
+        /// Share of the fins per share of the band.
+        const GAIN: f64 = 1.5;
         /// A band is taken to be at least this wide, in time at the present speed, s: above a narrow band lies hardly
         /// a landing, but closing the fins would only make the vehicle faster.
         const NARROW_S: f64 = 0.25;
@@ -145,7 +146,7 @@ impl Column {
         let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
         let width_m = (high_m - low_m).max(-NARROW_S * vertical_m_s).max(1e-3);
         let at_m = low_m + place * width_m;
-        (0.5 + gain * (at_m - height_m) / width_m).clamp(0.0, 1.0)
+        (0.5 + GAIN * (at_m - height_m) / width_m).clamp(0.0, 1.0)
     }
 
     /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.

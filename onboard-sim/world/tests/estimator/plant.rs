@@ -11,7 +11,6 @@ use flight::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage}
 use flight::motors;
 use flight::rigid::RigidState;
 use flight::thrust_curve::ThrustCurve;
-use flight::thrust_offset::{OffsetSample, ThrustOffset};
 use nalgebra::{Vector2, Vector3};
 use world::sensors::{SensorFaults, SensorParams, SensorTruth, Sensors, believed_start};
 use world::wind::Wind;
@@ -31,7 +30,6 @@ struct Frame {
     estimate: Estimate,
     nees: f64,
     motor: MotorEstimate,
-    offset_rad: [f64; 2],
     /// Thrust a second ahead: predicted and, by the drawn motor, true, N.
     ahead_n: (f64, f64),
 }
@@ -93,7 +91,6 @@ fn fly(seed: u64) -> Vec<Frame> {
     let believed = believed_start(&start(&truth), &uncertainty, seed);
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed);
     let mut motor = MotorEstimate::new(&MotorPrior::default());
-    let mut offset = ThrustOffset::default();
     let allocation = Allocation {
         model: airframe.fin_model(),
         arm_m: airframe.fins.station_m - airframe.mass.loaded_cg_station_m,
@@ -137,16 +134,6 @@ fn fly(seed: u64) -> Vec<Frame> {
                 may_burn: actuators.ignite,
             },
         );
-        let thrust_n = motor.predict(&curve, time_s, f64::INFINITY).thrust_n;
-        offset.update(&OffsetSample {
-            rate_rad_s: [estimate.state.rate_rad_s.y, estimate.state.rate_rad_s.z],
-            gimbal_rad,
-            thrust_n,
-            arm_m: mass.cg_station_m,
-            inertia_kg_m2: mass.pitch_inertia_kg_m2,
-            other_rad_s2: [0.0; 2],
-            interval_s: 0.005,
-        });
         let since_thrust_s = world.thrust_begins_s().map(|begins_s| time_s - begins_s).filter(|s| *s >= 0.0);
         let ahead_n = since_thrust_s.map_or(0.0, |since_s| {
             truth.impulse_scale / truth.burn_time_scale
@@ -160,7 +147,6 @@ fn fly(seed: u64) -> Vec<Frame> {
             estimate,
             nees: estimator.nees_of_motion(&state).unwrap_or(f64::NAN),
             motor,
-            offset_rad: offset.offset_rad(),
             ahead_n: (motor.predict(&curve, time_s + 1.0, f64::NAN).thrust_n, ahead_n),
         });
         let dynamic_pressure_pa = 0.5 * vehicle.air_density_kg_m3 * world.air_velocity_m_s().norm_squared();
@@ -225,23 +211,8 @@ fn the_motor_is_known_half_a_second_into_its_burn() {
         let burning = burning_for(since_s);
         // The accelerometer sees thrust over mass, and a mass that is off is in the estimated thrust.
         let ahead_n = rms(&burning, |truth, frame| frame.ahead_n.0 - frame.ahead_n.1 / truth.mass_scale);
-        let offset_rad = rms(&burning, |truth, frame| {
-            (0..2)
-                .map(|axis| frame.offset_rad[axis] - truth.thrust_misalignment_rad[axis])
-                .fold(0.0, f64::hypot)
-        });
-        let unknown_rad = rms(&burning, |truth, _| {
-            let [pitch, yaw] = truth.thrust_misalignment_rad;
-            pitch.hypot(yaw)
-        });
-        println!(
-            "after {since_s} s: thrust a second ahead {ahead_n:.2} N, direction {offset_rad:.4} of {unknown_rad:.4} rad"
-        );
+        println!("after {since_s} s: thrust a second ahead {ahead_n:.2} N");
         assert!(ahead_n < thrust_n, "{ahead_n}");
-        // The air's moments, which are an offset to the observer, are largest while the vehicle is fast.
-        if since_s >= 1.0 {
-            assert!(offset_rad < 0.8 * unknown_rad, "{offset_rad} of {unknown_rad}");
-        }
         assert!(burning.iter().all(|(_, frame)| frame.motor.stage() == MotorStage::Burning));
     }
     let late_s = rms(&burning_for(0.5), |_, frame| {
