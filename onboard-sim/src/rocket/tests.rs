@@ -225,7 +225,9 @@ fn telemetry_is_the_estimate_in_north_east_down() {
 
 #[test]
 fn the_countdown_to_ignition_runs_down_to_it() {
-    let mut rocket = in_phase(&flight_of("field", &[]), Phase::LandArmed);
+    // In still air with everything known: what a gust or a better estimate changes in the last second is no error of
+    // the countdown.
+    let mut rocket = in_phase(&flight_of("none", &[]), Phase::LandArmed);
     let announced = rocket.snapshot().descent.unwrap();
     let (band, chosen_m) = (announced.band_m.unwrap(), announced.chosen_m.unwrap());
     assert!(band.0 < chosen_m && chosen_m < band.1, "{announced:?}");
