@@ -49,6 +49,8 @@ impl Pilot {
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         let far = self.mode.phase == Phase::AeroDescent;
         let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
+        // Without one, right after apogee and after a restart, an abort would not know whether the parachute has room.
+        let looking = looking || self.outlook == Outlook::default();
         if looking && self.mode.phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }

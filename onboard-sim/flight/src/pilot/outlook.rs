@@ -5,7 +5,7 @@ use crate::ignition::IgnitionOutlook;
 /// Room the parachute needs, times this, is left above the ground.
 const COMMIT_MARGIN: f64 = 1.5;
 
-/// Expectations before ignition, made anew ten or twenty times a second.
+/// Expectations before ignition, made anew five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outlook {
     /// The ignition.
@@ -23,4 +23,40 @@ pub struct Outlook {
 /// Height that a parachute needs at a speed: the fall until it is out and the distance it inflates over.
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use crate::estimator::{ImuSample, Measurements, StartUncertainty};
+    use crate::mission::Mission;
+    use crate::pilot::{Pilot, PilotInput, Sensed};
+    use crate::rigid::RigidState;
+
+    /// Whether an abort in the very next frame releases the parachute.
+    fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {
+        let imu =
+            ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0) };
+        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
+        let input = PilotInput {
+            frame,
+            time_s: 0.005 * frame as f64,
+            sensed: Sensed::Measured(measured),
+            fins_rad: [0.0; 4],
+            contact: false,
+            igniter_continuity: true,
+            abort: true,
+        };
+        pilot.step(&input).parachute
+    }
+
+    #[test]
+    fn an_abort_in_the_first_frame_knows_how_high_it_is() {
+        let mission = Mission::builtin("mk2").unwrap().unwrap();
+        let start = RigidState::upright(300.0);
+        let pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee()).unwrap();
+        assert!(abort_releases(&mut pilot.clone(), 1));
+        assert!(abort_releases(&mut pilot.restarted(0.1), 21));
+    }
 }
