@@ -11,8 +11,8 @@ use protocol::dialect::{
 use super::vehicle::{Attitude, Deflection, Gimbal, Heartbeat, Motion, Prediction, Sample, Vehicle, Verdict};
 use crate::limits::Touchdown;
 
-/// The vehicle's clock may jump back this far by reordered datagrams; more is a reboot.
-const REORDERED_MS: u32 = 1_000;
+/// The vehicle's clock may jump back this far by a slow link beside a fast one; more is a reboot.
+const REORDERED_MS: u32 = 5_000;
 
 /// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted, in which
 /// case everything it said before is forgotten first.
