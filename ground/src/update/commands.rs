@@ -44,7 +44,9 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
         ticket,
         not_observed_said: false,
     });
-    commands.abort_again_at = None;
+    if kind == CommandKind::Abort {
+        commands.abort_again_at = None;
+    }
     model.outcome.refusal = None;
     poll(model, now);
 }

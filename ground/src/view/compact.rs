@@ -60,7 +60,8 @@ fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return top::facts_short(track, theme, now);
     }
-    let mut spans = vec![Span::styled(" ^X^X ABORT:", theme.style(Role::Key))];
+    let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
+    let mut spans = vec![Span::styled(key, theme.style(Role::Key))];
     spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
     Line::from(spans)
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
-use super::number::{age_mark, seconds};
+use super::number::{STALE_MARK, age_mark, seconds};
 use super::theme::{Role, Theme};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
@@ -182,6 +182,9 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     }
     match model.vehicle.status.as_ref() {
         None => Line::default(),
+        Some(status) if status.is_stale(now) => {
+            Line::styled(format!(" {STALE_MARK}checks: not heard any more"), theme.style(Role::Stale))
+        }
         Some(status) if status.value.checks_failed.is_empty() => {
             Line::styled(" GO: every arming check passes", theme.style(Role::Good))
         }
