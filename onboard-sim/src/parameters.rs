@@ -99,6 +99,9 @@ pub fn set(
         Some(_) if !may_change => {
             refuse(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED, "only while disarmed on the pad")
         }
+        Some(_) if !(value.is_finite() && value >= 0.0) => {
+            refuse(MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "it must be 0 (off) or a rate in Hz")
+        }
         Some(stream) => {
             // 0 Hz is off; the rest is the interval's business, with its budget.
             let interval_us = if value == 0.0 { -1.0 } else { 1e6 / value };

@@ -103,12 +103,14 @@ impl Links {
         let (now, clock) = (Duration::from_secs_f64(time_s), clock());
         let recorder = self.recorder.as_ref();
         let mut heard = Vec::new();
+        let mut commanded = false;
         for (number, OpenLink { transport, name, .. }) in self.open.iter_mut().enumerate() {
             for _ in 0..MAX_AT_ONCE {
                 let Some(received) = transport.try_receive() else { break };
                 for news in self.hub.take(number, received, now, clock) {
                     match news {
                         News::Frame(frame) => {
+                            commanded |= CommandRequest::from_frame(&frame).is_some();
                             self.intake.record(name, &frame, time_s);
                             heard.push(Heard::Frame(frame));
                         }
@@ -121,7 +123,8 @@ impl Links {
                 }
             }
         }
-        if clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
+        // Before a command is obeyed, so that a restart does not make it new.
+        if commanded || clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
             self.remembered_at = clock;
             self.remember(time_s);
         }

@@ -4,7 +4,7 @@ use flight::estimator::{Doubt, Health};
 use mavlink::MessageData as _;
 use protocol::dialect::{
     BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA,
-    HighresImuUpdatedFlags, MavMessage, MavSysStatusSensor, TD_DESCENT_DATA, TdChute,
+    HighresImuUpdatedFlags, MavBatteryFault, MavMessage, MavSysStatusSensor, TD_DESCENT_DATA, TdChute,
 };
 
 use super::boot_ms;
@@ -137,6 +137,8 @@ fn battery() -> MavMessage {
         current_consumed: -1,
         energy_consumed: -1,
         battery_remaining: -1,
+        // The generated default is the first flag.
+        fault_bitmask: MavBatteryFault::empty(),
         ..BATTERY_STATUS_DATA::default()
     })
 }

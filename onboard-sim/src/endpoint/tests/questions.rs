@@ -97,6 +97,8 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
         ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
         ("RATE_FINS", -3.0, 4.0, "must be"),
         ("RATE_FINS", f32::NAN, 4.0, "must be"),
+        ("RATE_FINS", f32::INFINITY, 4.0, "must be"),
+        ("RATE_FINS", -1e6, 4.0, "must be"),
         ("RATE_HEARTBEAT", 0.0, 1.0, "the crew lives by it"),
         ("NMPC_W_U", 51.0, 50.0, "from the profile"),
     ] {

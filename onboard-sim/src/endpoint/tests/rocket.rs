@@ -175,6 +175,7 @@ fn what_is_off_can_be_asked_for_and_what_is_not_modelled_is_unknown() {
     let MavMessage::BATTERY_STATUS(battery) = airborne.request(BATTERY_STATUS_DATA::ID) else {
         panic!("not the battery")
     };
+    assert!(battery.fault_bitmask.is_empty());
     assert_eq!((battery.voltages[0], battery.current_battery, battery.battery_remaining), (u16::MAX, -1, -1));
 }
 
