@@ -41,6 +41,7 @@ impl Anchors {
             Entry::Tick(tick) if lit(tick.input.phase) => {
                 self.ignition_s = Some(tick.input.time_s - tick.input.time_since_ignition_s);
             }
+            Entry::PilotTick(tick) if lit(tick.output.phase) => self.ignition_s = Some(tick.input.time_s),
             Entry::Telemetry(telemetry) if telemetry.phase.is_some_and(lit) => {
                 self.ignition_s = Some(telemetry.time_s);
             }

@@ -12,11 +12,12 @@ use crate::table::{Cell, Kind, TableReader, TableShape};
 const VALUES_MAX: usize = 20_000_000;
 
 /// Columns that are times or numbers of records, and those that were measured rather than decided.
-const NO_SIGNALS: [&str; 8] = [
+const NO_SIGNALS: [&str; 9] = [
     "log_time_ns",
     "time_s",
     "input.time_s",
     "input.tick",
+    "input.frame",
     "output.tick",
     "solve_time_s",
     "deadline_s",

@@ -203,8 +203,10 @@ fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
 fn summarise(recording: &Recording, settings: &[Setting], ticks: Vec<EvaluatedTick>) -> EvaluateReport {
     let difference_rad =
         |tick: &EvaluatedTick| apart_rad(&tick.recorded.gimbal_rad, &tick.evaluated.gimbal_rad);
-    let landing: Vec<&EvaluatedTick> =
-        ticks.iter().filter(|tick| !matches!(tick.phase, "SAFE" | "PAD_IDLE" | "PAD_ARMED")).collect();
+    let landing: Vec<&EvaluatedTick> = ticks
+        .iter()
+        .filter(|tick| matches!(tick.phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN"))
+        .collect();
     let squares: f64 = landing.iter().map(|tick| difference_rad(tick) * difference_rad(tick)).sum();
     let largest = ticks.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
     let count = |differs: &dyn Fn(&EvaluatedTick) -> bool| ticks.iter().filter(|tick| differs(tick)).count();

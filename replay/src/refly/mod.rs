@@ -11,7 +11,8 @@
 //! frame on the way; from there on the other settings hold, for world and flight computer alike.
 //!
 //! Settings change the controller and the plant alike, those "of the plant" the plant alone, timed ones the
-//! controller alone. Abort under thrust is flown if the record had it at the start. There is wind in a flight from apogee
+//! controller alone. Abort under thrust is flown if the record had it at the start; of a flight
+//! from apogee, a crew's abort comes at its recorded frame. There is wind in a flight from apogee
 //! only (`truth.wind_m_s`): the planar plant has none.
 
 mod apogee;

@@ -147,18 +147,6 @@ fn in_plane(plane: &Plane, state: &RigidState, height_m: f64) -> PlanarState {
     PlanarState { z_m: height_m, ..plane.project(state, 0.0, 0.0) }
 }
 
-/// A state of a plan over the ground: the plan's frame moves with the air along the plane, from where it began `since_s`
-/// before.
-fn over_ground(planned: &PlanarState, wind_m_s: f64, since_s: f64) -> PlanarState {
-    let (sin, cos) = libm::sincos(planned.theta_rad);
-    PlanarState {
-        x_m: planned.x_m + wind_m_s * since_s,
-        u_m_s: planned.u_m_s + wind_m_s * cos,
-        w_m_s: planned.w_m_s + wind_m_s * sin,
-        ..*planned
-    }
-}
-
 impl Thought {
     /// The wind along the plane that a plan of this frame was made in, m/s.
     fn wind_m_s(&self, plane: &Plane) -> f64 {
@@ -217,7 +205,7 @@ fn tick(thought: &Thought, world: &[flight_v1::TruthSample], plane: &Plane) -> v
         tick.output.solver.iterations = u32::try_from(report.iterations).unwrap_or(u32::MAX);
         tick.output.solver.cost = report.cost;
         tick.output.predicted_touchdown.time_from_now_s = report.touchdown_in_s;
-        let touchdown = over_ground(&report.touchdown, thought.wind_m_s(plane), report.touchdown_in_s);
+        let touchdown = Plane::over_ground(&report.touchdown, thought.wind_m_s(plane), report.touchdown_in_s);
         tick.output.predicted_touchdown.state = state_to_log(&touchdown);
     } else {
         tick.output.level = u32::from(ControlLevel::Idle.index());
@@ -233,7 +221,7 @@ fn plans(thoughts: &[Thought], plane: &Plane) -> Vec<PlanSample> {
         let wind_m_s = thought.wind_m_s(plane);
         let nodes = states.iter().enumerate();
         let states: Vec<[f64; 6]> = nodes
-            .map(|(node, state)| over_ground(state, wind_m_s, node as f64 * step_s).to_array())
+            .map(|(node, state)| Plane::over_ground(state, wind_m_s, node as f64 * step_s).to_array())
             .collect();
         let drawn = place.is_multiple_of(stride);
         Some(PlanSample {

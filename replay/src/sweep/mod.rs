@@ -22,7 +22,7 @@ use crate::refly::ReflyError;
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// A flight cannot be flown again with some choice.
-    #[error("{settings}: {source}")]
+    #[error("{settings}")]
     Refly {
         /// The choice.
         settings: String,

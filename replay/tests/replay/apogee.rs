@@ -392,3 +392,12 @@ proptest! {
         }
     }
 }
+
+/// The C library picks its mathematical kernels by processor; the pilot must not notice.
+#[test]
+fn its_frames_are_identical_on_a_processor_without_fused_multiply_add() {
+    let mut command = replay("verify", &LANDED.log);
+    let (code, stdout, _) = run(command.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4"));
+    assert_eq!(code, 0, "{stdout}");
+    assert!(stdout.contains("identical"), "{stdout}");
+}

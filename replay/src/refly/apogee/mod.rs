@@ -77,8 +77,8 @@ impl<'a> AtStart<'a> {
         }
         let recorded = match &recording.verdict {
             Some(verdict) => Some(VerdictFacts::of(verdict)),
-            // An older log: what the flight comes to as it was, if it is still the same flight.
-            None if reached.first_different.is_none() => {
+            // An older log of a whole flight: what it comes to as it was, if it is still the same flight.
+            None if reached.first_different.is_none() && frames.last().is_some_and(is_down) => {
                 let mut as_it_was = rerun.clone();
                 while as_it_was.step()? {}
                 from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
@@ -273,4 +273,9 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
 /// The settings without a time.
 fn lasting(options: &ReflyOptions) -> Vec<Setting> {
     options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect()
+}
+
+/// Whether a frame's flight computer has noticed that it is on the ground.
+fn is_down(tick: &flight_v1::PilotTick) -> bool {
+    [Phase::Touchdown, Phase::Safed].into_iter().any(|phase| u32::from(phase.index()) == tick.output.phase)
 }

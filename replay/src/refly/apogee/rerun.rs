@@ -3,7 +3,7 @@
 use campaign::baseline::Baseline;
 use campaign::dispersion::Dispersion;
 use campaign::draw::draw;
-use campaign::fault::{FaultError, Injector, TimedFault};
+use campaign::fault::{Breakage, FaultError, Injector, TimedFault};
 use campaign::fly::Flight;
 use flight::mission::Mission;
 use onboard_sim::from_apogee;
@@ -20,6 +20,8 @@ pub(super) struct Rerun {
     pub(super) flight: Flight,
     injector: Injector,
     pub(super) schedule: Option<Schedule<Mission>>,
+    /// The frames in which the crew aborted.
+    aborts: Vec<u64>,
 }
 
 /// What a flight was drawn from, and the flight at apogee.
@@ -35,7 +37,7 @@ impl Recipe {
     /// # Errors
     /// The log does not say all of it, or this build does not know it.
     pub(super) fn of(recording: &Recording) -> Result<Self, ReflyError> {
-        let (pilot_start, _) = recording.replayable_frames()?;
+        let (pilot_start, frames) = recording.replayable_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
         let run = &recording.head.run;
         if let Some(original) = run.get("reflown_from") {
@@ -59,7 +61,11 @@ impl Recipe {
         let drawn = draw(&mission, &dispersion, seed, number);
         let flight =
             Flight::new(&mission, &dispersion, &drawn)?.with_baseline(Baseline::new(controller, &mission)?);
-        let rerun = Rerun { flight, injector: Injector::new(&faults), schedule: None };
+        // An abort that no fault asked for was the crew's.
+        let by_fault = faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
+        let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);
+        let aborts = crews.map(|tick| tick.input.frame).collect();
+        let rerun = Rerun { flight, injector: Injector::new(&faults), schedule: None, aborts };
         Ok(Self { dispersion, number, rerun })
     }
 }
@@ -73,6 +79,9 @@ impl Rerun {
             self.flight.reconfigure(mission)?;
         }
         self.injector.step(&mut self.flight);
+        if self.aborts.binary_search(&(self.flight.frame() + 1)).is_ok() {
+            self.flight.abort();
+        }
         Ok(self.flight.step())
     }
 }
