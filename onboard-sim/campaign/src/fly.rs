@@ -7,7 +7,6 @@ use std::time::Duration;
 pub use self::errors::EstimatorErrors;
 use flight::estimator::{Measurements, StartUncertainty};
 use flight::mission::{Mission, MissionError};
-use flight::phase::Phase;
 use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
 use flight::rigid::RigidState;
 use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
@@ -291,9 +290,4 @@ impl Flight {
         while self.step() {}
         self.outcome()
     }
-}
-
-/// Whether a phase is past the landing motor's light.
-pub fn burning(phase: Phase) -> bool {
-    matches!(phase, Phase::Powered)
 }

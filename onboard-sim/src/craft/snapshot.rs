@@ -172,14 +172,14 @@ pub struct Path {
 }
 
 impl Path {
-    /// Evenly spread over a plan's states, both ends kept; `None` of an empty plan.
-    pub fn through(states: &[PlanarState]) -> Option<Self> {
-        let last = states.len().checked_sub(1)?;
-        let count = states.len().min(PATH_POINTS);
+    /// Evenly spread over a plan's nodes, both ends kept; `None` of an empty plan. `place` says where a node is, m: along
+    /// the plane and up.
+    pub fn through(nodes: usize, place: impl Fn(usize) -> (f64, f64)) -> Option<Self> {
+        let last = nodes.checked_sub(1)?;
+        let count = nodes.min(PATH_POINTS);
         let mut points_m = [(0.0, 0.0); PATH_POINTS];
-        for (point, place) in points_m.iter_mut().enumerate().take(count) {
-            let state = &states[last * point / (count - 1).max(1)];
-            *place = (state.x_m, state.z_m);
+        for (point, point_m) in points_m.iter_mut().enumerate().take(count) {
+            *point_m = place(last * point / (count - 1).max(1));
         }
         Some(Self { points_m, count })
     }

@@ -6,7 +6,6 @@ use campaign::sortie::Sortie;
 use flight::controller::ControlLevel;
 use flight::phase::{Effect, Event, Mode, Phase};
 use flight::pilot::{FRAMES_PER_PLAN, Sensed};
-use flight::powered::PoweredReport;
 use world::RestOutcome;
 
 use super::{Air, FRAME_S, Rocket};
@@ -28,8 +27,6 @@ impl Air {
             level: ControlLevel::Idle,
             gate_refusal: None,
             touched: false,
-            report: PoweredReport::idle(),
-            reported_at_s: released_at_s,
             took_s: 0.0,
             judged: None,
             given_up: false,
@@ -66,10 +63,6 @@ impl Rocket {
                 air.took_s = took_s;
                 self.events.push(VehicleEvent::Planned { took_s, deadline_s: FRAME_S });
             }
-        }
-        if air.report != *pilot.report() {
-            air.report = *pilot.report();
-            air.reported_at_s = time_s;
         }
         self.tell(&before);
         self.watch_the_ground(time_s);

@@ -24,7 +24,6 @@ use campaign::sortie::Sortie;
 use flight::airframe::MassModel;
 use flight::controller::ControlLevel;
 use flight::phase::Mode;
-use flight::powered::PoweredReport;
 use flight::thrust_curve::ThrustCurve;
 use world::STEP_S;
 use world::sensors::FRAME_MS;
@@ -76,8 +75,6 @@ struct Air {
     level: ControlLevel,
     gate_refusal: Option<&'static str>,
     touched: bool,
-    report: PoweredReport,
-    reported_at_s: f64,
     took_s: f64,
     /// By what the legs take, and by Table 2.
     judged: Option<(Judged, Judged)>,

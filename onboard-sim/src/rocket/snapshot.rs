@@ -6,9 +6,9 @@ use flight::dynamics::PlanarState;
 use flight::estimator::Estimate;
 use flight::phase::Phase;
 use flight::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::powered::PoweredReport;
+use flight::powered::{Plane, PoweredReport};
 use flight::verdict::LandingVerdict;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 
 use super::{Air, FRAME_S, Rocket};
 use crate::craft::{
@@ -16,8 +16,10 @@ use crate::craft::{
     bits, violations,
 };
 
-/// Under a parachute that carries the fall is slower than this, m/s: canopies are sized for 6, an open fall is 20 to 40.
+/// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
+/// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.
 const CARRIED_M_S: f64 = 10.0;
+const CARRIED_WEIGHTS: f64 = 0.5;
 
 impl Rocket {
     pub(super) fn state_now(&self) -> Snapshot {
@@ -93,9 +95,9 @@ impl Rocket {
             gimbal_rad: core::array::from_fn(|axis| (output.gimbal_rad[axis], gimbal_rad[axis])),
             fins_rad: (output.fins_rad, fins_rad),
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
-            controller: Some(facts(flight.frame() / FRAMES_PER_PLAN, output.level, &air.report)),
-            prediction: planned.and_then(|_| self.prediction(air, pilot, estimate, standing.time_s)),
-            path: planned.and_then(|(states, _)| path_from_the_east(pilot, estimate, states)),
+            controller: Some(facts(flight.frame() / FRAMES_PER_PLAN, output.level, pilot.report())),
+            prediction: planned.and_then(|planned| self.prediction(pilot, estimate, planned, flight_s)),
+            path: planned.and_then(|planned| path_from_the_east(pilot, estimate, planned)),
             solve_time_s: air.took_s,
             thrust_scale: motor.impulse_scale(),
             descent: Some(self.descent(pilot, estimate, feet_m)),
@@ -118,6 +120,8 @@ impl Rocket {
         let deciding = self.mode.phase.in_descent();
         // Also on the ground, after a descent under it.
         let fired = self.air.as_ref().is_some_and(|air| air.sortie.flight().world().parachute_ejected());
+        let weights_felt = estimate.specific_force_m_s2.norm() / self.flight.order.mission.gravity_m_s2;
+        let carried = velocity.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS;
         DescentFacts {
             height_m,
             vertical_m_s: velocity.z,
@@ -131,7 +135,7 @@ impl Rocket {
             thrust_scale: motor.impulse_scale(),
             touchdown_m: [place.x + velocity.x * to_ground_s, -(place.y + velocity.y * to_ground_s)],
             chute: match self.mode.phase {
-                Phase::Chute if velocity.z.abs() < CARRIED_M_S => Chute::Open,
+                Phase::Chute if carried => Chute::Open,
                 Phase::Chute => Chute::Fired,
                 _ if fired => Chute::Open,
                 _ => Chute::Stowed,
@@ -140,38 +144,47 @@ impl Rocket {
     }
 
     /// The plan's end over the ground; the plan itself moves with the wind.
-    fn prediction(&self, air: &Air, pilot: &Pilot, estimate: &Estimate, time_s: f64) -> Option<Prediction> {
-        let plane = pilot.powered().plane()?;
-        let wind: Vector3<f64> = estimate.wind_m_s.push(0.0);
-        let mut state = over_ground(&air.report.touchdown, wind.dot(&plane.along));
+    fn prediction(
+        &self,
+        pilot: &Pilot,
+        estimate: &Estimate,
+        (states, step_s): (&[PlanarState], f64),
+        flight_s: f64,
+    ) -> Option<Prediction> {
+        let guidance = pilot.powered();
+        let whole_s = states.len().saturating_sub(1) as f64 * step_s;
+        let mut state = Plane::over_ground(states.last()?, along_m_s(estimate, guidance.plane()?), whole_s);
         // A plan that misses its end by no more than this counts as a landing: it ends on the ground.
         if state.z_m.abs() <= self.flight.order.mission.powered.landing_miss {
             state.z_m = 0.0;
         }
         Some(Prediction {
-            time_to_go_s: air.report.touchdown_in_s - (time_s - air.reported_at_s),
+            time_to_go_s: guidance.left_s(flight_s)?,
             state,
             violations: violations(&LandingVerdict::judge_plan(&self.limits.legs, &state)),
         })
     }
 }
 
-/// The plan's path as it looks from the east, where the path that is flown is seen from too: its plane stands as it
-/// happens to.
-fn path_from_the_east(pilot: &Pilot, estimate: &Estimate, states: &[PlanarState]) -> Option<Path> {
-    let plane = pilot.powered().plane()?;
-    let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
-    let mut path = Path::through(states)?;
-    for (north_m, _) in &mut path.points_m {
-        *north_m = *north_m * plane.along.x + beside_north_m;
-    }
-    Some(path)
+/// The wind along the plane, m/s.
+fn along_m_s(estimate: &Estimate, plane: &Plane) -> f64 {
+    estimate.wind_m_s.push(0.0).dot(&plane.along)
 }
 
-/// A planar state whose velocities are through air that moves with `wind_m_s`, with velocities over the ground.
-fn over_ground(state: &PlanarState, wind_m_s: f64) -> PlanarState {
-    let (sin, cos) = libm::sincos(state.theta_rad);
-    PlanarState { u_m_s: state.u_m_s + wind_m_s * cos, w_m_s: state.w_m_s + wind_m_s * sin, ..*state }
+/// The plan's path over the ground as it looks from the east, where the path that is flown is seen from too: its plane
+/// stands as it happens to.
+fn path_from_the_east(
+    pilot: &Pilot,
+    estimate: &Estimate,
+    (states, step_s): (&[PlanarState], f64),
+) -> Option<Path> {
+    let plane = pilot.powered().plane()?;
+    let wind_m_s = along_m_s(estimate, plane);
+    let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
+    Path::through(states.len(), |node| {
+        let state = Plane::over_ground(&states[node], wind_m_s, node as f64 * step_s);
+        (state.x_m * plane.along.x + beside_north_m, state.z_m)
+    })
 }
 
 fn facts(tick: u64, level: ControlLevel, report: &PoweredReport) -> ControllerFacts {

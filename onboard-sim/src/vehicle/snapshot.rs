@@ -49,7 +49,10 @@ impl Vehicle {
                     &output.predicted_touchdown.state,
                 )),
             }),
-            path: output.and_then(|output| Path::through(output.plan.used_states())),
+            path: output.and_then(|output| {
+                let states = output.plan.used_states();
+                Path::through(states.len(), |node| (states[node].x_m, states[node].z_m))
+            }),
             solve_time_s: self.solve_time_s,
             deadline_s: self.profile.nmpc.sample_time_s,
             thrust_scale: self.thrust.scale(),

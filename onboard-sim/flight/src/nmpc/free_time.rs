@@ -299,7 +299,7 @@ impl<M: Motor> Search<'_, M> {
 }
 
 /// Fills in what the final time decides.
-fn pose(problem: &FreeTimeProblem, motor: &impl Motor, final_time_s: f64, posed: &mut Problem) {
+pub(crate) fn pose(problem: &FreeTimeProblem, motor: &impl Motor, final_time_s: f64, posed: &mut Problem) {
     let step_s = final_time_s / problem.intervals as f64;
     let between = |k: usize| (k as f64 * step_s, (k + 1) as f64 * step_s);
     posed.step_s = step_s;

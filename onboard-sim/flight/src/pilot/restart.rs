@@ -34,6 +34,7 @@ impl Pilot {
             powered: PoweredGuidance::new(mission.powered),
             aim_loop: AimLoop::new(mission.aim, mission.estimator.frame_s),
             gate_refusal: None,
+            gate_shut_since_s: None,
             ..self.clone()
         }
     }

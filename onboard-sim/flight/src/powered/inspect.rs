@@ -4,7 +4,7 @@ use super::situation::Ahead;
 use super::{Plane, PoweredGuidance, PoweredSettings, PoweredSituation, UPRIGHT_DEARER, largest_tilt_rad};
 use crate::dynamics::PlanarState;
 use crate::nmpc::Problem;
-use crate::nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, Motor as _, solve_free_time};
+use crate::nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, pose, solve_free_time};
 use crate::rigid::RigidState;
 
 /// A landing, planned again alone.
@@ -24,8 +24,8 @@ impl PoweredGuidance {
         self.plane.as_ref()
     }
 
-    /// The planned planar states, one step apart, s, if there is a plan: positions over the ground, velocities through
-    /// the air.
+    /// The planned planar states, one step apart, s, if there is a plan, in the frame of the air that moves along the
+    /// plane; [`Plane::over_ground`] takes them out of it.
     pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
         let flown = self.flown.as_ref()?;
         Some((&flown.plan.solution.states, flown.plan.solution.step_s))
@@ -68,13 +68,7 @@ impl PoweredGuidance {
 
 /// The problem of one final time.
 fn at_final_time(posed: &FreeTimeProblem, ahead: &Ahead<'_, '_>, final_time_s: f64) -> Problem {
-    let step_s = final_time_s / posed.intervals as f64;
-    let bounds = |k: usize| (k as f64 * step_s, (k + 1) as f64 * step_s);
     let mut problem = posed.landing.clone();
-    problem.step_s = step_s;
-    problem.thrust_n =
-        (0..posed.intervals).map(bounds).map(|(from_s, to_s)| ahead.mean_thrust_n(from_s, to_s)).collect();
-    problem.mass_kg =
-        (0..posed.intervals).map(bounds).map(|(from_s, to_s)| ahead.mean_mass_kg(from_s, to_s)).collect();
+    pose(posed, ahead, final_time_s, &mut problem);
     problem
 }

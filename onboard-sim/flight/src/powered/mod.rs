@@ -87,6 +87,11 @@ impl PoweredGuidance {
         &self.report
     }
 
+    /// Time left until the plan that is flown ends, s.
+    pub fn left_s(&self, time_s: f64) -> Option<f64> {
+        self.flown.as_ref().map(|flown| flown.left_s(time_s))
+    }
+
     /// Plans the landing from a state at a time.
     pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
         let plane = *self.plane.get_or_insert_with(|| {

@@ -1,6 +1,6 @@
 //! The vertical plane a landing is planned in.
 
-use core::f64::consts::FRAC_PI_2;
+use core::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Vector3;
 
@@ -13,6 +13,12 @@ const CHOOSING_SPEED_M_S: f64 = 1.0;
 /// Velocity that being off the pad is worth when the plane is chosen, 1/s: what the least-effort way back from rest in
 /// four seconds asks for, `6 p / t^2` beside `4 v / t`.
 const HOMING_PER_S: f64 = 0.375;
+
+/// An elevation that passes the horizontal on either side without a jump: that lies straight below.
+fn elevation_rad(up: f64, along: f64) -> f64 {
+    let elevation_rad = libm::atan2(up, along);
+    if elevation_rad < -FRAC_PI_2 { elevation_rad + TAU } else { elevation_rad }
+}
 
 /// A vertical plane through the pad's axis, and what lies across it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +49,7 @@ impl Plane {
     /// The nose's component across the plane is left out: elevation and rate are those of its projection.
     pub fn project(&self, state: &RigidState, feet_below_cg_m: f64, wind_m_s: f64) -> PlanarState {
         let nose = state.nose_in_world();
-        let theta_rad = libm::atan2(nose.z, nose.dot(&self.along));
+        let theta_rad = elevation_rad(nose.z, nose.dot(&self.along));
         let (sin, cos) = libm::sincos(theta_rad);
         let along_m_s = state.velocity_m_s.dot(&self.along) - wind_m_s;
         let up_m_s = state.velocity_m_s.z;
@@ -71,6 +77,17 @@ impl Plane {
         self.across * -elevation_rate
     }
 
+    /// A planned state over the ground, `since_s` after its plan began, in air that moves with `wind_m_s` along the plane.
+    pub fn over_ground(planned: &PlanarState, wind_m_s: f64, since_s: f64) -> PlanarState {
+        let (sin, cos) = libm::sincos(planned.theta_rad);
+        PlanarState {
+            x_m: planned.x_m + wind_m_s * since_s,
+            u_m_s: planned.u_m_s + wind_m_s * cos,
+            w_m_s: planned.w_m_s + wind_m_s * sin,
+            ..*planned
+        }
+    }
+
     /// What stands still on the ground, upright, in the frame of air that moves with `wind_m_s` along the plane.
     pub fn rest(wind_m_s: f64) -> PlanarState {
         PlanarState { theta_rad: FRAC_PI_2, w_m_s: -wind_m_s, ..PlanarState::default() }
@@ -94,6 +111,27 @@ mod tests {
         assert!((nose - RigidState::from(planar).nose_in_world()).norm() < 1e-12);
         let turning = RigidState::from(planar).world_from_body * Vector3::new(0.0, 0.3, 0.0);
         assert!((plane.turning(0.3) - turning).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_pitch_passes_the_horizontal_backwards_without_a_jump() {
+        let plane = Plane::choose(&Vector3::zeros(), &Vector3::zeros(), &Vector3::zeros());
+        for theta_rad in [-1.5, 0.1, 3.1, 3.2, 4.7] {
+            let planar = PlanarState { theta_rad, ..PlanarState::default() };
+            let found = plane.project(&RigidState::from(planar), 0.0, 0.0);
+            assert!((found.theta_rad - theta_rad).abs() < 1e-12, "{} for {theta_rad}", found.theta_rad);
+        }
+    }
+
+    #[test]
+    fn what_is_planned_at_rest_on_the_ground_is_at_rest_over_it() {
+        let wind_m_s = 4.0;
+        let planned = PlanarState { x_m: -12.0, ..Plane::rest(wind_m_s) };
+        let found = Plane::over_ground(&planned, wind_m_s, 3.0);
+        let expected = PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() };
+        for (found, expected) in found.to_array().iter().zip(expected.to_array()) {
+            assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
+        }
     }
 
     #[test]
