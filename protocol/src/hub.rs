@@ -111,9 +111,6 @@ impl HubLink {
         if bytes > 0 {
             self.stats.on_rx_bytes(bytes, now);
         }
-        for frame in &frames {
-            self.stats.on_frame(frame, now);
-        }
         Taken::Frames(frames)
     }
 }
@@ -165,6 +162,8 @@ impl Hub {
         {
             return News::Rejected(frame, rejection);
         }
+        // What is not believed is no sign of life either.
+        self.links[link].stats.on_frame(&frame, now);
         // Judged first: a forged frame must not make the true one a copy.
         if self.duplicates.is_copy(&frame, link, now) {
             self.links[link].copies += 1;
