@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::log::record::Record;
+use protocol::log::record::{EventLevel, Record};
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
@@ -18,6 +18,8 @@ use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_aske
 use crate::attach::place;
 use crate::config::Config;
 use crate::exit::{self, Exit};
+use crate::model::command::CommandKind;
+use crate::model::events::Speaker;
 use crate::model::{Model, Role, Settings};
 use crate::update::{Action, Msg, update};
 
@@ -54,6 +56,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
+    // An abort that no station took.
+    let mut abort_unsent = false;
     loop {
         let (redraw_at, chord_at) = (screen.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -87,7 +91,10 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             },
             () = clock.sleep_until(look_again_at) => {
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
-                if let Ok(found) = Link::open(path, watch).await {
+                if let Ok(mut found) = Link::open(path, watch).await {
+                    if abort_unsent {
+                        abort_unsent = !found.ask(&Asked::Command(CommandKind::Abort)).await;
+                    }
                     link = found;
                     let pages = model.pages;
                     model = Model::new(settings(&Hello::default(), watch));
@@ -103,7 +110,12 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
         let mut quit = false;
         for action in actions {
             match action {
-                Action::Request(asked) => link.ask(&asked).await,
+                Action::Request(asked) => {
+                    if !link.ask(&asked).await {
+                        abort_unsent |= asked == Asked::Command(CommandKind::Abort);
+                        unsent(&mut model, &asked, times.theirs(clock.now()));
+                    }
+                }
                 Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
                     link.ask(&Asked::Key(action.detail)).await;
                 }
@@ -121,6 +133,22 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     }
     drop(screen);
     Ok(exit::decide(&model.outcome, true))
+}
+
+/// Says what the crew asked for and no station took.
+fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
+    let text = match asked {
+        Asked::Command(CommandKind::Abort) => {
+            "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
+        }
+        Asked::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),
+        Asked::Acknowledge => {
+            model.alarms.acknowledge();
+            return;
+        }
+        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) => return,
+    };
+    model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 
 fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Result<()> {
@@ -212,8 +240,8 @@ impl Link {
         Ok(link)
     }
 
-    /// A station that is gone shows by its silence.
-    async fn ask(&mut self, asked: &Asked) {
-        let _ = self.write.write_all(&encode_asked(asked)).await;
+    /// Whether the station took it; one that is gone takes nothing.
+    async fn ask(&mut self, asked: &Asked) -> bool {
+        self.write.write_all(&encode_asked(asked)).await.is_ok()
     }
 }
