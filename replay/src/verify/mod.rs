@@ -70,6 +70,9 @@ pub fn verify_log<R: Read>(
     let mut verifier = None;
     let mut pilot = None;
     let mut found = Found::default();
+    // Number of the last frame, and of its record: a computer that was restarted leaves out frames, a log that has lost
+    // some leaves out records.
+    let mut last: Option<(u64, u32)> = None;
     while let Some(stamped) = log.next_entry()? {
         match stamped.entry {
             Entry::Tick(tick) => {
@@ -102,10 +105,14 @@ pub fn verify_log<R: Read>(
             },
             Entry::PilotTick(tick) => {
                 found.ticks += 1;
+                let (before, record) = (tick.input.frame, stamped.sequence);
+                let lost = last.filter(|(_, earlier)| record > earlier.saturating_add(1));
+                last = Some((before, record));
                 if found.obstacle.is_none() {
-                    found.obstacle = match &mut pilot {
-                        Some(pilot) => pilot.check(&tick).err().map(Obstacle::Frame),
-                        None => Some(Obstacle::NoStart),
+                    found.obstacle = match (lost, &mut pilot) {
+                        (Some((after, _)), _) => Some(Obstacle::Gap { after, before }),
+                        (None, Some(pilot)) => pilot.check(&tick).err().map(Obstacle::Frame),
+                        (None, None) => Some(Obstacle::NoStart),
                     };
                 }
             }
