@@ -21,7 +21,7 @@ use protocol::signing::Rejection;
 use protocol::text;
 
 use crate::commands::{self, Command};
-use crate::craft::{Craft, Severity, Snapshot, VehicleEvent};
+use crate::craft::{Craft, Severity, VehicleEvent};
 use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
 
@@ -165,8 +165,10 @@ impl VehicleEndpoint {
     }
 
     /// What is to be sent now.
-    pub fn poll(&mut self, vehicle: &dyn Craft, snapshot: &Snapshot) -> Vec<Frame> {
-        let now_s = snapshot.time_s;
+    pub fn poll(&mut self, vehicle: &dyn Craft) -> Vec<Frame> {
+        let now_s = vehicle.time_s();
+        // In most frames nothing is due, and the state is not put together for nothing.
+        let mut snapshot = None;
         let earned = f64::from(RADIO_BUDGET_BYTES_S) * (now_s - self.last_poll_s).max(0.0);
         self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
         self.last_poll_s = now_s;
@@ -177,6 +179,7 @@ impl VehicleEndpoint {
             if self.credit_bytes < pending as f64 && message_id != HEARTBEAT_DATA::ID {
                 continue;
             }
+            let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
             if let Some(message) = telemetry::message(message_id, snapshot) {
                 frames.push(self.encoder.encode(&message));
             }

@@ -1,6 +1,6 @@
 //! What is sent unasked, and how often.
 
-use mavlink::MessageData as _;
+use mavlink::MessageData;
 use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA,
     ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
@@ -33,66 +33,63 @@ pub struct Standard {
     pub rate_hz: f64,
 }
 
-const fn standard(parameter: &'static str, message_id: u32, payload_len: usize, rate_hz: f64) -> Standard {
-    Standard { message_id, parameter, payload_len, rate_hz }
+const fn standard<M: MessageData>(parameter: &'static str, rate_hz: f64) -> Standard {
+    Standard { message_id: M::ID, parameter, payload_len: M::ENCODED_LEN, rate_hz }
+}
+
+impl Standard {
+    /// As long as it is without what is never set and therefore cut.
+    const fn cut_to(self, payload_len: usize) -> Self {
+        Self { payload_len, ..self }
+    }
 }
 
 /// What the planar vehicle sends unasked. In the order in which it is given up when the budget runs short: last first.
 pub const STANDARD: [Standard; 16] = [
-    standard("RATE_HEARTBEAT", HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_FLIGHT_STAT", TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
-    standard("RATE_VERDICT", TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
-    // Without its optional offset quaternion, which is never set and therefore cut.
-    standard("RATE_ATTITUDE", ATTITUDE_QUATERNION_DATA::ID, 32, 10.0),
-    standard("RATE_POSITION", LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 10.0),
-    standard("RATE_GIMBAL", TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 10.0),
-    standard("RATE_CONTROLLER", TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 5.0),
-    standard("RATE_FINS", TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 2.0),
-    standard(
-        "RATE_PREDICTION",
-        TD_TOUCHDOWN_PREDICTION_DATA::ID,
-        TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN,
-        2.0,
-    ),
-    standard("RATE_PATH", TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_SYS_STATUS", SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_EXT_STATE", EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_VFR_HUD", VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_LIMITS", TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+    standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
+    standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
+    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 1.0),
+    // Without its optional offset quaternion.
+    standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 10.0).cut_to(32),
+    standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 10.0),
+    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 10.0),
+    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 5.0),
+    standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
+    standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
+    standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
+    standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
+    standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
+    standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
+    standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
     // For other people's clients, off until asked for: what they say is in the messages above already.
-    standard("RATE_ACTUATORS", ACTUATOR_OUTPUT_STATUS_DATA::ID, ACTUATOR_PAYLOAD_LEN, 0.0),
-    standard("RATE_MODE", CURRENT_MODE_DATA::ID, CURRENT_MODE_DATA::ENCODED_LEN, 0.0),
+    standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
+    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
 ];
 
 /// What the rocket from apogee sends unasked, in the same order.
 pub const FROM_APOGEE: [Standard; 20] = [
-    standard("RATE_HEARTBEAT", HEARTBEAT_DATA::ID, HEARTBEAT_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_FLIGHT_STAT", TD_FLIGHT_STATUS_DATA::ID, TD_FLIGHT_STATUS_DATA::ENCODED_LEN, 5.0),
-    standard("RATE_VERDICT", TD_LANDING_VERDICT_DATA::ID, TD_LANDING_VERDICT_DATA::ENCODED_LEN, 1.0),
-    // Without its optional offset quaternion, which is never set and therefore cut.
-    standard("RATE_ATTITUDE", ATTITUDE_QUATERNION_DATA::ID, 32, 8.0),
-    standard("RATE_POSITION", LOCAL_POSITION_NED_DATA::ID, LOCAL_POSITION_NED_DATA::ENCODED_LEN, 8.0),
-    standard("RATE_DESCENT", TD_DESCENT_DATA::ID, TD_DESCENT_DATA::ENCODED_LEN, 4.0),
-    standard("RATE_GIMBAL", TD_GIMBAL_DATA::ID, TD_GIMBAL_DATA::ENCODED_LEN, 8.0),
-    standard("RATE_CONTROLLER", TD_CONTROLLER_DATA::ID, TD_CONTROLLER_DATA::ENCODED_LEN, 4.0),
-    standard("RATE_FINS", TD_FINS_DATA::ID, TD_FINS_DATA::ENCODED_LEN, 4.0),
-    standard(
-        "RATE_PREDICTION",
-        TD_TOUCHDOWN_PREDICTION_DATA::ID,
-        TD_TOUCHDOWN_PREDICTION_DATA::ENCODED_LEN,
-        2.0,
-    ),
-    standard("RATE_PATH", TD_PREDICTED_PATH_DATA::ID, TD_PREDICTED_PATH_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_SYS_STATUS", SYS_STATUS_DATA::ID, SYS_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_EXT_STATE", EXTENDED_SYS_STATE_DATA::ID, EXTENDED_SYS_STATE_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_ESTIMATOR", ESTIMATOR_STATUS_DATA::ID, ESTIMATOR_STATUS_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_VFR_HUD", VFR_HUD_DATA::ID, VFR_HUD_DATA::ENCODED_LEN, 1.0),
-    standard("RATE_LIMITS", TD_TOUCHDOWN_LIMITS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ENCODED_LEN, 0.2),
+    standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
+    standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
+    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 1.0),
+    // Without its optional offset quaternion.
+    standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
+    standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
+    standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0),
+    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 8.0),
+    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 4.0),
+    standard::<TD_FINS_DATA>("RATE_FINS", 4.0),
+    standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
+    standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
+    standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
+    standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
+    standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 1.0),
+    standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
+    standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
     // Off until asked for.
-    standard("RATE_IMU", HIGHRES_IMU_DATA::ID, HIGHRES_IMU_DATA::ENCODED_LEN, 0.0),
-    standard("RATE_BATTERY", BATTERY_STATUS_DATA::ID, BATTERY_STATUS_DATA::ENCODED_LEN, 0.0),
-    standard("RATE_ACTUATORS", ACTUATOR_OUTPUT_STATUS_DATA::ID, ACTUATOR_PAYLOAD_LEN, 0.0),
-    standard("RATE_MODE", CURRENT_MODE_DATA::ID, CURRENT_MODE_DATA::ENCODED_LEN, 0.0),
+    standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
+    standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0),
+    standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
+    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
 ];
 
 #[derive(Debug, Clone, Copy)]

@@ -26,7 +26,7 @@ pub use snapshot::{
     Prediction, SensorFacts, Snapshot,
 };
 pub(crate) use snapshot::{bits, violations};
-pub(crate) use words::{DEGRADED, Readiness, self_test_failed, words_of};
+pub(crate) use words::{DEGRADED, LOG_STOPPED, Readiness, self_test_failed, words_of};
 
 use crate::streams::Standard;
 
@@ -89,8 +89,16 @@ pub trait Craft {
         self.happen(Event::PinPulled);
     }
 
+    /// What it was told of its log.
+    fn log_state(&mut self) -> &mut LogState;
+
     /// Tells the craft how its log fares; a log that stops is announced.
-    fn set_log_state(&mut self, log: LogState);
+    fn set_log_state(&mut self, log: LogState) {
+        let before = core::mem::replace(self.log_state(), log);
+        if before.running && !log.running {
+            self.say(Severity::Error, LOG_STOPPED.to_owned());
+        }
+    }
 
     /// Puts an event to the phase table and does what follows from it; returns the refusal, if any.
     fn happen(&mut self, event: Event) -> Option<Refusal>;

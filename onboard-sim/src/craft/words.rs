@@ -5,6 +5,9 @@ use flight::phase::Effect;
 
 use super::Severity;
 
+/// A log that stops in flight, in words.
+pub(crate) const LOG_STOPPED: &str = "the log has stopped: this flight is no longer recorded whole";
+
 /// The words for an effect; `None` where the change of phase says it.
 pub(crate) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, String)> {
     let (severity, words) = match effect {

@@ -39,7 +39,7 @@ impl Bench {
             for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            sent.extend(self.endpoint.poll(&self.vehicle, &self.vehicle.snapshot()));
+            sent.extend(self.endpoint.poll(&self.vehicle));
         }
         sent
     }

@@ -255,11 +255,10 @@ pub async fn fly_observed(
                 _ => {}
             }
         }
-        let snapshot = craft.snapshot();
         if let Some(recorder) = &options.recorder {
             record(recorder, craft, &events);
         }
-        let leaving = endpoint.poll(craft, &snapshot);
+        let leaving = endpoint.poll(craft);
         for frame in sent.pass(leaving, time_s, craft.radio()) {
             links.send(&frame, time_s);
         }

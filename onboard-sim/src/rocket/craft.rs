@@ -14,7 +14,6 @@ use crate::craft::{
     Craft, Judged, LogState, Radio, Severity, Snapshot, TestStep, VehicleEvent, self_test_failed, words_of,
 };
 use crate::streams::{FROM_APOGEE, Standard};
-use crate::vehicle::LOG_STOPPED;
 use crate::{from_apogee, pilot_log};
 
 impl Craft for Rocket {
@@ -78,11 +77,8 @@ impl Craft for Rocket {
         self.flight.order.mission.start.countdown_s
     }
 
-    fn set_log_state(&mut self, log: LogState) {
-        if self.log.running && !log.running {
-            self.say(Severity::Error, LOG_STOPPED.to_owned());
-        }
-        self.log = log;
+    fn log_state(&mut self) -> &mut LogState {
+        &mut self.log
     }
 
     /// In the air the flight computer moves through the table itself: of what is put to it from outside, it takes the

@@ -25,17 +25,13 @@ use flight::airframe::MassModel;
 use flight::controller::ControlLevel;
 use flight::phase::Mode;
 use flight::thrust_curve::ThrustCurve;
-use world::STEP_S;
-use world::sensors::FRAME_MS;
+use world::sensors::FRAME_S;
 
 use self::limits::Limits;
 use self::pad::Pad;
 use self::rehearsal::Rehearsal;
 use self::sensed::SensorWatch;
 use crate::craft::{Judged, LogState, Readiness, VehicleEvent};
-
-/// Length of a frame, s.
-const FRAME_S: f64 = FRAME_MS as f64 * STEP_S;
 
 /// Which flight is flown.
 #[derive(Debug, Clone)]

@@ -66,11 +66,8 @@ impl Craft for Vehicle {
         self.profile.start.countdown_s
     }
 
-    fn set_log_state(&mut self, log: LogState) {
-        if self.log.running && !log.running {
-            self.say(Severity::Error, LOG_STOPPED.to_owned());
-        }
-        self.log = log;
+    fn log_state(&mut self) -> &mut LogState {
+        &mut self.log
     }
 
     fn happen(&mut self, event: Event) -> Option<Refusal> {
@@ -126,9 +123,6 @@ impl Craft for Vehicle {
         self.verdict
     }
 }
-
-/// A log that stops in flight, in words.
-pub(crate) const LOG_STOPPED: &str = "the log has stopped: this flight is no longer recorded whole";
 
 impl Vehicle {
     fn take_effect(&mut self, effect: Effect) {

@@ -18,8 +18,6 @@ use flight::profile::Profile;
 use flight::thrust_estimate::ThrustEstimate;
 use flight::verdict::TouchdownLimits;
 
-pub(crate) use craft::LOG_STOPPED;
-
 pub use crate::craft::{Severity, Tick, VehicleEvent};
 
 use crate::craft::{ANSWERING_RAD, Judged, LogState, Readiness, SelfTest};

@@ -68,7 +68,7 @@ impl Airborne {
             for event in self.rocket.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            let leaving = self.endpoint.poll(&self.rocket, &self.rocket.snapshot());
+            let leaving = self.endpoint.poll(&self.rocket);
             sent.extend(self.sent.pass(leaving, self.rocket.time_s(), self.rocket.radio()));
         }
         sent
