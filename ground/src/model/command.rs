@@ -152,4 +152,9 @@ impl Commands {
     pub fn of(&self, kind: CommandKind) -> Option<&Track> {
         self.tracks.iter().find(|track| track.kind == kind)
     }
+
+    /// Whether an abort waits for its answer.
+    pub fn is_aborting(&self) -> bool {
+        self.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none())
+    }
 }

@@ -10,6 +10,7 @@ use protocol::frame::{Frame, Framer};
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
+use protocol::log::tlog::frame_length;
 
 use crate::model::command::CommandKind;
 use crate::model::telemetry::phase_from_number;
@@ -167,12 +168,8 @@ fn from_tlog(mut file: impl Read) -> std::io::Result<Film> {
 
 /// The length of the frame that the bytes begin with, and the frame if its checksum holds.
 fn tlog_frame(bytes: &[u8]) -> Option<(usize, Option<Frame>)> {
-    // MAVLink 2: header 10, checksum 2, signature 13 if flag 1 is set. MAVLink 1: 6 and 2; not shown.
-    let len = match bytes {
-        [0xFD, payload, flags, ..] => 12 + usize::from(*payload) + if flags & 1 == 0 { 0 } else { 13 },
-        [0xFE, payload, ..] => 8 + usize::from(*payload),
-        _ => return None,
-    };
+    // Of MAVLink 1 nothing is shown.
+    let len = frame_length(bytes)?;
     let bytes = bytes.get(..len)?;
     Some((len, frames(bytes).pop()))
 }

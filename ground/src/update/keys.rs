@@ -254,8 +254,7 @@ fn quit(model: &mut Model, now: Duration) {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
     // A screen that ends leaves its station as it is.
     let is_station = model.settings.role == Role::Station;
-    let aborting = model.commands.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none());
-    let risky = is_station && (armed || aborting || model.vehicle.in_flight());
+    let risky = is_station && (armed || model.commands.is_aborting() || model.vehicle.in_flight());
     let confirmed = matches!(model.dialog, Dialog::Quit { .. });
     if confirmed || !risky {
         model.dialog = Dialog::Closed;

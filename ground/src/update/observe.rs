@@ -44,7 +44,7 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.parameters = Parameters::default();
     model.rebooted_at = Some(now);
     // What was asked of the vehicle before its reboot is not asked of it afterwards; an abort is.
-    let aborting = model.commands.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none());
+    let aborting = model.commands.is_aborting();
     model.commands.sender.withdraw_all(now);
     model.commands.tracks.retain(|track| track.kind == CommandKind::Abort && aborting);
     if aborting {

@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TD_FLIGHT_STATUS_DATA;
 use ratatui::text::{Line, Span};
 
 use super::number::{STALE_MARK, age_mark, seconds};
 use super::theme::{Role, Theme};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
+use crate::model::vehicle::Sample;
 use crate::model::{self, Model, too_late, words};
 
 /// The abort key, in words.
@@ -180,17 +182,24 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = latest {
         return facts(track, theme, now);
     }
-    match model.vehicle.status.as_ref() {
-        None => Line::default(),
-        Some(status) if status.is_stale(now) => {
-            Line::styled(format!(" {STALE_MARK}checks: not heard any more"), theme.style(Role::Stale))
-        }
-        Some(status) if status.value.checks_failed.is_empty() => {
-            Line::styled(" GO: every arming check passes", theme.style(Role::Good))
-        }
-        Some(status) => {
+    model.vehicle.status.as_ref().map_or_else(Line::default, |status| {
+        readiness(status, theme, now).unwrap_or_else(|| {
             let failing = words::failed_checks(status.value.checks_failed).join(", ");
             Line::styled(format!(" NO-GO: {failing}"), theme.style(Role::Caution))
-        }
+        })
+    })
+}
+
+/// How the arming checks stand, where none is known to fail.
+pub fn readiness(
+    status: &Sample<TD_FLIGHT_STATUS_DATA>,
+    theme: Theme,
+    now: Duration,
+) -> Option<Line<'static>> {
+    if status.is_stale(now) {
+        let words = format!(" {STALE_MARK}checks: not heard any more");
+        return Some(Line::styled(words, theme.style(Role::Stale)));
     }
+    let passed = status.value.checks_failed.is_empty();
+    passed.then(|| Line::styled(" GO: every arming check passes", theme.style(Role::Good)))
 }

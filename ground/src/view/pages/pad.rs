@@ -83,16 +83,10 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         .collect();
     let summary = match status {
         None => Line::styled(" the vehicle has not said how its checks stand", theme.style(Role::Caution)),
-        Some(status) if status.is_stale(now) => {
-            Line::styled(format!(" {STALE_MARK}checks: not heard any more"), theme.style(Role::Stale))
-        }
-        Some(status) if status.value.checks_failed.is_empty() => {
-            Line::styled(" GO: every arming check passes", theme.style(Role::Good))
-        }
-        Some(status) => {
+        Some(status) => top::readiness(status, theme, now).unwrap_or_else(|| {
             let count = status.value.checks_failed.iter_names().count();
             Line::styled(format!(" NO-GO: {count} of {} checks fail", lines.len()), theme.style(Role::Alarm))
-        }
+        }),
     };
     lines.insert(0, summary);
     lines

@@ -6,5 +6,5 @@
 mod reader;
 mod writer;
 
-pub use reader::{TlogFrame, TlogReader};
+pub use reader::{TlogFrame, TlogReader, frame_length};
 pub use writer::TlogWriter;

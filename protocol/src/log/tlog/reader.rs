@@ -85,8 +85,8 @@ impl<R: Read> TlogReader<R> {
     }
 }
 
-/// The length that a frame's own head says.
-fn frame_length(frame: &[u8]) -> Option<usize> {
+/// The length of the frame that bytes begin with, of MAVLink 1 or 2, as its own head says.
+pub fn frame_length(frame: &[u8]) -> Option<usize> {
     let payload = usize::from(*frame.get(1)?);
     match *frame.first()? {
         MAGIC_2 if frame.get(2)? & SIGNED != 0 => Some(payload + 25),
