@@ -9,7 +9,9 @@ use flight::estimator::{Measurements, StartUncertainty};
 use flight::mission::{Mission, MissionError};
 use flight::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
 use flight::rigid::RigidState;
-use world::sensors::{FRAME_MS, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
+use world::sensors::{
+    FRAME_MS, FRAME_S, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
+};
 use world::world::WorldError;
 use world::{Actuators, World};
 
@@ -157,8 +159,7 @@ impl Flight {
 
     /// The flight computer dies, and starts again after a time, s. Servos keep their last command meanwhile.
     pub fn reboot(&mut self, down_s: f64) {
-        let frame_s = f64::from(FRAME_MS) * world::STEP_S;
-        self.frames_down = libm::ceil(down_s / frame_s).max(1.0) as u64;
+        self.frames_down = libm::ceil(down_s / FRAME_S).max(1.0) as u64;
     }
 
     /// The radio. A campaign has nobody at its other end; a flight on the wire has.

@@ -1,8 +1,7 @@
 //! The estimate against the truth.
 
-use flight::estimator::{Estimate, Health, HeightSources, Sigmas};
+use flight::estimator::Estimate;
 use flight::pilot::Sensed;
-use nalgebra::{Vector2, Vector3};
 use world::World;
 
 use super::Flight;
@@ -58,27 +57,5 @@ impl Flight {
 
 /// The truth as an estimate.
 pub(super) fn known(world: &World) -> Estimate {
-    let zero = Vector3::zeros();
-    Estimate {
-        time_s: world.time_s(),
-        state: *world.state(),
-        specific_force_m_s2: *world.specific_force_m_s2(),
-        wind_m_s: Vector2::new(world.wind_m_s().x, world.wind_m_s().y),
-        gyro_bias_rad_s: zero,
-        accelerometer_bias_m_s2: zero,
-        sigmas: Sigmas {
-            position_m: zero,
-            velocity_m_s: zero,
-            attitude_rad: zero,
-            gyro_bias_rad_s: zero,
-            accelerometer_bias_m_s2: zero,
-            wind_m_s: Vector2::zeros(),
-        },
-        heights: HeightSources {
-            inertial_m: world.state().position_m.z,
-            inertial_sigma_m: 0.0,
-            barometric_m: Some(world.state().position_m.z),
-        },
-        health: Health::Good,
-    }
+    Estimate::exact(world.time_s(), *world.state(), *world.specific_force_m_s2(), world.wind_m_s().xy())
 }

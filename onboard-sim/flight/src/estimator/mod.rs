@@ -92,6 +92,38 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// What is known exactly, without an estimator: for flights and tests that leave it out.
+    pub fn exact(
+        time_s: f64,
+        state: RigidState,
+        specific_force_m_s2: Vector3<f64>,
+        wind_m_s: Vector2<f64>,
+    ) -> Self {
+        let (zero, height_m) = (Vector3::zeros(), state.position_m.z);
+        Self {
+            time_s,
+            state,
+            specific_force_m_s2,
+            wind_m_s,
+            gyro_bias_rad_s: zero,
+            accelerometer_bias_m_s2: zero,
+            sigmas: Sigmas {
+                position_m: zero,
+                velocity_m_s: zero,
+                attitude_rad: zero,
+                gyro_bias_rad_s: zero,
+                accelerometer_bias_m_s2: zero,
+                wind_m_s: Vector2::zeros(),
+            },
+            heights: HeightSources {
+                inertial_m: height_m,
+                inertial_sigma_m: 0.0,
+                barometric_m: Some(height_m),
+            },
+            health: Health::Good,
+        }
+    }
+
     /// Velocity through the air, world, m/s.
     pub fn velocity_through_air_m_s(&self) -> Vector3<f64> {
         self.state.velocity_m_s - self.wind_m_s.push(0.0)

@@ -46,7 +46,7 @@ mod tests {
     use nalgebra::{Vector2, Vector3};
 
     use super::*;
-    use crate::estimator::{Health, HeightSources, Sigmas, StartUncertainty};
+    use crate::estimator::StartUncertainty;
     use crate::mission::Mission;
     use crate::pilot::Sensed;
     use crate::rigid::RigidState;
@@ -54,29 +54,7 @@ mod tests {
     fn falling(time_s: f64) -> Estimate {
         let mut state = RigidState::upright(250.0 - 38.0 * time_s);
         state.velocity_m_s.z = -38.0;
-        let zero = Vector3::zeros();
-        Estimate {
-            time_s,
-            state,
-            specific_force_m_s2: Vector3::new(9.8, 0.0, 0.0),
-            wind_m_s: Vector2::zeros(),
-            gyro_bias_rad_s: zero,
-            accelerometer_bias_m_s2: zero,
-            sigmas: Sigmas {
-                position_m: zero,
-                velocity_m_s: zero,
-                attitude_rad: zero,
-                gyro_bias_rad_s: zero,
-                accelerometer_bias_m_s2: zero,
-                wind_m_s: Vector2::zeros(),
-            },
-            heights: HeightSources {
-                inertial_m: state.position_m.z,
-                inertial_sigma_m: 0.0,
-                barometric_m: Some(state.position_m.z),
-            },
-            health: Health::Good,
-        }
+        Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
     }
 
     /// Height of the parachute's release, m, in a fall with fins that answer or do not.

@@ -11,6 +11,8 @@ mod inspect;
 mod known;
 mod outlook;
 mod restart;
+#[cfg(test)]
+mod sample;
 
 use known::Known;
 pub use outlook::Outlook;

@@ -27,35 +27,17 @@ pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_d
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
-    use crate::estimator::{ImuSample, Measurements, StartUncertainty};
-    use crate::mission::Mission;
-    use crate::pilot::{Pilot, PilotInput, Sensed};
-    use crate::rigid::RigidState;
+    use crate::pilot::sample::{falling, input};
+    use crate::pilot::{Pilot, PilotInput};
 
     /// Whether an abort in the very next frame releases the parachute.
     fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {
-        let imu =
-            ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0) };
-        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
-        let input = PilotInput {
-            frame,
-            time_s: 0.005 * frame as f64,
-            sensed: Sensed::Measured(measured),
-            fins_rad: [0.0; 4],
-            contact: false,
-            igniter_continuity: true,
-            abort: true,
-        };
-        pilot.step(&input).parachute
+        pilot.step(&PilotInput { abort: true, ..input(frame, 0.0) }).parachute
     }
 
     #[test]
     fn an_abort_in_the_first_frame_knows_how_high_it_is() {
-        let mission = Mission::builtin("mk2").unwrap().unwrap();
-        let start = RigidState::upright(300.0);
-        let pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee()).unwrap();
+        let pilot = falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
         assert!(abort_releases(&mut pilot.restarted(0.1), 21));
     }

@@ -1,7 +1,7 @@
 //! The guidance looked at, and its settings changed, from outside the flight: for those who replay it.
 
 use super::situation::Ahead;
-use super::{Plane, PoweredGuidance, PoweredSettings, PoweredSituation, UPRIGHT_DEARER, largest_tilt_rad};
+use super::{Plane, PoweredGuidance, PoweredSettings, PoweredSituation};
 use crate::dynamics::PlanarState;
 use crate::nmpc::Problem;
 use crate::nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, pose, solve_free_time};
@@ -47,20 +47,13 @@ impl PoweredGuidance {
         situation: &PoweredSituation<'_>,
     ) -> Option<LandingSolved> {
         let plane = decided.plane?;
-        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
+        if self.is_flown_out(time_s) {
             return None;
         }
-        let wind_m_s = situation.wind_m_s.dot(&plane.along);
-        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let along_m_s = state.velocity_m_s.dot(&plane.along);
-        let mut posed = self.pose(initial, along_m_s, wind_m_s, situation)?;
-        let ahead = Ahead(situation);
-        let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
-        let mut warm = solve_free_time(&posed, &ahead, earlier);
-        if largest_tilt_rad(&warm) > self.settings.tilt_max_deg.to_radians() {
-            posed.landing.state_weights[2] *= UPRIGHT_DEARER;
-            warm = solve_free_time(&posed, &ahead, None);
-        }
+        let mut posed = self.pose(&plane, state, situation)?;
+        let mut again = self.clone();
+        again.solve(time_s, &mut posed, situation);
+        let (ahead, warm) = (Ahead(situation), again.trial);
         let cold = solve_free_time(&posed, &ahead, None);
         Some(LandingSolved { problem: at_final_time(&posed, &ahead, warm.final_time_s), warm, cold })
     }

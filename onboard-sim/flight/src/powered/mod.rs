@@ -97,33 +97,42 @@ impl PoweredGuidance {
         let plane = *self.plane.get_or_insert_with(|| {
             Plane::choose(&state.position_m, &state.velocity_m_s, &situation.wind_m_s)
         });
-        if self.flown.as_ref().is_some_and(|flown| flown.left_s(time_s) < self.settings.flown_out_s) {
+        if self.is_flown_out(time_s) {
             return;
         }
-        let wind_m_s = situation.wind_m_s.dot(&plane.along);
-        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let along_m_s = state.velocity_m_s.dot(&plane.along);
-        let Some(mut problem) = self.pose(initial, along_m_s, wind_m_s, situation) else {
+        let Some(mut problem) = self.pose(&plane, state, situation) else {
             self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
             return;
         };
+        self.solve(time_s, &mut problem, situation);
+        self.take(time_s, &problem, situation);
+    }
+
+    /// Whether the plan ends so soon that it is flown out.
+    fn is_flown_out(&self, time_s: f64) -> bool {
+        self.left_s(time_s).is_some_and(|left_s| left_s < self.settings.flown_out_s)
+    }
+
+    /// Solves a problem from the plan that is flown, into the trial.
+    fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
-        solve_free_time_into(&problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+        solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
         if largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians() {
             // A loop is a landing for the equations, not for a vehicle in air: ask again, upright dearer.
             problem.landing.state_weights[2] *= UPRIGHT_DEARER;
-            solve_free_time_into(&problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
+            solve_free_time_into(problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
         }
-        self.take(time_s, &problem, situation);
     }
 
     fn pose(
         &self,
-        initial: PlanarState,
-        along_m_s: f64,
-        wind_m_s: f64,
+        plane: &Plane,
+        state: &RigidState,
         situation: &PoweredSituation<'_>,
     ) -> Option<FreeTimeProblem> {
+        let wind_m_s = situation.wind_m_s.dot(&plane.along);
+        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
+        let along_m_s = state.velocity_m_s.dot(&plane.along);
         let settings = &self.settings;
         let carried_until_s =
             situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;

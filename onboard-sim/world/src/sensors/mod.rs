@@ -22,6 +22,8 @@ use crate::world::World;
 /// Milliseconds of truth in one frame of the flight computer.
 pub const FRAME_MS: u32 = 5;
 const MS_S: f64 = 1e-3;
+/// The same, s.
+pub const FRAME_S: f64 = FRAME_MS as f64 * MS_S;
 
 /// The truth that the sensors look at, after a millisecond.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,13 +168,12 @@ impl Sensors {
 
     fn imu(&mut self, faults: &SensorFaults) -> ImuSample {
         let imu = &self.params.imu;
-        let frame_s = f64::from(FRAME_MS) * MS_S;
         let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
         // White noise of a density, averaged over a frame.
-        let spread = 1.0 / libm::sqrt(frame_s);
+        let spread = 1.0 / libm::sqrt(FRAME_S);
         let milli_g = 1e-3 * GRAVITY_M_S2;
 
-        let walk = imu.gyro_bias_walk_deg_s_sqrt_s.to_radians() * libm::sqrt(frame_s);
+        let walk = imu.gyro_bias_walk_deg_s_sqrt_s.to_radians() * libm::sqrt(FRAME_S);
         self.errors.gyro_bias_rad_s += self.imu_noise.next3() * walk;
         let gyro_white = self.imu_noise.next3() * (imu.gyro_noise_deg_s_sqrt_hz.to_radians() * spread);
         let gyro = mean(&mut self.rate_sum_rad_s)

@@ -15,6 +15,7 @@ use protocol::log::flight_v1;
 use protocol::log::record::Record;
 use tick_log::pilot::tick_to_log;
 use world::Truth;
+use world::sensors::FRAME_S;
 
 use self::place::{find, phase_of};
 use self::rerun::{Recipe, Rerun};
@@ -24,9 +25,6 @@ use crate::controller::{LoggedPilot, SETTINGS_IN_FLIGHT};
 use crate::info::VerdictFacts;
 use crate::log::Recording;
 use crate::settings::{Setting, mission_with, truth_with};
-
-/// Length of a frame, s.
-const FRAME_S: f64 = 0.005;
 
 /// Number and time of what is kept of a flight.
 type Kept = Vec<(f64, Record)>;
@@ -277,5 +275,5 @@ fn lasting(options: &ReflyOptions) -> Vec<Setting> {
 
 /// Whether a frame's flight computer has noticed that it is on the ground.
 fn is_down(tick: &flight_v1::PilotTick) -> bool {
-    [Phase::Touchdown, Phase::Safed].into_iter().any(|phase| u32::from(phase.index()) == tick.output.phase)
+    matches!(phase_of(tick), Some(Phase::Touchdown | Phase::Safed))
 }

@@ -7,8 +7,8 @@ use campaign::fault::{Breakage, FaultError, Injector, TimedFault};
 use campaign::fly::Flight;
 use flight::mission::Mission;
 use onboard_sim::from_apogee;
+use world::sensors::FRAME_S;
 
-use super::FRAME_S;
 use crate::controller::LoggedPilot;
 use crate::log::Recording;
 use crate::refly::ReflyError;
