@@ -7,11 +7,11 @@ mod from_apogee;
 #[path = "replay/simulated.rs"]
 mod simulated;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, OnceLock};
 
+use e2e::install;
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::log::{FlightLog, Recording};
 use replay::recover::recover;
@@ -20,30 +20,11 @@ use replay::refly::{ReflyOptions, refly_flight, write_log};
 use from_apogee::LANDED;
 use simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
 
-/// Set by the continuous integration: there, a missing reader fails the test.
-const REQUIRED: &str = "TOUCHDOWN_CLIENTS_REQUIRED";
-
 /// The folder with the outside readers, installed by the first call. `None`, and a loud line, where this machine cannot
 /// have them.
 fn readers() -> Option<&'static Path> {
     static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        // target/<profile>/deps/<test>
-        let folder = test.ancestors().nth(3).unwrap().join("readers");
-        let trouble = match Command::new(script("setup")).arg(&folder).output() {
-            Ok(output) if output.status.success() => return Some(folder),
-            Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
-            Err(error) => error.to_string(),
-        };
-        assert!(std::env::var_os(REQUIRED).is_none(), "the outside readers cannot be installed: {trouble}");
-        // Past the test's captured output, so that nobody overlooks it; nothing is left to do if it cannot be said.
-        let _ = writeln!(
-            std::io::stderr(),
-            "NOT RUN: other people's readers cannot be installed here:\n{trouble}"
-        );
-        None
-    });
+    let folder = FOLDER.get_or_init(|| install(&script("setup"), "readers"));
     folder.as_deref()
 }
 

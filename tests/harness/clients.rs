@@ -5,6 +5,27 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+/// Other people's programs in a folder of this name below the target folder, put there by a script that takes the folder.
+/// `None`, and a loud line, where this machine cannot have them.
+///
+/// # Panics
+/// They cannot be installed, and [`REQUIRED`] is set.
+pub fn install(setup: &Path, name: &str) -> Option<PathBuf> {
+    let test = std::env::current_exe().expect("the path of this test");
+    // target/<profile>/deps/<test>
+    let folder = test.ancestors().nth(3).expect("the target folder").join(name);
+    let trouble = match Command::new(setup).arg(&folder).output() {
+        Ok(output) if output.status.success() => return Some(folder),
+        Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
+        Err(error) => error.to_string(),
+    };
+    assert!(std::env::var_os(REQUIRED).is_none(), "the {name} cannot be installed: {trouble}");
+    // Past the test's captured output, so that nobody overlooks it; nothing is left to do if it cannot be said.
+    let _ =
+        writeln!(std::io::stderr(), "NOT RUN: other people's {name} cannot be installed here:\n{trouble}");
+    None
+}
+
 /// Where the clients are.
 #[derive(Debug, Clone, Copy)]
 pub struct Clients {
@@ -21,24 +42,7 @@ impl Clients {
     /// They cannot be installed, and [`REQUIRED`] is set.
     pub fn installed() -> Option<Self> {
         static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
-        let folder = FOLDER.get_or_init(|| {
-            let test = std::env::current_exe().expect("the path of this test");
-            // target/<profile>/deps/<test>
-            let folder = test.ancestors().nth(3).expect("the target folder").join("clients");
-            let setup = Command::new(scripts().join("setup")).arg(&folder).output();
-            let trouble = match setup {
-                Ok(output) if output.status.success() => return Some(folder),
-                Ok(output) => String::from_utf8_lossy(&output.stderr).into_owned(),
-                Err(error) => error.to_string(),
-            };
-            assert!(std::env::var_os(REQUIRED).is_none(), "the clients cannot be installed: {trouble}");
-            // Past the test's captured output, so that nobody overlooks it; nothing is left to do if it cannot be said.
-            let _ = writeln!(
-                std::io::stderr(),
-                "NOT RUN: other people's clients cannot be installed here:\n{trouble}"
-            );
-            None
-        });
+        let folder = FOLDER.get_or_init(|| install(&scripts().join("setup"), "clients"));
         folder.as_deref().map(|folder| Self { folder })
     }
 

@@ -11,7 +11,7 @@ mod serial_line;
 mod terminal;
 
 pub use bare_ground::{BareGround, command_frame};
-pub use clients::Clients;
+pub use clients::{Clients, install};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
 pub use process::{Ended, Running};

@@ -10,6 +10,7 @@ use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Scalars, SeriesLines, StateChange};
 use re_sdk_types::components::InterpolationMode;
 use re_sdk_types::datatypes::Rgba32;
+use tick_log::pilot::state_from_log;
 
 use crate::entity;
 use crate::pose::pitch_error_deg;
@@ -149,8 +150,6 @@ impl<'a> Plots<'a> {
     /// What really happens on a flight from apogee, and what its servos were told.
     pub(crate) fn in_space(&mut self, truth: &TruthSample) -> RecordingStreamResult<()> {
         let (at, moving) = (&truth.state.position_m, &truth.state.velocity_m_s);
-        let turned = &truth.state.world_from_body;
-        let nose_up = 2.0 * (turned.x * turned.z - turned.w * turned.y);
         let degrees = |angles_rad: &[f64], axis: usize| angles_rad.get(axis).copied().map(f64::to_degrees);
         let mean_deg = |angles_rad: &[f64]| {
             let sum_rad: f64 = angles_rad.iter().sum();
@@ -161,7 +160,7 @@ impl<'a> Plots<'a> {
         self.draw("y_m", Line::Truth, at.y)?;
         self.draw("vertical_m_s", Line::Truth, moving.z)?;
         self.draw("lateral_m_s", Line::Truth, libm::hypot(moving.x, moving.y))?;
-        self.draw("tilt_deg", Line::Truth, libm::acos(nose_up.clamp(-1.0, 1.0)).to_degrees())?;
+        self.draw("tilt_deg", Line::Truth, state_from_log(&truth.state).tilt_rad().to_degrees())?;
         self.draw("thrust_n", Line::Truth, truth.thrust_n)?;
         for (axis, plot) in ["gimbal_pitch_deg", "gimbal_yaw_deg"].into_iter().enumerate() {
             self.maybe(plot, Line::Commanded, degrees(&truth.gimbal_commanded_rad, axis))?;

@@ -11,28 +11,16 @@ use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::recover::recover;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
-use replay::settings::Setting;
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 use replay::tick::tick;
 use replay::verify::{Obstacle, Outcome, verify};
 
+use crate::asked::{settings, with, with_plant};
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
 
 fn recording() -> Recording {
     Recording::open(&LANDED.log).unwrap()
-}
-
-fn settings(given: &[&str]) -> Vec<Setting> {
-    given.iter().map(|text| text.parse().unwrap()).collect()
-}
-
-fn with(given: &[&str]) -> ReflyOptions {
-    ReflyOptions { settings: settings(given), ..ReflyOptions::default() }
-}
-
-fn with_plant(given: &[&str]) -> ReflyOptions {
-    ReflyOptions { plant_settings: settings(given), ..ReflyOptions::default() }
 }
 
 #[test]

@@ -6,24 +6,12 @@ use flight::phase::Phase;
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::refly::{From, Law, ReflyOptions, StartAt, margin, refly, refly_flight, write_log};
-use replay::settings::Setting;
 use replay::sweep::{BisectOptions, State, bisect, grid, random, sweep};
 use replay::tick::tick;
 use replay::verify::{Outcome, verify};
 
+use crate::asked::{settings, with, with_plant};
 use crate::simulated::{DISPERSED, NOMINAL, Simulated};
-
-fn settings(given: &[&str]) -> Vec<Setting> {
-    given.iter().map(|text| text.parse().unwrap()).collect()
-}
-
-fn with(given: &[&str]) -> ReflyOptions {
-    ReflyOptions { settings: settings(given), ..ReflyOptions::default() }
-}
-
-fn with_plant(given: &[&str]) -> ReflyOptions {
-    ReflyOptions { plant_settings: settings(given), ..ReflyOptions::default() }
-}
 
 #[test]
 fn nothing_changed_commands_nothing_else() {

@@ -1,0 +1,18 @@
+//! What a test asks to be other.
+
+use replay::refly::ReflyOptions;
+use replay::settings::Setting;
+
+pub(crate) fn settings(given: &[&str]) -> Vec<Setting> {
+    given.iter().map(|text| text.parse().unwrap()).collect()
+}
+
+/// The settings changed for the controller and the plant alike.
+pub(crate) fn with(given: &[&str]) -> ReflyOptions {
+    ReflyOptions { settings: settings(given), ..ReflyOptions::default() }
+}
+
+/// Those of the plant alone.
+pub(crate) fn with_plant(given: &[&str]) -> ReflyOptions {
+    ReflyOptions { plant_settings: settings(given), ..ReflyOptions::default() }
+}
