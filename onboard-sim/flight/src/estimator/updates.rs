@@ -6,8 +6,8 @@ use super::covariance::{
 };
 use super::{Estimator, GnssFix};
 
-/// Beyond this tilt a lidar range says little about the height: its cosine.
-const LIDAR_COS_TILT: f64 = 0.85;
+/// Beyond this tilt a lidar range says little about the height: its cosine (that of 49 degrees).
+const LIDAR_COS_TILT: f64 = 0.65;
 /// What the filter adds to its doubt when satellite velocities keep pulling one way: standard deviations.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
 const DOUBT_ATTITUDE_RAD: f64 = 0.04;
@@ -164,7 +164,10 @@ impl Estimator {
         ];
         let measured_m = range_m + behind_cg_m;
         let noise = self.config.lidar_m * self.config.lidar_m;
-        let correction = self.correct(&sensitivity, measured_m - slant_m, noise, |_| true);
+        // How far the slant exceeds the height depends on the tilt, but no field is so level that a range may correct it.
+        let correction = self.correct(&sensitivity, measured_m - slant_m, noise, |index| {
+            !(ATTITUDE..ATTITUDE + 3).contains(&index)
+        });
         self.gates.lidar.count(correction.accepted);
         if measured_m.is_finite() {
             self.heights.take_lidar(&self.config, measured_m * nose.z, nose.z);

@@ -249,6 +249,9 @@ impl Sensors {
         // From the lidar along the axis to the ground: the slant from the centre of gravity, less the lidar's place.
         let slant_m = truth.state.position_m.z / libm::cos(tilt_rad);
         let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
-        (lidar.range_min_m..=lidar.range_max_m).contains(&range_m).then_some(range_m)
+        // Rough ground sends back what falls on it in all directions, and less falls on it aslant (Lambert's cosine
+        // law); the echo weakens with the square of the range.
+        let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
+        (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m)
     }
 }

@@ -88,7 +88,7 @@ pub struct LidarParams {
     pub noise_m: f64,
     /// Shortest range, m.
     pub range_min_m: f64,
-    /// Longest range, m.
+    /// Longest range, m, straight down; it shrinks as the beam leans.
     pub range_max_m: f64,
     /// Beyond this tilt the ground gives no echo, degrees.
     pub tilt_max_deg: f64,
@@ -153,7 +153,7 @@ impl Default for LidarParams {
             noise_m: 0.06,
             range_min_m: 0.05,
             range_max_m: 12.0,
-            tilt_max_deg: 25.0,
+            tilt_max_deg: 45.0,
             ahead_of_feet_m: 0.15,
         }
     }

@@ -50,8 +50,13 @@ fn the_lidar_is_silent_high_up_and_on_its_side() {
     assert!(lidar_of(&falling(5.0, 13.0)).is_empty());
     let mut leaning = falling(5.0, 5.0);
     let lean = |deg: f64| nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), deg.to_radians());
-    leaning.state.world_from_body = lean(26.0) * flight::rigid::upright();
+    leaning.state.world_from_body = lean(46.0) * flight::rigid::upright();
     assert!(lidar_of(&leaning).is_empty());
+    // 11 m straight down are seen; the 10.7 m aslant from 8 m are beyond 12 m times the root of the cosine of 44 deg.
+    assert!(!lidar_of(&falling(5.0, 11.0)).is_empty());
+    let mut far = falling(5.0, 8.0);
+    far.state.world_from_body = lean(44.0) * flight::rigid::upright();
+    assert!(lidar_of(&far).is_empty());
     leaning.state.world_from_body = lean(20.0) * flight::rigid::upright();
     let ranges = lidar_of(&leaning);
     // 5 m / cos 20 deg - (0.6 - 0.15) m.

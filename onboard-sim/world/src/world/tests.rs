@@ -135,7 +135,7 @@ fn val_tsiolkovsky_vertical_burn() {
     let truth = Truth { drag_scale: 0.0, ignition_delay_s: 0.0, ..Truth::default() };
     let mut world = world("mk2", &truth, &RigidState::upright(1000.0));
     let motor = motors::builtin("H45W").unwrap();
-    let (full_kg, burnt_kg) = (3.05, motor.propellant_mass_kg());
+    let (full_kg, burnt_kg) = (world.mass().mass_kg, motor.propellant_mass_kg());
     let ignite = Actuators { ignite: true, ..Actuators::default() };
     world.advance(&ignite, 8000);
     let exhaust_m_s = motor.total_impulse_n_s() / burnt_kg;
