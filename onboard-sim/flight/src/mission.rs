@@ -83,7 +83,8 @@ pub struct Mission {
     pub fin_sigmas: f64,
     /// Where the fins keep the vehicle in the band that is then left, 0 at its low end, 1 at its high end.
     pub fin_place: f64,
-    /// How much of the fins' present opening a plan expects to last; the rest is expected to be half open.
+    /// How much of the fins' present opening a plan expects to last; the rest is expected to open as the motor that is
+    /// planned with will ask.
     pub fins_kept: f64,
     /// Tilt that the landing may use throughout, at most, when the band of feasible heights is computed before the
     /// ignition, degrees.

@@ -271,13 +271,8 @@ impl Pilot {
         if self.mode.interlocks.degraded {
             return;
         }
-        let situation = self.known.powered_situation(
-            estimate,
-            situation,
-            fins_rad,
-            self.known.cautious_burn(situation.burning_s),
-        );
-        self.powered.plan(time_s, state, &situation);
+        let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
+        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
     }
 
     fn gimbal(
@@ -288,10 +283,11 @@ impl Pilot {
         fins_rad: &[f64; 4],
     ) -> [f64; 2] {
         let thrust_n = self.known.burn().thrust_n(situation.burning_s);
+        let fins_m2 = self.known.fin_drag_area_m2(fins_rad);
         let aim: Aim = self.powered.aim(
             time_s,
             &estimate.state,
-            &self.known.powered_situation(estimate, situation, fins_rad, self.known.burn()),
+            &self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2),
         );
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
             thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2

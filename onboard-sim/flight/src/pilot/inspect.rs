@@ -60,8 +60,7 @@ impl Pilot {
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         let mass = self.known.mass_now(Some(burning_s));
         let burning = Burning { burning_s, mass, density_kg_m3 };
-        let burn = self.known.cautious_burn(burning_s);
-        let situation = self.known.powered_situation(estimate, &burning, &input.fins_rad, burn);
-        before.powered.inspect(&self.powered, input.time_s, &estimate.state, &situation)
+        let (preferred, fallback) = self.known.situations_to_plan(estimate, &burning, &input.fins_rad);
+        before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
     }
 }

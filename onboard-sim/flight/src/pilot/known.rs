@@ -84,16 +84,6 @@ impl Known {
         Burn { impulse_scale, time_scale, ..burn }
     }
 
-    /// The motor that is planned with: what turns out to be too much can be thrown away late, what is missing cannot
-    /// be had.
-    pub(super) fn cautious_burn(&self, burning_s: f64) -> Burn<'_> {
-        let carried_until_s =
-            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
-        let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
-        let early = (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0);
-        self.doubted_burn(burning_s, -self.mission.caution_sigmas * early)
-    }
-
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {
         let mission = &self.mission;
         let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;
@@ -115,12 +105,13 @@ impl Known {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
+    /// The burning vehicle with a motor, and with its fins this far open as certified.
     pub(super) fn powered_situation<'a>(
         &'a self,
         estimate: &Estimate,
         situation: &Burning,
-        fins_rad: &[f64; 4],
         burn: Burn<'a>,
+        fin_drag_area_m2: f64,
     ) -> PoweredSituation<'a> {
         PoweredSituation {
             burn,
@@ -134,9 +125,7 @@ impl Known {
             wind_m_s: estimate.wind_m_s.push(0.0),
             body_drag_area_m2: self.motor.air_scale() * self.body_drag_area_m2(),
             crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.motor.air_scale()
-                * (self.mission.fins_kept * self.fin_drag_area_m2(fins_rad)
-                    + 0.5 * (1.0 - self.mission.fins_kept) * self.largest_fin_drag_area_m2()),
+            fin_drag_area_m2: self.motor.air_scale() * fin_drag_area_m2,
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
         }
     }

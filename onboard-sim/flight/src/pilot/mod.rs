@@ -4,6 +4,7 @@
 //! [`PilotOutput`]s, so a log of inputs flies the flight again. A frame is 5 ms: estimate, watch the motor, move through
 //! the [phase table](crate::phase), point fins and gimbal. Every tenth frame the outlook and the landing are planned.
 
+mod assumed;
 mod digest;
 mod fly;
 mod hopeless;

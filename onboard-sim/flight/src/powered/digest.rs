@@ -7,10 +7,10 @@ use crate::memory::{Memory, Remembers, remembers};
 use crate::nmpc::free_time::FreeTimeSolution;
 use crate::nmpc::{Solution, SolveStatus};
 
-// The settings are the mission's. The workspace holds nothing that a search depends on, and the trial is cleared before
-// it is solved into: both only keep their room. (Of a problem that cannot be posed the trial keeps an older final time,
+// The settings are the mission's. The workspace holds nothing that a search depends on, and the trial and what was set
+// aside for another are cleared before they are solved into: they only keep their room. (Of a problem that cannot be posed the trial keeps an older final time,
 // which is reported and decides nothing.)
-remembers!(PoweredGuidance { plane, flown, report } but { settings, workspace, trial });
+remembers!(PoweredGuidance { plane, flown, report } but { settings, workspace, trial, set_aside });
 
 remembers!(Plane { along, across });
 remembers!(Flown { begins_s, turning_rad_s2, plan });

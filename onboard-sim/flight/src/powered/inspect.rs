@@ -44,15 +44,15 @@ impl PoweredGuidance {
         decided: &Self,
         time_s: f64,
         state: &RigidState,
-        situation: &PoweredSituation<'_>,
+        preferred: &PoweredSituation<'_>,
+        fallback: Option<&PoweredSituation<'_>>,
     ) -> Option<LandingSolved> {
         let plane = decided.plane?;
         if self.is_flown_out(time_s) {
             return None;
         }
-        let mut posed = self.pose(&plane, state, situation)?;
         let mut again = self.clone();
-        again.solve(time_s, &mut posed, situation);
+        let (posed, situation) = again.solve_either(time_s, &plane, state, preferred, fallback)?;
         let (ahead, warm) = (Ahead(situation), again.trial);
         let cold = solve_free_time(&posed, &ahead, None);
         Some(LandingSolved { problem: at_final_time(&posed, &ahead, warm.final_time_s), warm, cold })

@@ -52,11 +52,20 @@ const END_LEAN_MAX_RAD: f64 = 0.05;
 /// How much dearer a tilt becomes when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
 
+/// A plan that touches down faster than this, m/s, makes another one be tried if there is any.
+const SOFT_M_S: f64 = -0.7;
+
 /// A plan that touches down faster than this is not flown, m/s: upright brakes as well.
 const HARD_M_S: f64 = -1.2;
 
 /// A plan that tilts further than this even so is not flown, rad.
 const TILT_BELIEVED_RAD: f64 = 1.6;
+
+/// Velocity along the nose that a plan touches down with, m/s; without bound downwards for a plan that is none.
+fn ended_m_s(plan: &FreeTimeSolution) -> f64 {
+    let finite = plan.solution.states.iter().all(PlanarState::is_finite);
+    plan.solution.states.last().filter(|_| finite).map_or(f64::NEG_INFINITY, |last| last.u_m_s)
+}
 
 /// The guidance and what it remembers.
 #[derive(Debug, Clone)]
@@ -67,6 +76,7 @@ pub struct PoweredGuidance {
     report: PoweredReport,
     workspace: FreeTimeWorkspace,
     trial: FreeTimeSolution,
+    set_aside: FreeTimeSolution,
 }
 
 impl PoweredGuidance {
@@ -79,6 +89,7 @@ impl PoweredGuidance {
             report: PoweredReport::idle(),
             workspace: FreeTimeWorkspace::default(),
             trial: FreeTimeSolution::default(),
+            set_aside: FreeTimeSolution::default(),
         }
     }
 
@@ -92,20 +103,50 @@ impl PoweredGuidance {
         self.flown.as_ref().map(|flown| flown.left_s(time_s))
     }
 
-    /// Plans the landing from a state at a time.
-    pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
+    /// Plans the landing from a state at a time; if what is preferred ends hard, with what there is to fall back on.
+    pub fn plan(
+        &mut self,
+        time_s: f64,
+        state: &RigidState,
+        preferred: &PoweredSituation<'_>,
+        fallback: Option<&PoweredSituation<'_>>,
+    ) {
         let plane = *self.plane.get_or_insert_with(|| {
-            Plane::choose(&state.position_m, &state.velocity_m_s, &situation.wind_m_s)
+            Plane::choose(&state.position_m, &state.velocity_m_s, &preferred.wind_m_s)
         });
         if self.is_flown_out(time_s) {
             return;
         }
-        let Some(mut problem) = self.pose(&plane, state, situation) else {
+        let Some((problem, situation)) = self.solve_either(time_s, &plane, state, preferred, fallback) else {
             self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
             return;
         };
-        self.solve(time_s, &mut problem, situation);
         self.take(time_s, &problem, situation);
+    }
+
+    /// Solves the landing, into the trial: as preferred, unless that ends hard and the fallback ends softer.
+    fn solve_either<'s, 'a>(
+        &mut self,
+        time_s: f64,
+        plane: &Plane,
+        state: &RigidState,
+        preferred: &'s PoweredSituation<'a>,
+        fallback: Option<&'s PoweredSituation<'a>>,
+    ) -> Option<(FreeTimeProblem, &'s PoweredSituation<'a>)> {
+        let mut problem = self.pose(plane, state, preferred)?;
+        self.solve(time_s, &mut problem, preferred);
+        let ended_m_s = ended_m_s(&self.trial);
+        let posed = fallback
+            .filter(|_| ended_m_s < SOFT_M_S)
+            .and_then(|fallback| Some((self.pose(plane, state, fallback)?, fallback)));
+        let Some((mut other, fallback)) = posed else { return Some((problem, preferred)) };
+        core::mem::swap(&mut self.trial, &mut self.set_aside);
+        self.solve(time_s, &mut other, fallback);
+        if ended_m_s < self::ended_m_s(&self.trial) {
+            return Some((other, fallback));
+        }
+        core::mem::swap(&mut self.trial, &mut self.set_aside);
+        Some((problem, preferred))
     }
 
     /// Whether the plan ends so soon that it is flown out.

@@ -20,6 +20,14 @@ use crate::burn::Burn;
 /// End times tried between thrust falling through weight and the latest.
 const END_TIMES: usize = 4;
 
+/// Share of the fins per share of the band.
+const FIN_GAIN: f64 = 1.5;
+
+/// How much of the fins to open, 0 to 1, to stay at a place in a band for a vehicle that is at another.
+pub fn share_for(wanted_place: f64, place: f64) -> f64 {
+    (0.5 + FIN_GAIN * (wanted_place - place)).clamp(0.0, 1.0)
+}
+
 /// How hard the vehicle brakes: its tilt and its fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Braking {
@@ -131,8 +139,6 @@ impl Column {
         height_m: f64,
         place: f64,
     ) -> f64 {
-        /// Share of the fins per share of the band.
-        const GAIN: f64 = 1.5;
         /// A band is taken to be at least this wide, in time at the present speed, s: above a narrow band lies hardly
         /// a landing, but closing the fins would only make the vehicle faster.
         const NARROW_S: f64 = 0.25;
@@ -145,8 +151,7 @@ impl Column {
         let strong = strong.unwrap_or(weak);
         let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
         let width_m = (high_m - low_m).max(-NARROW_S * vertical_m_s).max(1e-3);
-        let at_m = low_m + place * width_m;
-        (0.5 + GAIN * (at_m - height_m) / width_m).clamp(0.0, 1.0)
+        share_for(place, (height_m - low_m) / width_m)
     }
 
     /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.
