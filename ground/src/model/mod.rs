@@ -7,6 +7,7 @@ pub mod dialog;
 pub mod events;
 pub mod history;
 pub mod link;
+pub mod motion;
 pub mod outcome;
 pub mod page;
 pub mod parameters;

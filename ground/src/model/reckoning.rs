@@ -71,7 +71,8 @@ fn along_plan(vehicle: &Vehicle, now: Duration) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
     use crate::limits::Touchdown;
-    use crate::model::vehicle::{Heartbeat, Motion, Prediction, Sample};
+    use crate::model::motion::Motion;
+    use crate::model::vehicle::{Heartbeat, Prediction, Sample};
     use protocol::dialect::{TdLimit, TdPhase};
 
     const SEEN: Duration = Duration::from_secs(100);
@@ -83,7 +84,7 @@ mod tests {
                 SEEN,
             )),
             motion: Some(Sample::new(
-                Motion { x_m: 1.0, altitude_m: 100.0, vx_m_s: 2.0, climb_m_s: -10.0 },
+                Motion { x_m: 1.0, y_m: 0.0, altitude_m: 100.0, vx_m_s: 2.0, vy_m_s: 0.0, climb_m_s: -10.0 },
                 SEEN,
             )),
             ..Vehicle::default()

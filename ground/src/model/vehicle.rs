@@ -7,6 +7,7 @@ use protocol::dialect::{
     TdPhase,
 };
 
+use super::motion::{Attitude, BodySpeed, Motion};
 use crate::limits::Touchdown;
 
 /// A value older than this is marked as stale.
@@ -31,6 +32,11 @@ impl<T> Sample<T> {
         Self { value, received_at: now }
     }
 
+    /// What is read from the value, as old as it.
+    pub fn map<U>(self, read: impl FnOnce(&T) -> U) -> Sample<U> {
+        Sample { value: read(&self.value), received_at: self.received_at }
+    }
+
     /// Time since it was received.
     pub fn age(&self, now: Duration) -> Duration {
         now.saturating_sub(self.received_at)
@@ -51,39 +57,6 @@ pub struct Heartbeat {
     pub phase: Option<TdPhase>,
     /// `MAV_STATE_FLIGHT_TERMINATION`.
     pub terminated: bool,
-}
-
-/// Attitude in the pitch plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Attitude {
-    /// Pitch from the horizontal; pi/2 is upright.
-    pub pitch_rad: f64,
-    /// Angle between nose and vertical, 0 to pi.
-    pub tilt_rad: f64,
-    /// Pitch rate.
-    pub pitch_rate_rad_s: f64,
-}
-
-/// Position and velocity in the pitch plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
-    /// Horizontal, north.
-    pub x_m: f64,
-    /// Altitude, up.
-    pub altitude_m: f64,
-    /// Horizontal speed, north.
-    pub vx_m_s: f64,
-    /// Vertical speed, up.
-    pub climb_m_s: f64,
-}
-
-/// Speeds along the body's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodySpeed {
-    /// Axial, towards the nose.
-    pub u_m_s: f64,
-    /// Lateral, body z axis.
-    pub w_m_s: f64,
 }
 
 /// Commanded and measured angle.
@@ -157,6 +130,8 @@ pub struct Vehicle {
     pub ready_to_arm: Option<Sample<bool>>,
     /// Where it flew: x and altitude, m.
     pub flown: Vec<(f64, f64)>,
+    /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
+    pub in_space: bool,
     /// The vehicle's clock, ms since its boot.
     pub last_boot_ms: Option<u32>,
 }
@@ -211,10 +186,7 @@ impl Vehicle {
     /// Speeds along the body's axes, as old as the older of attitude and velocity.
     pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
         let (attitude, motion) = (self.attitude?, self.motion?);
-        let (sin, cos) = libm::sincos(attitude.value.pitch_rad);
-        let (vx, climb) = (motion.value.vx_m_s, motion.value.climb_m_s);
-        // Axes in (x, up): e_x = (cos, sin) towards the nose, e_z = (sin, -cos).
-        let speed = BodySpeed { u_m_s: vx * cos + climb * sin, w_m_s: vx * sin - climb * cos };
+        let speed = BodySpeed::of(&attitude.value, &motion.value);
         Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
     }
 

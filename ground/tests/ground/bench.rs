@@ -187,24 +187,58 @@ impl Bench {
         }
     }
 
-    /// Upright at an altitude, moving.
+    /// In the plane of north and up: at an altitude, moving, pitched.
     pub(crate) fn state(&mut self, x: f32, altitude: f32, vx: f32, climb: f32, pitch_deg: f64) {
         let (sin, cos) = libm::sincos(pitch_deg.to_radians() / 2.0);
-        let time_boot_ms = self.boot_ms();
+        self.attitude([cos, 0.0, sin, 0.0], [0.0, -0.005, 0.0]);
+        self.motion([x, 0.0, -altitude], [vx, 0.0, -climb]);
+    }
+
+    /// In space: position and velocity north, east and up; leaning towards this heading by this much.
+    pub(crate) fn state_in_space(
+        &mut self,
+        position: [f32; 3],
+        velocity: [f32; 3],
+        (heading_deg, lean_deg): (f64, f64),
+    ) {
+        // Upright is a quarter turn about east; the lean turns about the horizontal across the heading.
+        let (sin_lean, cos_lean) = libm::sincos(lean_deg.to_radians() / 2.0);
+        let (across_north, across_east) = {
+            let (sin, cos) = libm::sincos(heading_deg.to_radians());
+            (sin * sin_lean, -cos * sin_lean)
+        };
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let (w, x, y) = (cos_lean, across_north, across_east);
+        self.attitude([half * (w - y), half * x, half * (w + y), half * x], [0.0, -0.02, 0.03]);
+        let down = |[north, east, up]: [f32; 3]| [north, east, -up];
+        self.motion(down(position), down(velocity));
+    }
+
+    fn attitude(&mut self, [q1, q2, q3, q4]: [f64; 4], [rollspeed, pitchspeed, yawspeed]: [f32; 3]) {
+        let [q1, q2, q3, q4] = [q1, q2, q3, q4].map(|part| part as f32);
         self.hear(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
-            time_boot_ms,
-            q1: cos as f32,
-            q3: sin as f32,
-            pitchspeed: -0.005,
+            time_boot_ms: self.boot_ms(),
+            q1,
+            q2,
+            q3,
+            q4,
+            rollspeed,
+            pitchspeed,
+            yawspeed,
             ..Default::default()
         }));
+    }
+
+    fn motion(&mut self, [x, y, z]: [f32; 3], [vx, vy, vz]: [f32; 3]) {
+        let time_boot_ms = self.boot_ms();
         self.hear(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
             time_boot_ms,
             x,
-            z: -altitude,
+            y,
+            z,
             vx,
-            vz: -climb,
-            ..Default::default()
+            vy,
+            vz,
         }));
     }
 
@@ -215,11 +249,17 @@ impl Bench {
             commanded: [9000; 4],
             measured: [9000, 8990, 9000, 8400],
         }));
+        self.gimbal([(gimbal_cdeg, gimbal_cdeg / 2), (0, 0)]);
+    }
+
+    /// Commanded and measured, in the pitch and in the yaw plane.
+    pub(crate) fn gimbal(&mut self, [pitch, yaw]: [(i16, i16); 2]) {
         self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
-            time_boot_ms,
-            pitch_commanded: gimbal_cdeg,
-            pitch_measured: gimbal_cdeg / 2,
-            ..Default::default()
+            time_boot_ms: self.boot_ms(),
+            pitch_commanded: pitch.0,
+            pitch_measured: pitch.1,
+            yaw_commanded: yaw.0,
+            yaw_measured: yaw.1,
         }));
     }
 

@@ -166,6 +166,52 @@ fn regress_nothing_heard() {
     snapshot("nothing_heard", &bench);
 }
 
+/// A vehicle that moves and leans towards the east: the plane of north and up shows nothing of it.
+#[test]
+fn what_points_east_is_in_every_number() {
+    let mut bench = powered();
+    bench.state_in_space([0.0, 30.0, 40.0], [0.0, 4.0, -3.0], (90.0, 20.0));
+    bench.run(0.1);
+    let screen = bench.screen(80, 24);
+    for row in [
+        "horizontal      4.00 m/s",
+        "distance        30.0 m",
+        // 4 m/s sin 20 deg - 3 m/s cos 20 deg, and what is left of 5 m/s across the axis.
+        "u axial        -1.45 m/s",
+        "lateral        4.785 m/s",
+        "tilt           20.00 deg",
+        // The nose turns by 0.02 and 0.03 rad/s.
+        "turn rate       2.07 deg/s",
+    ] {
+        assert!(screen.contains(row), "{row}\n{screen}");
+    }
+    assert!(bench.screen(40, 12).contains("tilt 20.0 u -1.5 lat 4.78"), "{}", bench.screen(40, 12));
+    bench.key(Key::Char('2'));
+    let screen = bench.screen(80, 24);
+    for row in ["horizontal       4.0 m/s", "distance        30.0 m", "tilt            20.0 deg"] {
+        assert!(screen.contains(row), "{row}\n{screen}");
+    }
+    bench.key(Key::Char('4'));
+    let screen = bench.screen(80, 24);
+    for row in [
+        "distance               30.0 m",
+        "tilt                  20.00 deg",
+        "turn rate              2.07 deg/s",
+    ] {
+        assert!(screen.contains(row), "{row}\n{screen}");
+    }
+}
+
+/// The yaw plane's gimbal counts as much as the pitch plane's.
+#[test]
+fn the_greatest_gimbal_angle_is_that_of_either_axis() {
+    let mut bench = powered();
+    bench.gimbal([(-100, -80), (420, 390)]);
+    bench.run(0.1);
+    bench.key(Key::Char('4'));
+    assert!(bench.screen(80, 24).contains("gimbal                 3.90 deg"), "{}", bench.screen(80, 24));
+}
+
 fn descending() -> Bench {
     let mut bench = armed();
     bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;

@@ -19,7 +19,7 @@ const GAUGE_COLUMNS: u16 = 27;
 /// Columns of the numbers.
 const NUMBER_COLUMNS: u16 = 28;
 /// Rows of the numbers, their title included.
-const NUMBER_ROWS: u16 = 16;
+const NUMBER_ROWS: u16 = 18;
 
 /// Gauge on the left, numbers in the middle, fins and side view on the right.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -68,10 +68,14 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
     lines.push(chute(descent, theme, now));
+    let attitude = model.vehicle.attitude;
+    let tilt = attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "horizontal", of_motion(motion.map(|m| m.value.horizontal_m_s())), 1, "m/s", now));
+    lines.push(row(theme, "distance", of_motion(motion.map(|m| m.value.distance_m())), 1, "m", now));
+    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
     lines.push(row(theme, "wind", wind_speed(descent), 1, "m/s", now));
     lines.push(row(theme, "wind from", wind_from(descent), 0, "deg", now));
     lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
-    lines.push(row(theme, "thrust x", of(|d| d.thrust_scale), 3, "", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
     lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
     lines

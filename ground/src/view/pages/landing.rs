@@ -9,6 +9,7 @@ use ratatui::text::{Line, Span};
 use super::titled;
 use crate::model::Model;
 use crate::model::command::CommandKind;
+use crate::model::motion::BodySpeed;
 use crate::model::vehicle::Sample;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{Role, Theme};
@@ -130,27 +131,27 @@ fn value(
 
 fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let motion = model.vehicle.best_motion();
-    let altitude =
-        motion.map(|motion| Sample { value: motion.value.altitude_m, received_at: motion.received_at });
-    let climb =
-        motion.map(|motion| Sample { value: motion.value.climb_m_s, received_at: motion.received_at });
+    let altitude = motion.map(|motion| motion.map(|m| m.altitude_m));
+    let climb = motion.map(|motion| motion.map(|m| m.climb_m_s));
     let mut spans = value(theme, "alt", altitude, 1, now);
     spans.extend(value(theme, "vz", climb, 1, now));
     Line::from(spans)
 }
 
 fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let body = model.vehicle.body_speed();
-    let attitude = model.vehicle.attitude;
-    let u = body.map(|body| Sample { value: body.value.u_m_s, received_at: body.received_at });
-    let w = body.map(|body| Sample { value: body.value.w_m_s, received_at: body.received_at });
-    let pitch = attitude.map(|attitude| Sample {
-        value: attitude.value.pitch_rad.to_degrees(),
-        received_at: attitude.received_at,
-    });
-    let mut spans = value(theme, "pitch", pitch, 1, now);
-    spans.extend(value(theme, "u", u, 1, now));
-    spans.extend(value(theme, "w", w, 2, now));
+    let vehicle = &model.vehicle;
+    let (body, attitude) = (vehicle.body_speed(), vehicle.attitude);
+    let axial = body.map(|body| body.map(|b| b.u_m_s));
+    let mut spans;
+    if vehicle.in_space {
+        spans = value(theme, "tilt", attitude.map(|a| a.map(|a| a.tilt_rad.to_degrees())), 1, now);
+        spans.extend(value(theme, "u", axial, 1, now));
+        spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
+    } else {
+        spans = value(theme, "pitch", attitude.map(|a| a.map(|a| a.pitch_rad.to_degrees())), 1, now);
+        spans.extend(value(theme, "u", axial, 1, now));
+        spans.extend(value(theme, "w", body.map(|body| body.map(|b| b.w_m_s)), 2, now));
+    }
     Line::from(spans)
 }
 

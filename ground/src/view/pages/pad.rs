@@ -115,9 +115,9 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_ABORT_LATCH => yes_no(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, "latched", "free"),
         TdCheck::TD_CHECK_PIN => yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"),
         TdCheck::TD_CHECK_TILT => number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"),
-        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.pitch_rate_rad_s.to_degrees()), 1, "deg/s"),
+        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"),
         TdCheck::TD_CHECK_SPEED => {
-            let speed = vehicle.motion.map(|m| libm::hypot(m.value.vx_m_s, m.value.climb_m_s));
+            let speed = vehicle.motion.map(|m| m.value.speed_m_s());
             number(speed, 2, "m/s")
         }
         TdCheck::TD_CHECK_FINS => {

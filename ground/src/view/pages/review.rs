@@ -73,8 +73,9 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     vec![
         row("altitude", most.altitude_m, 2, "m"),
         row("descent speed", most.descent_m_s, 2, "m/s"),
+        row("distance", most.distance_m, 1, "m"),
         row("tilt", most.tilt_rad.map(f64::to_degrees), 2, "deg"),
-        row("pitch rate", most.pitch_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
+        row("turn rate", most.turn_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
         row("gimbal", most.gimbal_rad.map(f64::to_degrees), 2, "deg"),
         row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
         row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
