@@ -3,6 +3,7 @@
 pub mod alarm;
 pub mod chord;
 pub mod command;
+mod course;
 pub mod dialog;
 pub mod events;
 pub mod history;
@@ -14,6 +15,7 @@ pub mod parameters;
 pub mod reckoning;
 pub mod telemetry;
 pub mod too_late;
+pub mod trend;
 pub mod vehicle;
 pub mod words;
 

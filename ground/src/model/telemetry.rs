@@ -31,6 +31,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             let motion = Motion::of(data);
             vehicle.in_space |= motion.leaves_the_plane();
             vehicle.motion = Some(Sample::new(motion, now));
+            let phase = vehicle.phase().map(|phase| phase.value);
+            vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
                 vehicle.extend_flown(&motion);
             }

@@ -8,6 +8,7 @@ use protocol::dialect::{
 };
 
 use super::motion::{Attitude, BodySpeed, Motion};
+use super::trend::Trend;
 use crate::limits::Touchdown;
 
 /// A value older than this is marked as stale.
@@ -128,6 +129,8 @@ pub struct Vehicle {
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: the vehicle's own arming checks pass.
     pub ready_to_arm: Option<Sample<bool>>,
+    /// How its velocity changed of late.
+    pub trend: Trend,
     /// Where it flew: x and altitude, m.
     pub flown: Vec<(f64, f64)>,
     /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.

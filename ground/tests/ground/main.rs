@@ -5,6 +5,7 @@ mod auto;
 mod bench;
 mod daemon;
 mod disarm;
+mod flown;
 mod hand;
 mod ladder;
 mod links;
