@@ -10,7 +10,7 @@ use protocol::dialect::{TdInterlock, TdPhase};
 use super::motion::{Motion, NorthEastUp};
 use super::reckoning::By;
 use super::trend::Change;
-use super::vehicle::Vehicle;
+use super::vehicle::{Vehicle, is_burning};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -66,11 +66,6 @@ struct Way {
     place: NorthEastUp,
     landed_after_s: Option<f64>,
     burning_s: f64,
-}
-
-/// Whether the landing motor burns or is about to.
-pub(super) fn is_burning(phase: TdPhase) -> bool {
-    matches!(phase, TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED)
 }
 
 impl Course {

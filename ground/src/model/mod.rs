@@ -6,6 +6,7 @@ pub mod command;
 mod course;
 pub mod dialog;
 pub mod events;
+pub mod flown;
 pub mod history;
 pub mod link;
 pub mod motion;

@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use protocol::dialect::{TdChute, TdPhase};
 
-use super::course::{Course, Expected, is_burning};
-use super::vehicle::Vehicle;
+use super::course::{Course, Expected};
+use super::vehicle::{Vehicle, is_burning};
 
 /// How wrong the last position may be, m: a satellite receiver's usual error.
 const POSITION_ERROR_M: f64 = 1.5;

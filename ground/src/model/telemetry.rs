@@ -8,7 +8,7 @@ use protocol::dialect::{
 };
 
 use super::motion::{Attitude, Motion};
-use super::vehicle::{Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict};
+use super::vehicle::{Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning};
 use crate::limits::Touchdown;
 
 /// The vehicle's clock may jump back this far by a slow link beside a fast one; more is a reboot.
@@ -34,7 +34,10 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             let phase = vehicle.phase().map(|phase| phase.value);
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
-                vehicle.extend_flown(&motion);
+                vehicle.flown.extend(&motion);
+            }
+            if phase.is_some_and(is_burning) {
+                vehicle.burn.extend(&motion);
             }
         }
         MavMessage::VFR_HUD(data) => {

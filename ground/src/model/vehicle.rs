@@ -7,16 +7,13 @@ use protocol::dialect::{
     TdPhase,
 };
 
+use super::flown::Flown;
 use super::motion::{Attitude, BodySpeed, Motion};
 use super::trend::Trend;
 use crate::limits::Touchdown;
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
-/// Points of the flown path kept.
-const FLOWN_MAX: usize = 512;
-/// Positions beyond this are no positions.
-const POSITION_MAX_M: f64 = 1e5;
 
 /// A value and when it was received.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,8 +128,10 @@ pub struct Vehicle {
     pub ready_to_arm: Option<Sample<bool>>,
     /// How its velocity changed of late.
     pub trend: Trend,
-    /// Where it flew: x and altitude, m.
-    pub flown: Vec<(f64, f64)>,
+    /// Where it flew.
+    pub flown: Flown,
+    /// The part of it under the landing motor's thrust, from the command to light it on.
+    pub burn: Flown,
     /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
     pub in_space: bool,
     /// The vehicle's clock, ms since its boot.
@@ -193,21 +192,10 @@ impl Vehicle {
         Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
     }
 
-    /// Notes where it is; thins the path out when it grows too long.
-    pub(crate) fn extend_flown(&mut self, motion: &Motion) {
-        let point = (motion.x_m, motion.altitude_m);
-        let is_position = |value: f64| value.abs() < POSITION_MAX_M;
-        if !is_position(point.0) || !is_position(point.1) || self.flown.last() == Some(&point) {
-            return;
-        }
-        if self.flown.len() >= FLOWN_MAX {
-            let mut keep = false;
-            self.flown.retain(|_| {
-                keep = !keep;
-                keep
-            });
-        }
-        self.flown.push(point);
+    /// The plan's path where it is one of this moment: under thrust, and of the rehearsal on the pad.
+    pub fn planned(&self) -> &[(f64, f64)] {
+        let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
+        self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
     }
 }
 
@@ -215,6 +203,11 @@ impl Vehicle {
 pub fn is_flight(phase: TdPhase) -> bool {
     (TdPhase::TD_PHASE_BOOST as u32..=TdPhase::TD_PHASE_POWERED as u32).contains(&(phase as u32))
         || phase == TdPhase::TD_PHASE_CHUTE
+}
+
+/// Whether the landing motor burns or is about to.
+pub fn is_burning(phase: TdPhase) -> bool {
+    matches!(phase, TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED)
 }
 
 /// On the pad.

@@ -243,12 +243,7 @@ impl Bench {
     }
 
     pub(crate) fn actuators(&mut self, gimbal_cdeg: i16) {
-        let time_boot_ms = self.boot_ms();
-        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
-            time_boot_ms,
-            commanded: [9000; 4],
-            measured: [9000, 8990, 9000, 8400],
-        }));
+        self.actuated_fins();
         self.gimbal([(gimbal_cdeg, gimbal_cdeg / 2), (0, 0)]);
     }
 
@@ -260,6 +255,16 @@ impl Bench {
             pitch_measured: pitch.1,
             yaw_commanded: yaw.0,
             yaw_measured: yaw.1,
+        }));
+    }
+
+    /// Every fin fully open.
+    pub(crate) fn actuated_fins(&mut self) {
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+            time_boot_ms,
+            commanded: [9000; 4],
+            measured: [9000, 8990, 9000, 8400],
         }));
     }
 
@@ -294,16 +299,28 @@ impl Bench {
             q_rad_s: -0.008,
             limits_violated: violated,
         }));
+        let points: Vec<(f64, f64)> =
+            (0..12).rev().map(|k| (-1.4 + 0.1 * f64::from(k), 0.6 * f64::from(k))).collect();
+        self.path(&points);
+    }
+
+    /// A plan that lands, along these points, north and up.
+    pub(crate) fn plan_along(&mut self, points: &[(f64, f64)]) {
+        self.plan(TdLimit::empty());
+        self.path(points);
+    }
+
+    fn path(&mut self, points: &[(f64, f64)]) {
         let (mut x, mut altitude) = ([0; 12], [0; 12]);
-        for k in 0..12_i16 {
-            x[usize::from(11_u8) - usize::from(k.unsigned_abs())] = -140 + 10 * k;
-            altitude[usize::from(11_u8) - usize::from(k.unsigned_abs())] = 60 * k;
+        for (place, (north, up)) in points.iter().enumerate() {
+            x[place] = (100.0 * north).round() as i16;
+            altitude[place] = (100.0 * up).round() as i16;
         }
         self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-            time_boot_ms,
+            time_boot_ms: self.boot_ms(),
             x,
             altitude,
-            count: 12,
+            count: points.len() as u8,
         }));
     }
 
@@ -328,17 +345,26 @@ impl Bench {
         }));
     }
 
-    /// What counts as a landing for this vehicle.
+    /// What counts as a landing for this vehicle: Table 2 of the landing paper.
     pub(crate) fn limits(&mut self) {
+        self.touchdown_limits([20.0, 5.0, 0.4, 0.1, 2.0, 20.0]);
+    }
+
+    /// What counts as a landing for mk2: what its legs take, inside its fence.
+    pub(crate) fn limits_of_legs(&mut self) {
+        self.touchdown_limits([120.0, 10.0, 1.0, 0.7, 30.0, 7.0]);
+    }
+
+    fn touchdown_limits(&mut self, [x_m, pitch_deg, u_m_s, w_m_s, q_deg_s, gimbal_deg]: [f32; 6]) {
         self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
-            x_m: 20.0,
+            x_m,
             altitude_min_m: 0.0,
             altitude_max_m: 0.2,
-            pitch_error_rad: 5.0_f32.to_radians(),
-            u_m_s: 0.4,
-            w_m_s: 0.1,
-            q_rad_s: 2.0_f32.to_radians(),
-            gimbal_limit_rad: 20.0_f32.to_radians(),
+            pitch_error_rad: pitch_deg.to_radians(),
+            u_m_s,
+            w_m_s,
+            q_rad_s: q_deg_s.to_radians(),
+            gimbal_limit_rad: gimbal_deg.to_radians(),
         }));
     }
 

@@ -335,3 +335,65 @@ fn the_top_lines_keep_their_place() {
         assert_eq!(top(&bench), before, "after {key:?}");
     }
 }
+
+/// A flight in space, at its burn: from 300 m down, and from ignition on.
+fn burning_in_space() -> Bench {
+    let mut bench = armed();
+    bench.limits_of_legs();
+    let mut fall = |phase, heights: std::ops::Range<u16>, lean: (f64, f64)| {
+        bench.phase = phase;
+        bench.run(0.2);
+        for step in heights.rev() {
+            let height = f32::from(step) * 4.0;
+            bench.state_in_space([height * 0.3, -height * 0.2, height], [-3.0, 2.0, -20.0], lean);
+            bench.run(0.1);
+        }
+    };
+    fall(TdPhase::TD_PHASE_AERO_DESCENT, 18..75, (120.0, 6.0));
+    fall(TdPhase::TD_PHASE_IGNITION, 17..18, (120.0, 6.0));
+    fall(TdPhase::TD_PHASE_POWERED, 7..17, (300.0, 28.0));
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.countdown_ms = -2_700;
+    bench.run(0.2);
+    bench.state_in_space([8.0, -5.5, 27.5], [-3.0, 2.0, -13.0], (300.0, 28.0));
+    bench.plan_along(&[
+        (8.0, 27.0),
+        (6.5, 20.0),
+        (5.0, 14.0),
+        (3.5, 8.5),
+        (2.5, 4.0),
+        (1.8, 1.5),
+        (1.4, 0.0),
+    ]);
+    bench.gimbal([(-310, -250), (420, 390)]);
+    bench.actuated_fins();
+    bench
+}
+
+/// From ignition on the side view shows the burn alone, at its own scale; the descent's is the whole.
+#[test]
+fn the_side_view_of_a_landing_begins_with_its_burn() {
+    let mut bench = burning_in_space();
+    assert!(bench.screen(80, 24).contains("73 m up"), "{}", bench.screen(80, 24));
+    assert!(bench.screen(80, 24).contains("limit ±120 m"), "{}", bench.screen(80, 24));
+    bench.key(Key::Char('2'));
+    assert!(bench.screen(80, 24).contains("321 m up"), "{}", bench.screen(80, 24));
+}
+
+/// Command and measurement of both planes, where there are two.
+#[test]
+fn both_planes_of_a_gimbal_in_space_are_shown() {
+    let bench = burning_in_space();
+    let screen = bench.screen(80, 24);
+    assert!(
+        screen.contains("pitch o  -3.1 #  -2.5 deg") && screen.contains("yaw   o   4.2 #   3.9 deg"),
+        "{screen}"
+    );
+    let small = bench.screen(40, 24);
+    assert!(small.contains("yaw   o   4.2 #   3.9 deg"), "{small}");
+}
+
+#[test]
+fn regress_powered_in_space() {
+    snapshot("powered_in_space", &burning_in_space());
+}

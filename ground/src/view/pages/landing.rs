@@ -31,9 +31,13 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let [left, right] =
         below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
     draw_left(model, theme, now, frame, left);
-    let title = if lost::is_lost(model, now) { "Side view: PREDICTION +" } else { "Side view: flown, plan" };
+    let title = match (lost::is_lost(model, now), model.vehicle.in_space) {
+        (true, _) => "Side view: PREDICTION +",
+        (false, true) => "From east: flown, plan",
+        (false, false) => "Side view: flown, plan",
+    };
     let inside = titled(title, theme, frame, right);
-    side::draw(model, theme, now, frame, inside);
+    side::draw(model, side::Part::Burn, theme, now, frame, inside);
 }
 
 fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -104,7 +108,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     }));
     lines.push(verdict);
     lines.extend(controller::rows(model, theme, now).into_iter().take(2));
-    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
+    // In the plane command and actual, in space either plane's.
+    let gimbal = actuators::gimbal_rows(model, theme, now).into_iter();
+    lines.extend(gimbal.step_by(if model.vehicle.in_space { 2 } else { 1 }).take(2));
     lines.extend(actuators::fin_rows(model, theme, now));
     lines.push(happenings::link(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
