@@ -38,8 +38,8 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     draw_lines(frame, below, &[happenings::link(model, theme, now, usize::from(below.width))]);
     let [fin_area, picture] =
         right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
-    let inside = titled("Fins from above", theme, frame, fin_area);
-    draw_lines(frame, inside, &fins::lines(model, theme, now));
+    let inside = titled(&fins::title(model), theme, frame, fin_area);
+    fins::draw(model, theme, now, frame, inside);
     let inside =
         titled(if model.vehicle.in_space { "From the east" } else { "Side view" }, theme, frame, picture);
     side::draw(model, side::Part::Whole, theme, now, frame, inside);
