@@ -18,8 +18,9 @@ use crate::model::Model;
 use crate::model::motion::{Attitude, Motion};
 use crate::model::vehicle::Deflection;
 
-/// Rows of the picture.
+/// Rows and columns of the picture: odd, so that its middle is one.
 pub const ROWS: u16 = 9;
+const COLUMNS: u16 = 25;
 /// A fin further from its command than this is marked.
 const APART_DEG: f64 = 3.0;
 /// Headings of the fins 1 to 4 of a vehicle that stands unrolled: each 30 degrees off the east-west line (landing paper,
@@ -49,39 +50,42 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         draw_lines(frame, area, &[TextLine::styled(" no data", theme.style(Role::Label))]);
         return;
     };
-    if area.width < 3 || area.height < 3 {
+    if area.width < COLUMNS || area.height < ROWS {
         return;
     }
+    let area = Rect { x: area.x + (area.width - COLUMNS) / 2, width: COLUMNS, height: ROWS, ..area };
     let (mark, role) = age_mark(&fins, now);
     let roll_rad = model.vehicle.attitude.map_or(0.0, |attitude| roll_rad(&attitude.value));
-    let (across, up) = (f64::from(area.width - 1) / 4.0, f64::from(area.height - 1) / 2.0);
+    // In rows; a column is half as wide.
+    let (across, up) = (f64::from(COLUMNS - 1) / 4.0, f64::from(ROWS - 1) / 2.0);
     let colour = |colour| if theme.colour { colour } else { Color::Reset };
     let text = |words: String, role: Role| TextLine::styled(words, theme.style(role));
-    let canvas =
-        Canvas::default().marker(Marker::Braille).x_bounds([-across, across]).y_bounds([-up, up]).paint(
-            |context| {
-                context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: colour(Color::Reset) });
-                for ((number, stand_deg), fin) in (1..).zip(STAND_DEG).zip(&fins.value) {
-                    let (east, north) = libm::sincos(stand_deg.to_radians() + roll_rad);
-                    arm(context, (east, north), fin, colour(Color::Cyan), colour(Color::DarkGray));
-                    let apart = (fin.commanded_rad - fin.measured_rad).abs().to_degrees() > APART_DEG;
-                    let degrees = fixed(fin.measured_rad.to_degrees(), 0);
-                    let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
-                    // A label leads outwards; a column is half a row.
-                    let leads_left = if east < 0.0 { 0.5 * words.len() as f64 - 0.5 } else { 0.0 };
-                    let role = if apart { Role::Caution } else { role };
-                    context.print(column(LABEL * east - leads_left), row(LABEL * north), text(words, role));
-                }
-                if model.vehicle.attitude.is_some() {
-                    context.print(0.0, up, text("N".to_owned(), Role::Title));
-                }
-                let motion = model.vehicle.motion;
-                if let Some((east, north)) = motion.and_then(|motion| to_pad(&motion.value)) {
-                    let (x, y) = on_border((east, north), (across, up));
-                    context.print(column(x), row(y), text("P".to_owned(), Role::Title));
-                }
-            },
-        );
+    let canvas = Canvas::default()
+        .marker(Marker::Braille)
+        .x_bounds([-across, across])
+        .y_bounds([-up, up])
+        .paint(|context| {
+            context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: colour(Color::Reset) });
+            for ((number, stand_deg), fin) in (1..).zip(STAND_DEG).zip(&fins.value) {
+                let (east, north) = libm::sincos(stand_deg.to_radians() + roll_rad);
+                arm(context, (east, north), fin, colour(Color::Cyan), colour(Color::DarkGray));
+                let apart = (fin.commanded_rad - fin.measured_rad).abs().to_degrees() > APART_DEG;
+                let degrees = fixed(fin.measured_rad.to_degrees(), 0);
+                let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
+                // A label leads outwards; a column is half a row.
+                let leads_left = if east < 0.0 { 0.5 * words.len() as f64 - 0.5 } else { 0.0 };
+                let role = if apart { Role::Caution } else { role };
+                context.print(column(LABEL * east - leads_left), (LABEL * north).round(), text(words, role));
+            }
+            if model.vehicle.attitude.is_some() {
+                context.print(0.0, up, text("N".to_owned(), Role::Title));
+            }
+            let motion = model.vehicle.motion;
+            if let Some((east, north)) = motion.and_then(|motion| to_pad(&motion.value)) {
+                let (x, y) = on_border((east, north), (across, up));
+                context.print(column(x), y.round(), text("P".to_owned(), Role::Title));
+            }
+        });
     frame.render_widget(canvas, area);
 }
 
@@ -125,14 +129,9 @@ fn on_border((east, north): (f64, f64), (across, up): (f64, f64)) -> (f64, f64) 
     (if on_north { libm::copysign(1.0, x) } else { x }, y)
 }
 
-/// The place of a column, half a row wide, and a hair more: the canvas rounds towards the left.
+/// The place of the nearest column: half a row wide.
 fn column(x: f64) -> f64 {
-    (2.0 * x).round() / 2.0 + 1e-6
-}
-
-/// The place of a row, and a hair less: the canvas rounds towards the top.
-fn row(y: f64) -> f64 {
-    y.round() - 1e-6
+    (2.0 * x).round() / 2.0
 }
 
 #[cfg(test)]

@@ -228,6 +228,24 @@ fn regress_descent() {
     snapshot("descent", &descending());
 }
 
+/// North is up; the pad is marked where it lies, at every bearing, whatever else is drawn there.
+#[test]
+fn the_way_to_the_pad_is_on_the_picture_at_every_bearing() {
+    let mut bench = descending();
+    for bearing_deg in (0..360).step_by(15) {
+        let (east, north) = libm::sincos(f64::from(bearing_deg).to_radians());
+        let (north, east) = ((-40.0 * north) as f32, (-40.0 * east) as f32);
+        bench.state_in_space([north, east, 120.0], [0.0, 0.0, -21.5], (0.0, 3.0));
+        for (columns, rows) in [(80, 24), (100, 30), (120, 40), (133, 50)] {
+            let screen = bench.screen(columns, rows);
+            let picture =
+                screen.lines().skip(4).take(9).map(|line| line.chars().skip(55).collect::<String>());
+            let marks: usize = picture.map(|line| line.matches(['P', 'N']).count()).sum();
+            assert_eq!(marks, 2, "{bearing_deg} deg\n{screen}");
+        }
+    }
+}
+
 #[test]
 fn regress_descent_without_its_data() {
     let mut bench = armed();
