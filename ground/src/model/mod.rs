@@ -8,6 +8,7 @@ pub mod dialog;
 pub mod events;
 pub mod flown;
 pub mod history;
+pub mod judgement;
 pub mod link;
 pub mod motion;
 pub mod outcome;

@@ -24,6 +24,7 @@ pub mod side;
 pub mod theme;
 pub mod top;
 pub mod touchdown;
+pub mod verdict;
 pub mod wide;
 
 use std::time::Duration;

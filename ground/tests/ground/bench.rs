@@ -369,15 +369,21 @@ impl Bench {
     }
 
     pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
+        self.contact([-1.428, 1.554, if landed { -0.058 } else { -1.2 }, 0.029, -0.0078], landed, violated);
+    }
+
+    /// The figures of a contact: distance, pitch, speeds, rate.
+    pub(crate) fn contact(&mut self, figures: [f32; 5], landed: bool, limits_violated: TdLimit) {
+        let [x_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = figures;
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             time_boot_ms: self.boot_ms(),
-            x_m: -1.428,
+            x_m,
             altitude_m: 0.0,
-            pitch_rad: 1.554,
-            u_m_s: if landed { -0.058 } else { -1.2 },
-            w_m_s: 0.029,
-            q_rad_s: -0.0078,
-            limits_violated: violated,
+            pitch_rad,
+            u_m_s,
+            w_m_s,
+            q_rad_s,
+            limits_violated,
             landed: u8::from(landed),
         }));
     }

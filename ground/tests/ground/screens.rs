@@ -150,6 +150,21 @@ fn regress_not_landed() {
     snapshot("not_landed", &bench);
 }
 
+/// A vehicle that judges by its legs: Table 2 is computed here, said to be, and where the figures do not tell it says so.
+#[test]
+fn regress_landed_on_the_legs() {
+    let mut bench = burning_in_space();
+    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    bench.contact([6.2, 1.545, -0.52, 0.04, 0.07], true, TdLimit::empty());
+    bench.run(0.5);
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains(" LANDED inside every limit (vehicle: legs)  Table 2* OUTSIDE"), "{screen}");
+    assert!(screen.contains("u       -0.520 m/s    ok ±1      NO ±0.4"), "{screen}");
+    assert!(screen.contains("q        4.011 deg/s  ok ±30     ?  ±2"), "{screen}");
+    snapshot("landed_on_the_legs", &bench);
+}
+
 #[test]
 fn regress_link_lost() {
     let mut bench = powered();
