@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use ground::model::Model;
+use ground::model::judgement::{Held, LEGS, Standard, TABLE_2, together};
 use ground::model::reckoning::{By, Reckoned, reckon};
 use ground::update::{Msg, update};
 use onboard_sim::craft::{Craft as _, LogState, Request};
@@ -17,7 +18,12 @@ use crate::bench::settings;
 const LONGEST_S: f64 = 60.0;
 
 /// Every frame of a flight with its time, from power-up until it is over.
-pub(crate) fn mk2(number: u64) -> Vec<(Duration, Frame)> {
+fn frames_of(number: u64) -> Vec<(Duration, Frame)> {
+    mk2(number).0
+}
+
+/// The same, and whether Table 2 was kept, by the simulator's own judgement.
+fn mk2(number: u64) -> (Vec<(Duration, Frame)>, bool) {
     let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").expect("a profile of its own") else {
         panic!("from apogee")
     };
@@ -43,11 +49,12 @@ pub(crate) fn mk2(number: u64) -> Vec<(Duration, Frame)> {
         heard.extend(endpoint.poll(&rocket).into_iter().map(|frame| (now, frame)));
     }
     assert!(rocket.is_over(), "still {:?}", rocket.phase());
-    heard
+    let strict = rocket.judged_by_table_2().expect("it came down").landed;
+    (heard, strict)
 }
 
 /// A ground that has heard the flight up to a time.
-pub(crate) fn heard_until(flight: &[(Duration, Frame)], end: Duration) -> Model {
+fn heard_until(flight: &[(Duration, Frame)], end: Duration) -> Model {
     let mut model = Model::new(settings(false, true));
     let mut tick = Duration::ZERO;
     for (at, frame) in flight.iter().take_while(|(at, _)| *at <= end) {
@@ -75,7 +82,7 @@ fn the_true_path_stays_inside_the_circle_as_often_as_it_claims() {
     let half = Duration::from_millis(500);
     let (mut inside, mut all, mut by_plan, mut useful) = (0_u32, 0_u32, 0_u32, 0_u32);
     for number in 0..5 {
-        let flight = mk2(number);
+        let flight = frames_of(number);
         let halves = u32::try_from(flight.last().expect("it speaks").0.as_millis() / 500).unwrap();
         let heard: Vec<(Duration, Model)> =
             (0..=halves).map(|k| (half * k, heard_until(&flight, half * k))).collect();
@@ -94,4 +101,22 @@ fn the_true_path_stays_inside_the_circle_as_often_as_it_claims() {
     assert!(all > 1_000 && by_plan > 100, "{all} predictions, {by_plan} by a plan");
     assert!(20 * inside >= 19 * all, "{inside} of {all}");
     assert!(2 * useful > all, "{useful} of {all}");
+}
+
+/// What is computed of Table 2 never contradicts the judgement that knows everything.
+#[test]
+fn the_computed_verdict_never_contradicts_the_simulators() {
+    let mut decided = 0;
+    for number in 0..8 {
+        let (flight, strict) = mk2(number);
+        let heard = heard_until(&flight, flight.last().expect("it speaks").0);
+        let verdict = heard.vehicle.verdict.expect("it was judged").value;
+        let limits = heard.vehicle.limits.as_ref().expect("it says its limits");
+        assert_eq!(Standard::of(limits), Some(LEGS), "mk2 judges by its legs");
+        let computed = together(&TABLE_2.judge(&verdict.touchdown, heard.vehicle.in_space));
+        println!("flight {number}: Table 2 {strict}, computed {computed:?}");
+        assert_ne!(computed, if strict { Held::Broken } else { Held::Kept }, "flight {number}");
+        decided += u32::from(computed != Held::Unknown);
+    }
+    assert!(decided > 0, "nothing was decided");
 }
