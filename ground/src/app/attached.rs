@@ -47,7 +47,10 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     while let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
         match told {
-            Told::Live => break,
+            Told::Live => {
+                model.history_ends();
+                break;
+            }
             told => take(&mut model, told, at, watch)?,
         }
     }
@@ -85,6 +88,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                     take_live(&mut model, told, at)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
+                    // Cut off while it told the past, it tells no more of it.
+                    model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
                     update(&mut model, gone, times.theirs(clock.now()))
                 }
@@ -174,7 +179,10 @@ fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
             model.settings = settings(&hello, model.settings.role == Role::Watching);
             Vec::new()
         }
-        Told::Live => Vec::new(),
+        Told::Live => {
+            model.history_ends();
+            Vec::new()
+        }
         Told::Msg(msg) => {
             let actions = update(model, msg, at);
             // The station asks for what the crew asks; a screen only rings.
