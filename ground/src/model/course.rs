@@ -5,7 +5,7 @@
 //! freely. From the height on at which the motor was to be lit, the fall is braked so that it ends on the ground: that
 //! is what the burn is for.
 
-use protocol::dialect::{TdInterlock, TdPhase};
+use protocol::dialect::TdPhase;
 
 use super::motion::{Motion, NorthEastUp};
 use super::reckoning::By;
@@ -84,7 +84,7 @@ impl Course {
             _ if is_burning(phase) => Pull::Brake,
             _ => {
                 let chosen_m = descent.map(|d| f64::from(d.chosen_height_m));
-                let burn_from_m = chosen_m.filter(|height_m| *height_m > 0.0 && will_burn(vehicle, phase));
+                let burn_from_m = chosen_m.filter(|height_m| *height_m > 0.0 && vehicle.may_light());
                 Pull::Air {
                     drag_per_m: change.and_then(|change| drag_per_m(&change, &wind_m_s)),
                     burn_from_m,
@@ -161,14 +161,6 @@ impl Course {
             }
         }
     }
-}
-
-/// Whether the motor is to be lit further down: nothing forbids it.
-fn will_burn(vehicle: &Vehicle, phase: TdPhase) -> bool {
-    let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
-        | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
-        | TdInterlock::TD_INTERLOCK_NO_LIGHT;
-    phase != TdPhase::TD_PHASE_CHUTE && vehicle.interlocks().is_some_and(|locks| !locks.intersects(never))
 }
 
 /// The resistance that takes from gravity what the acceleration is short of it, 1/m; `None` where there is too little wind to

@@ -162,6 +162,15 @@ impl Vehicle {
         self.status.as_ref().map(|status| status.value.interlocks)
     }
 
+    /// Whether the landing motor can still be lit: nothing latched forbids it. Unknown counts as not.
+    pub fn may_light(&self) -> bool {
+        let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
+            | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
+            | TdInterlock::TD_INTERLOCK_NO_LIGHT;
+        let chute = self.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+        !chute && self.interlocks().is_some_and(|locks| !locks.intersects(never))
+    }
+
     /// Left the pad and not yet at rest.
     pub fn in_flight(&self) -> bool {
         self.phase().is_some_and(|phase| is_flight(phase.value))

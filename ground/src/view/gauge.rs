@@ -18,11 +18,13 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         return Vec::new();
     }
     let descent = model.vehicle.descent.as_ref();
+    // A motor that will not be lit has no band.
+    let to_light = descent.filter(|_| model.vehicle.may_light());
     let motion = model.vehicle.best_motion();
     let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
-    let band = descent
+    let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
-    let chosen = descent.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
+    let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
     let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
     let lost = reckon(&model.vehicle, now);
     let (height, mark, role) = match (lost, motion) {

@@ -18,6 +18,7 @@ pub mod flight;
 pub mod gauge;
 pub mod happenings;
 pub mod lost;
+pub mod next;
 pub mod number;
 pub mod pages;
 pub mod side;

@@ -63,8 +63,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(band_word(model, theme, now));
     lines.push(row(theme, "height", height, 1, "m", now));
     lines.push(row(theme, "vertical", speed, 1, "m/s", now));
-    lines.push(row(theme, "ignite in", of(|d| d.time_to_ignition_s), 1, "s", now));
-    lines.push(row(theme, "ignite at", of(|d| d.chosen_height_m), 1, "m", now));
+    let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
+    lines.push(row(theme, "ignite in", lights(of(|d| d.time_to_ignition_s)), 1, "s", now));
+    lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
     lines.push(row(theme, "band high", of(|d| d.band_high_m), 1, "m", now));
     lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
@@ -84,6 +85,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 
 /// Where the height stands against the band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
+        return Line::styled(" NO BURN: motor inhibited", theme.style(Role::Alarm));
+    }
     let Some(descent) = model.vehicle.descent.as_ref() else {
         return Line::styled(" ignition band: no data", theme.style(Role::Caution));
     };

@@ -8,7 +8,6 @@ use ratatui::text::{Line, Span};
 
 use super::titled;
 use crate::model::Model;
-use crate::model::command::CommandKind;
 use crate::model::motion::BodySpeed;
 use crate::model::vehicle::Sample;
 use crate::view::number::{STALE_MARK, fixed};
@@ -96,7 +95,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     // The newest event earns a line before anything else does.
     lines.extend(newest_event(model, theme));
     // An abort has its place above.
-    if let Some(track) = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort) {
+    if let Some(track) = top::open_command(model, now) {
         lines.push(top::facts_short(track, theme, now));
     }
     lines.push(attitude(model, theme, now));
