@@ -46,12 +46,10 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     // The history first: the first frame shows everything.
     while let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
-        match told {
-            Told::Live => {
-                model.history_ends();
-                break;
-            }
-            told => take(&mut model, told, at, watch)?,
+        let live = told == Told::Live;
+        take(&mut model, told, at, watch)?;
+        if live {
+            break;
         }
     }
     let mut screen = Screen::open(config)?;
@@ -166,7 +164,7 @@ fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Res
             );
             model.settings = settings(&hello, watch);
         }
-        Told::Live => {}
+        Told::Live => model.history_ends(),
         // What the station did then is done.
         Told::Msg(msg) => drop(update(model, msg, at)),
     }

@@ -16,18 +16,17 @@ const MAXIMA_COLUMNS: usize = 34;
 
 /// The word that decides, then limits and maxima, then the timeline.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let (head, limits, limit_columns) = match &model.vehicle.verdict {
-        Some(judged) => (
+    let (head, limits, limit_columns) = if let Some(judged) = &model.vehicle.verdict {
+        (
             verdict::words(model, &judged.value, theme, columns),
             verdict::table(model, &judged.value, theme, columns),
             verdict::table_columns(model, &judged.value),
-        ),
-        None => {
-            let (title, mut limits) = touchdown::panel(model, theme, now);
-            limits.insert(0, Line::styled(title, theme.style(Role::Title)));
-            let none = Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution));
-            (none, limits, PLAN_COLUMNS)
-        }
+        )
+    } else {
+        let (title, mut limits) = touchdown::panel(model, theme, now);
+        limits.insert(0, Line::styled(title, theme.style(Role::Title)));
+        let none = Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution));
+        (none, limits, PLAN_COLUMNS)
     };
     let mut lines = vec![head];
     let mut maxima = maxima(model, theme);
