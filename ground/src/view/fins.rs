@@ -12,7 +12,7 @@ use ratatui::text::Line as TextLine;
 use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
 use super::draw_lines;
-use super::number::{age_mark, fixed};
+use super::number::{STALE_MARK, age_mark, fixed};
 use super::theme::{Role, Theme};
 use crate::model::Model;
 use crate::model::motion::{Attitude, Motion};
@@ -36,10 +36,12 @@ const OUTLINE_DOTS: u32 = 5;
 const PAD_NEAR_M: f64 = 1.0;
 
 /// The title: what is up, and how far the pad is.
-pub fn title(model: &Model) -> String {
-    let distance_m = model.vehicle.motion.map(|motion| motion.value.distance_m());
-    match distance_m.filter(|distance_m| distance_m.is_finite()) {
-        Some(distance_m) => format!("Fins above, P pad {} m", fixed(distance_m, 0)),
+pub fn title(model: &Model, now: Duration) -> String {
+    match model.vehicle.motion.filter(|motion| motion.value.distance_m().is_finite()) {
+        Some(motion) => {
+            let mark = if motion.is_stale(now) { STALE_MARK } else { "" };
+            format!("Fins above, P pad {mark}{} m", fixed(motion.value.distance_m(), 0))
+        }
         None => "Fins from above".to_owned(),
     }
 }

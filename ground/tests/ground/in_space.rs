@@ -1,7 +1,7 @@
 //! A vehicle that flies in space, where the plane of north and up does not show everything.
 
 use ground::key::Key;
-use protocol::dialect::{TdAbortEffect, TdLimit, TdPhase};
+use protocol::dialect::{TdAbortEffect, TdChute, TdLimit, TdPhase};
 
 use crate::bench::Bench;
 use crate::screens::{armed, descending, powered, snapshot};
@@ -145,4 +145,27 @@ fn both_planes_of_a_gimbal_in_space_are_shown() {
 #[test]
 fn regress_powered_in_space() {
     snapshot("powered_in_space", &burning_in_space());
+}
+
+/// The link is lost in the descent, four seconds before the burn: the fall goes on as it was, then the burn is expected.
+#[test]
+fn regress_link_lost_in_the_descent() {
+    let mut bench = armed();
+    bench.limits_of_legs();
+    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    bench.run(0.2);
+    for tenth in 0..20_u8 {
+        let fallen = 38.0 * 0.1 * f32::from(tenth);
+        bench.state_in_space([30.0, 12.0, 282.0 - fallen], [-2.0, 1.0, -38.0], (200.0, 6.0));
+        bench.run(0.1);
+    }
+    bench.descent_with(209.8, -38.0, TdChute::TD_CHUTE_STOWED);
+    bench.speaks = false;
+    bench.run(4.0);
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("PREDICTED, not heard") && screen.contains("fall, then the burn"), "{screen}");
+    // 209.8 m less 4.1 s at 38 m/s, and a little of the burn: 58 m of it were left.
+    assert!(screen.contains("alt   ?   53.0 ±20.5 m"), "{screen}");
+    snapshot("link_lost_in_the_descent", &bench);
 }

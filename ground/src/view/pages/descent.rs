@@ -38,7 +38,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     draw_lines(frame, below, &[happenings::link(model, theme, now, usize::from(below.width))]);
     let [fin_area, picture] =
         right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
-    let inside = titled(&fins::title(model), theme, frame, fin_area);
+    let inside = titled(&fins::title(model, now), theme, frame, fin_area);
     fins::draw(model, theme, now, frame, inside);
     let inside =
         titled(if model.vehicle.in_space { "From the east" } else { "Side view" }, theme, frame, picture);
