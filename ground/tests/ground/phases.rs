@@ -173,3 +173,13 @@ fn regress_chute() {
     bench.run(0.1);
     snapshot("chute", &bench);
 }
+
+/// The vehicle checks for arming on the pad only: in flight the pad's screen claims nothing.
+#[test]
+fn in_flight_no_arming_check_is_shown_as_passed() {
+    let mut bench = powered();
+    bench.key(Key::Char('1'));
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("off the pad nothing is checked for arming"), "{screen}");
+    assert!(!screen.contains(" GO ") && screen.contains("[ ] every check passes"), "{screen}");
+}
