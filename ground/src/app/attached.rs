@@ -44,13 +44,11 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     let mut model = Model::new(settings(&Hello::default(), watch));
     let mut times = Times::default();
     // The history first: the first frame shows everything.
-    while let Some((told, at)) = link.told.recv().await {
+    let mut live = false;
+    while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
-        let live = told == Told::Live;
+        live = told == Told::Live;
         take(&mut model, told, at, watch)?;
-        if live {
-            break;
-        }
     }
     let mut screen = Screen::open(config)?;
     model.repeats_told = screen.tells_repeats();
