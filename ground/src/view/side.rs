@@ -1,10 +1,10 @@
-//! The side view, from the east: where it flew (line), where it will fly (dots), the pad and the limits of the touchdown; after the loss of the link where it
+//! The side view: where it flew (line), where it will fly (dots), the pad and the limits of the touchdown; after the loss of the link where it
 //! probably is (a cross) and how far from there it may be (a circle).
 
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
@@ -12,6 +12,7 @@ use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
 use super::number::shortest;
 use super::theme::Theme;
 use crate::model::Model;
+use crate::model::motion::NorthEastUp;
 use crate::model::reckoning::reckon;
 
 /// Braille dots in a cell.
@@ -21,6 +22,8 @@ const DOTS_UP: f64 = 4.0;
 const ALTITUDE_MIN_M: f64 = 5.0;
 /// Dots that a limit of the touchdown stands up from the ground.
 const LIMIT_DOTS: f64 = 5.0;
+/// Columns that a picture needs.
+const PICTURE_COLUMNS: u16 = 22;
 /// The pad's half width, m.
 const PAD_HALF_M: f64 = 1.0;
 
@@ -36,8 +39,46 @@ pub enum Part {
     Burn,
 }
 
+/// Where it is seen from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// North is right. The plan is told as it looks from here.
+    East,
+    /// East is right.
+    South,
+}
+
+impl From {
+    fn sees(self, [north_m, east_m, altitude_m]: NorthEastUp) -> (f64, f64) {
+        match self {
+            Self::East => (north_m, altitude_m),
+            Self::South => (east_m, altitude_m),
+        }
+    }
+}
+
+/// The pictures that an area has room for, with their titles: for a vehicle in space from the east and from the south, side
+/// by side, or from the east alone.
+pub fn pictures(model: &Model, area: Rect) -> Vec<(From, &'static str, Rect)> {
+    if !model.vehicle.in_space {
+        return vec![(From::East, "Side view", area)];
+    }
+    if area.width < 2 * PICTURE_COLUMNS {
+        return vec![(From::East, "From east", area)];
+    }
+    let [east, south] = area.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+    vec![(From::East, "From east", east), (From::South, "From south", south)]
+}
+
 /// Draws the picture; both axes have the same scale.
-pub fn draw(model: &Model, part: Part, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw(
+    model: &Model,
+    (part, from): (Part, From),
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
     if area.width < 8 || area.height < 3 {
         return;
     }
@@ -46,10 +87,11 @@ pub fn draw(model: &Model, part: Part, theme: Theme, now: Duration, frame: &mut 
         Part::Burn if !vehicle.burn.points().is_empty() => vehicle.burn.points(),
         _ => vehicle.flown.points(),
     };
-    let predicted = vehicle.planned();
-    let lost = reckon(vehicle, now);
-    let reckoned: Vec<(f64, f64)> = lost.iter().map(|at| (at.x_m, at.altitude_m)).collect();
-    let points: Vec<(f64, f64)> = [flown, predicted, &reckoned].concat();
+    let flown: Vec<(f64, f64)> = flown.iter().map(|point| from.sees(*point)).collect();
+    let predicted = if from == From::East { vehicle.planned() } else { &[] };
+    let lost = reckon(vehicle, now).map(|at| (from.sees([at.x_m, at.y_m, at.altitude_m]), at.error_m));
+    let reckoned: Vec<(f64, f64)> = lost.iter().map(|(at, _)| *at).collect();
+    let points: Vec<(f64, f64)> = [&flown, predicted, &reckoned].concat();
     let limit_m = vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m));
     let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
     let view = Bounds::around(&points, limit_m, area);
@@ -73,8 +115,7 @@ pub fn draw(model: &Model, part: Part, theme: Theme, now: Duration, frame: &mut 
                 let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
                 context.draw(&Line { x1, y1, x2, y2, color: colour(Color::Yellow) });
             }
-            if let Some(at) = lost {
-                let (x, y, radius) = (at.x_m, at.altitude_m, at.error_m);
+            if let Some(((x, y), radius)) = lost {
                 context.draw(&Circle { x, y, radius, color: colour(Color::Magenta) });
                 context.print(x, y, "+");
             }

@@ -142,9 +142,12 @@ fn both_planes_of_a_gimbal_in_space_are_shown() {
     assert!(small.contains("yaw   o   4.2 #   3.9 deg"), "{small}");
 }
 
+/// Where there is room it is seen from two sides: from the east with the plan, from the south what goes east.
 #[test]
 fn regress_powered_in_space() {
-    snapshot("powered_in_space", &burning_in_space());
+    let bench = burning_in_space();
+    snapshot("powered_in_space", &bench);
+    insta::assert_snapshot!("powered_in_space_120x40", bench.screen(120, 40));
 }
 
 /// The link is lost in the descent, four seconds before the burn: the fall goes on as it was, then the burn is expected.

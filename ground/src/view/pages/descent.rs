@@ -40,9 +40,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
     let inside = titled(&fins::title(model, now), theme, frame, fin_area);
     fins::draw(model, theme, now, frame, inside);
-    let inside =
-        titled(if model.vehicle.in_space { "From the east" } else { "Side view" }, theme, frame, picture);
-    side::draw(model, side::Part::Whole, theme, now, frame, inside);
+    for (from, title, area) in side::pictures(model, picture) {
+        let inside = titled(title, theme, frame, area);
+        side::draw(model, (side::Part::Whole, from), theme, now, frame, inside);
+    }
 }
 
 /// The numbers, the most important first.

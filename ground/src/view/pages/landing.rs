@@ -30,13 +30,15 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let [left, right] =
         below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
     draw_left(model, theme, now, frame, left);
-    let title = match (lost::is_lost(model, now), model.vehicle.in_space) {
-        (true, _) => "Side view: PREDICTION +",
-        (false, true) => "From east: flown, plan",
-        (false, false) => "Side view: flown, plan",
-    };
-    let inside = titled(title, theme, frame, right);
-    side::draw(model, side::Part::Burn, theme, now, frame, inside);
+    let shows = if lost::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
+    for (from, title, area) in side::pictures(model, right) {
+        let title = match from {
+            side::From::East => format!("{title}: {shows}"),
+            side::From::South => format!("{title}: flown"),
+        };
+        let inside = titled(&title, theme, frame, area);
+        side::draw(model, (side::Part::Burn, from), theme, now, frame, inside);
+    }
 }
 
 fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
