@@ -7,13 +7,11 @@
 
 use protocol::dialect::TdPhase;
 
-use super::motion::{Motion, NorthEastUp};
+use super::motion::{GRAVITY_M_S2, Motion, NorthEastUp};
 use super::reckoning::By;
 use super::trend::Change;
 use super::vehicle::{Vehicle, is_burning};
 
-/// Standard gravity, m/s2 (CGPM 1901).
-const GRAVITY_M_S2: f64 = 9.806_65;
 /// Slower than this through the air, its resistance cannot be told from noise, m/s.
 const DRAG_SEEN_M_S: f64 = 8.0;
 /// More resistance than an open parachute has is none: terminal speed 2 m/s, in 1/m.

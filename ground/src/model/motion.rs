@@ -8,6 +8,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
+/// Standard gravity, m/s2 (CGPM 1901).
+pub const GRAVITY_M_S2: f64 = 9.806_65;
+
 /// A direction or a velocity: north, east, up.
 pub type NorthEastUp = [f64; 3];
 

@@ -1,6 +1,6 @@
 //! Where the vehicle probably is once it is no longer heard: a prediction, and marked as one.
 //!
-//! Under thrust along the last plan. Otherwise as [`course`] has it, from what was last known: the last motion, the drag
+//! Under thrust along the last plan. Otherwise as `course` has it, from what was last known: the last motion, the drag
 //! that the last second's acceleration shows, the wind, the height at which the motor was to be lit.
 //!
 //! The circle is meant to hold the vehicle nineteen times out of twenty. It grows with the time that nothing was heard: a

@@ -8,10 +8,9 @@ use ratatui::text::{Line, Span};
 use super::number::{STALE_MARK, fixed};
 use super::theme::{Role, Theme};
 use crate::model::Model;
+use crate::model::motion::GRAVITY_M_S2;
 use crate::model::vehicle::Vehicle;
 
-/// Standard gravity, m/s2 (CGPM 1901).
-const GRAVITY_M_S2: f64 = 9.806_65;
 /// Slower than this it does not fall, m/s.
 const FALLS_M_S: f64 = 0.5;
 

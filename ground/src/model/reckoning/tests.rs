@@ -1,12 +1,11 @@
 use super::*;
 use crate::limits::Touchdown;
-use crate::model::motion::Motion;
+use crate::model::motion::{GRAVITY_M_S2, Motion};
 use crate::model::vehicle::{Heartbeat, Prediction, Sample};
 use proptest::prelude::*;
 use protocol::dialect::{TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdLimit};
 
 const SEEN: Duration = Duration::from_secs(100);
-const GRAVITY_M_S2: f64 = 9.806_65;
 
 fn after(vehicle: &Vehicle, seconds: f64) -> Reckoned {
     reckon(vehicle, SEEN + Duration::from_secs_f64(seconds)).unwrap()
