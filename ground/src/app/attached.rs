@@ -44,12 +44,11 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     let mut model = Model::new(settings(&Hello::default(), watch));
     let mut times = Times::default();
     // The history first: the first frame shows everything.
-    while let Some((told, at)) = link.told.recv().await {
+    let mut live = false;
+    while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
-        match told {
-            Told::Live => break,
-            told => take(&mut model, told, at, watch)?,
-        }
+        live = told == Told::Live;
+        take(&mut model, told, at, watch)?;
     }
     let mut screen = Screen::open(config)?;
     model.repeats_told = screen.tells_repeats();
@@ -85,6 +84,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                     take_live(&mut model, told, at)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
+                    // Cut off while it told the past, it tells no more of it.
+                    model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
                     update(&mut model, gone, times.theirs(clock.now()))
                 }
@@ -161,7 +162,7 @@ fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Res
             );
             model.settings = settings(&hello, watch);
         }
-        Told::Live => {}
+        Told::Live => model.history_ends(),
         // What the station did then is done.
         Told::Msg(msg) => drop(update(model, msg, at)),
     }
@@ -174,7 +175,10 @@ fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
             model.settings = settings(&hello, model.settings.role == Role::Watching);
             Vec::new()
         }
-        Told::Live => Vec::new(),
+        Told::Live => {
+            model.history_ends();
+            Vec::new()
+        }
         Told::Msg(msg) => {
             let actions = update(model, msg, at);
             // The station asks for what the crew asks; a screen only rings.

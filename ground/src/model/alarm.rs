@@ -51,24 +51,43 @@ pub struct Alarm {
     pub active: bool,
     /// A person has seen it.
     pub acknowledged: bool,
+    /// It was over before this screen was there: worth knowing, and nothing to ring for.
+    pub past: bool,
 }
 
 /// The alarms that hold or that nobody has acknowledged yet, oldest first.
 #[derive(Debug, Default)]
 pub struct Alarms {
     list: Vec<Alarm>,
+    in_history: bool,
     rung_at: Option<Duration>,
 }
 
 impl Alarms {
+    /// Of a screen that is told first what happened before it was there: nothing rings until that is over.
+    pub(crate) fn in_history() -> Self {
+        Self { in_history: true, ..Self::default() }
+    }
+
+    /// What comes from now on happens now. What is over by then is past; what still holds rings.
+    pub(crate) fn history_ends(&mut self) {
+        if std::mem::take(&mut self.in_history) {
+            for alarm in &mut self.list {
+                alarm.past = !alarm.active;
+            }
+            self.rung_at = None;
+        }
+    }
+
     /// Oldest first.
     pub fn list(&self) -> &[Alarm] {
         &self.list
     }
 
-    /// The newest that nobody has acknowledged; else the newest that holds.
+    /// The newest that nobody has acknowledged, those of the past last; else the newest that holds.
     pub fn foremost(&self) -> Option<&Alarm> {
-        self.list.iter().rfind(|alarm| !alarm.acknowledged).or_else(|| self.list.last())
+        let newest = |past: bool| self.list.iter().rfind(|alarm| !alarm.acknowledged && alarm.past == past);
+        newest(false).or_else(|| newest(true)).or_else(|| self.list.last())
     }
 
     /// How many nobody has acknowledged.
@@ -85,8 +104,11 @@ impl Alarms {
         for (kind, text) in conditions {
             if let Some(known) = self.list.iter_mut().find(|alarm| alarm.kind == kind) {
                 known.text = text;
+                // It is back.
+                known.past = false;
             } else {
-                let alarm = Alarm { kind, text, raised_at: now, active: true, acknowledged: false };
+                let alarm =
+                    Alarm { kind, text, raised_at: now, active: true, acknowledged: false, past: false };
                 self.list.push(alarm.clone());
                 raised.push(alarm);
             }
@@ -109,7 +131,8 @@ impl Alarms {
     /// Whether the bell is due; then it counts as rung.
     pub(crate) fn rings(&mut self, now: Duration, raised: bool) -> bool {
         let again = self.rung_at.is_none_or(|at| now.saturating_sub(at) >= RING_EVERY);
-        let rings = self.unacknowledged() > 0 && (raised || again);
+        let open = self.list.iter().any(|alarm| !alarm.acknowledged && !alarm.past);
+        let rings = open && !self.in_history && (raised || again);
         if rings {
             self.rung_at = Some(now);
         }
@@ -149,6 +172,32 @@ mod tests {
         assert!(alarms.list().is_empty());
         assert_eq!(alarms.watch(S(4), lost()).len(), 1);
         assert_eq!(alarms.unacknowledged(), 1);
+    }
+
+    /// A screen that comes late hears of what was, and rings for what is.
+    #[test]
+    fn what_was_over_before_the_screen_came_does_not_ring() {
+        let mut alarms = Alarms::in_history();
+        let down = (AlarmKind::LinkDown, "LINK DOWN".to_owned());
+        alarms.watch(S(1), [lost(), vec![down.clone()]].concat());
+        assert!(!alarms.rings(S(1), true));
+        alarms.watch(S(9), vec![down]);
+        assert!(!alarms.rings(S(9), false));
+        alarms.history_ends();
+        assert!(alarms.rings(S(10), false), "the link is still down");
+        assert_eq!(alarms.foremost().map(|alarm| alarm.kind), Some(AlarmKind::LinkDown));
+        alarms.watch(S(11), Vec::new());
+        assert!(alarms.rings(S(20), false), "nobody has seen it, and it was there when the screen came");
+        alarms.acknowledge();
+        assert!(alarms.list().is_empty());
+
+        let mut alarms = Alarms::in_history();
+        alarms.watch(S(1), lost());
+        alarms.watch(S(2), Vec::new());
+        alarms.history_ends();
+        assert!(alarms.list()[0].past && !alarms.rings(S(30), false));
+        assert!(alarms.watch(S(40), lost()).is_empty() && !alarms.list()[0].past);
+        assert!(alarms.rings(S(40), false), "it has come back");
     }
 
     #[test]

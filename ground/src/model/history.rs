@@ -18,9 +18,11 @@ pub struct Maxima {
     pub descent_m_s: Option<f64>,
     /// Tilt from the vertical, rad.
     pub tilt_rad: Option<f64>,
-    /// Pitch rate, rad/s, either way.
-    pub pitch_rate_rad_s: Option<f64>,
-    /// Gimbal angle measured, rad, either way.
+    /// Distance from the pad over the ground, m.
+    pub distance_m: Option<f64>,
+    /// How fast the nose turned, rad/s, whichever way.
+    pub turn_rate_rad_s: Option<f64>,
+    /// Gimbal angle measured, rad, either way, of the axis that went further.
     pub gimbal_rad: Option<f64>,
     /// Solve time, s.
     pub solve_time_s: Option<f64>,
@@ -55,13 +57,16 @@ impl History {
         if let Some(motion) = vehicle.best_motion().filter(|motion| !motion.is_stale(now)) {
             raise(&mut maxima.altitude_m, motion.value.altitude_m);
             raise(&mut maxima.descent_m_s, -motion.value.climb_m_s);
+            raise(&mut maxima.distance_m, motion.value.distance_m());
         }
         if let Some(attitude) = vehicle.attitude.filter(|attitude| !attitude.is_stale(now)) {
             raise(&mut maxima.tilt_rad, attitude.value.tilt_rad);
-            raise(&mut maxima.pitch_rate_rad_s, attitude.value.pitch_rate_rad_s.abs());
+            raise(&mut maxima.turn_rate_rad_s, attitude.value.turn_rate_rad_s());
         }
         if let Some(gimbal) = vehicle.gimbal.filter(|gimbal| !gimbal.is_stale(now)) {
-            raise(&mut maxima.gimbal_rad, gimbal.value.pitch.measured_rad.abs());
+            for axis in [gimbal.value.pitch, gimbal.value.yaw] {
+                raise(&mut maxima.gimbal_rad, axis.measured_rad.abs());
+            }
         }
         if let Some(controller) = vehicle.controller.as_ref().filter(|controller| !controller.is_stale(now)) {
             raise(&mut maxima.solve_time_s, f64::from(controller.value.solve_time_us) * 1e-6);

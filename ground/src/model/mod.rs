@@ -3,16 +3,21 @@
 pub mod alarm;
 pub mod chord;
 pub mod command;
+mod course;
 pub mod dialog;
 pub mod events;
+pub mod flown;
 pub mod history;
+pub mod judgement;
 pub mod link;
+pub mod motion;
 pub mod outcome;
 pub mod page;
 pub mod parameters;
 pub mod reckoning;
 pub mod telemetry;
 pub mod too_late;
+pub mod trend;
 pub mod vehicle;
 pub mod words;
 
@@ -185,7 +190,11 @@ pub struct Model {
 
 impl Model {
     /// Nothing known yet.
+    ///
+    /// A screen whose station runs elsewhere is told the past first, until [`Self::history_ends`].
     pub fn new(settings: Settings) -> Self {
+        let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
+        let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
         Self {
             settings,
             vehicle: Vehicle::default(),
@@ -197,7 +206,7 @@ impl Model {
             events: Events::default(),
             outcome: Outcome::default(),
             log: LogHealth::default(),
-            alarms: Alarms::default(),
+            alarms,
             pages: Pages::default(),
             history: History::default(),
             parameters: Parameters::default(),
@@ -208,6 +217,11 @@ impl Model {
             auto_step: AutoStep::default(),
             outbox: Vec::new(),
         }
+    }
+
+    /// Everything that was told so far was the past: what holds of it rings now, what is over does not.
+    pub fn history_ends(&mut self) {
+        self.alarms.history_ends();
     }
 
     /// The screen to show.

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage,
-    MavModeFlag, MavState, MavSysStatusSensor, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
+    HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
+    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
 };
 
-use super::vehicle::{Attitude, Deflection, Gimbal, Heartbeat, Motion, Prediction, Sample, Vehicle, Verdict};
+use super::motion::{Attitude, Motion};
+use super::vehicle::{Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning};
 use crate::limits::Touchdown;
 
 /// The vehicle's clock may jump back this far by a slow link beside a fast one; more is a reboot.
@@ -22,24 +22,26 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),
         MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
         MavMessage::ATTITUDE_QUATERNION(data) => {
-            if let Some(attitude) = attitude(data) {
+            if let Some(attitude) = Attitude::of(data) {
+                vehicle.in_space |= attitude.leaves_the_plane();
                 vehicle.attitude = Some(Sample::new(attitude, now));
             }
         }
         MavMessage::LOCAL_POSITION_NED(data) => {
-            let motion = motion(data);
+            let motion = Motion::of(data);
+            vehicle.in_space |= motion.leaves_the_plane();
             vehicle.motion = Some(Sample::new(motion, now));
+            let phase = vehicle.phase().map(|phase| phase.value);
+            vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
-                vehicle.extend_flown(&motion);
+                vehicle.flown.extend(&motion);
+            }
+            if phase.is_some_and(is_burning) {
+                vehicle.burn.extend(&motion);
             }
         }
         MavMessage::VFR_HUD(data) => {
-            let motion = Motion {
-                x_m: f64::NAN,
-                altitude_m: f64::from(data.alt),
-                vx_m_s: f64::NAN,
-                climb_m_s: f64::from(data.climb),
-            };
+            let motion = Motion::vertical(f64::from(data.alt), f64::from(data.climb));
             vehicle.hud = Some(Sample::new(motion, now));
         }
         MavMessage::TD_FINS(data) => {
@@ -127,33 +129,6 @@ pub fn phase_from_number(number: u32) -> Option<TdPhase> {
     phases.into_iter().find(|phase| *phase as u32 == number)
 }
 
-/// The nose's direction, which has no singularity upright where a rocket stands. `None` if the
-/// quaternion is no rotation.
-fn attitude(data: &ATTITUDE_QUATERNION_DATA) -> Option<Attitude> {
-    let [w, x, y, z] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
-    let norm_squared = w * w + x * x + y * y + z * z;
-    // Sent as f32 and perhaps never normalised; an all-zero or NaN quaternion means "unknown".
-    if !(0.5..2.0).contains(&norm_squared) {
-        return None;
-    }
-    let nose_north = 1.0 - 2.0 * (y * y + z * z) / norm_squared;
-    let nose_up = -2.0 * (x * z - w * y) / norm_squared;
-    Some(Attitude {
-        pitch_rad: libm::atan2(nose_up, nose_north),
-        tilt_rad: libm::acos(nose_up.clamp(-1.0, 1.0)),
-        pitch_rate_rad_s: f64::from(data.pitchspeed),
-    })
-}
-
-fn motion(data: &LOCAL_POSITION_NED_DATA) -> Motion {
-    Motion {
-        x_m: f64::from(data.x),
-        altitude_m: -f64::from(data.z),
-        vx_m_s: f64::from(data.vx),
-        climb_m_s: -f64::from(data.vz),
-    }
-}
-
 fn deflection(commanded_cdeg: i16, measured_cdeg: i16) -> Deflection {
     let radians = |cdeg: i16| (f64::from(cdeg) / 100.0).to_radians();
     Deflection { commanded_rad: radians(commanded_cdeg), measured_rad: radians(measured_cdeg) }
@@ -198,6 +173,7 @@ fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
     const NOW: Duration = Duration::from_secs(1);
 

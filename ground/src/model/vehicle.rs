@@ -7,14 +7,13 @@ use protocol::dialect::{
     TdPhase,
 };
 
+use super::flown::Flown;
+use super::motion::{Attitude, BodySpeed, Motion};
+use super::trend::Trend;
 use crate::limits::Touchdown;
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
-/// Points of the flown path kept.
-const FLOWN_MAX: usize = 512;
-/// Positions beyond this are no positions.
-const POSITION_MAX_M: f64 = 1e5;
 
 /// A value and when it was received.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +28,11 @@ impl<T> Sample<T> {
     /// A value received now.
     pub fn new(value: T, now: Duration) -> Self {
         Self { value, received_at: now }
+    }
+
+    /// What is read from the value, as old as it.
+    pub fn map<U>(self, read: impl FnOnce(&T) -> U) -> Sample<U> {
+        Sample { value: read(&self.value), received_at: self.received_at }
     }
 
     /// Time since it was received.
@@ -51,39 +55,6 @@ pub struct Heartbeat {
     pub phase: Option<TdPhase>,
     /// `MAV_STATE_FLIGHT_TERMINATION`.
     pub terminated: bool,
-}
-
-/// Attitude in the pitch plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Attitude {
-    /// Pitch from the horizontal; pi/2 is upright.
-    pub pitch_rad: f64,
-    /// Angle between nose and vertical, 0 to pi.
-    pub tilt_rad: f64,
-    /// Pitch rate.
-    pub pitch_rate_rad_s: f64,
-}
-
-/// Position and velocity in the pitch plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
-    /// Horizontal, north.
-    pub x_m: f64,
-    /// Altitude, up.
-    pub altitude_m: f64,
-    /// Horizontal speed, north.
-    pub vx_m_s: f64,
-    /// Vertical speed, up.
-    pub climb_m_s: f64,
-}
-
-/// Speeds along the body's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodySpeed {
-    /// Axial, towards the nose.
-    pub u_m_s: f64,
-    /// Lateral, body z axis.
-    pub w_m_s: f64,
 }
 
 /// Commanded and measured angle.
@@ -155,8 +126,14 @@ pub struct Vehicle {
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: the vehicle's own arming checks pass.
     pub ready_to_arm: Option<Sample<bool>>,
-    /// Where it flew: x and altitude, m.
-    pub flown: Vec<(f64, f64)>,
+    /// How its velocity changed of late.
+    pub trend: Trend,
+    /// Where it flew.
+    pub flown: Flown,
+    /// The part of it under the landing motor's thrust, from the command to light it on.
+    pub burn: Flown,
+    /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
+    pub in_space: bool,
     /// The vehicle's clock, ms since its boot.
     pub last_boot_ms: Option<u32>,
 }
@@ -185,6 +162,15 @@ impl Vehicle {
         self.status.as_ref().map(|status| status.value.interlocks)
     }
 
+    /// Whether the landing motor can still be lit: nothing latched forbids it. Unknown counts as not.
+    pub fn may_light(&self) -> bool {
+        let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
+            | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
+            | TdInterlock::TD_INTERLOCK_NO_LIGHT;
+        let chute = self.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+        !chute && self.interlocks().is_some_and(|locks| !locks.intersects(never))
+    }
+
     /// Left the pad and not yet at rest.
     pub fn in_flight(&self) -> bool {
         self.phase().is_some_and(|phase| is_flight(phase.value))
@@ -211,28 +197,14 @@ impl Vehicle {
     /// Speeds along the body's axes, as old as the older of attitude and velocity.
     pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
         let (attitude, motion) = (self.attitude?, self.motion?);
-        let (sin, cos) = libm::sincos(attitude.value.pitch_rad);
-        let (vx, climb) = (motion.value.vx_m_s, motion.value.climb_m_s);
-        // Axes in (x, up): e_x = (cos, sin) towards the nose, e_z = (sin, -cos).
-        let speed = BodySpeed { u_m_s: vx * cos + climb * sin, w_m_s: vx * sin - climb * cos };
+        let speed = BodySpeed::of(&attitude.value, &motion.value);
         Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
     }
 
-    /// Notes where it is; thins the path out when it grows too long.
-    pub(crate) fn extend_flown(&mut self, motion: &Motion) {
-        let point = (motion.x_m, motion.altitude_m);
-        let is_position = |value: f64| value.abs() < POSITION_MAX_M;
-        if !is_position(point.0) || !is_position(point.1) || self.flown.last() == Some(&point) {
-            return;
-        }
-        if self.flown.len() >= FLOWN_MAX {
-            let mut keep = false;
-            self.flown.retain(|_| {
-                keep = !keep;
-                keep
-            });
-        }
-        self.flown.push(point);
+    /// The plan's path where it is one of this moment: under thrust, and of the rehearsal on the pad.
+    pub fn planned(&self) -> &[(f64, f64)] {
+        let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
+        self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
     }
 }
 
@@ -240,6 +212,11 @@ impl Vehicle {
 pub fn is_flight(phase: TdPhase) -> bool {
     (TdPhase::TD_PHASE_BOOST as u32..=TdPhase::TD_PHASE_POWERED as u32).contains(&(phase as u32))
         || phase == TdPhase::TD_PHASE_CHUTE
+}
+
+/// Whether the landing motor burns or is about to.
+pub fn is_burning(phase: TdPhase) -> bool {
+    matches!(phase, TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED)
 }
 
 /// On the pad.

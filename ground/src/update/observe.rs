@@ -8,6 +8,7 @@ use protocol::log::record::EventLevel;
 use super::{Action, commands};
 use crate::model::command::{CommandKind, is_aborted};
 use crate::model::events::Speaker;
+use crate::model::flown::Flown;
 use crate::model::history::{History, Maxima};
 use crate::model::outcome::Outcome;
 use crate::model::parameters::Parameters;
@@ -93,7 +94,8 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
     model.outbox.push(Action::SyncLog);
     if is_flight(phase) && !before.is_some_and(is_flight) {
         if !model.outcome.started {
-            model.vehicle.flown.clear();
+            model.vehicle.flown = Flown::default();
+            model.vehicle.burn = Flown::default();
         }
         model.outcome.started = true;
     }

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use super::number::{age_mark, fixed, row, shortest};
 use super::theme::{Role, Theme};
 use crate::model::Model;
-use crate::model::vehicle::{Deflection, Sample};
+use crate::model::vehicle::{Deflection, Gimbal, Sample};
 
 /// The scale of the gimbal's bar until the vehicle has said where its gimbal stops.
 const DEFAULT_SCALE_DEG: f64 = 20.0;
@@ -39,17 +39,22 @@ pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         .collect()
 }
 
-/// The gimbal's rows: command, measured angle, both on a bar.
+/// The gimbal's rows: command, measured angle, both on a bar. In space there are two planes to it, a line of numbers
+/// and a bar each.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let gimbal = model.vehicle.gimbal;
-    let angle = |pick: fn(&Deflection) -> f64| {
-        gimbal.map(|g| Sample { value: pick(&g.value.pitch).to_degrees(), received_at: g.received_at })
-    };
+    let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
+    let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
+    if model.vehicle.in_space {
+        let plane = |name, pick: fn(&Gimbal) -> Deflection| {
+            plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
+        };
+        return [plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)].concat();
+    }
+    let angle = |pick: fn(&Deflection) -> f64| gimbal.map(|g| g.map(|g| pick(&g.pitch).to_degrees()));
     let commanded = angle(|deflection| deflection.commanded_rad);
     let measured = angle(|deflection| deflection.measured_rad);
     let role = gimbal.map_or(Role::Label, |gimbal| age_mark(&gimbal, now).1);
-    let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
-    let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
     let value = |sample: Option<Sample<f64>>| sample.map(|sample| sample.value);
     vec![
         row(theme, "command o", commanded, 2, "deg", now),
@@ -59,6 +64,34 @@ pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
             theme.style(role),
         ),
         Line::styled(scale(limit), theme.style(Role::Label)),
+    ]
+}
+
+fn plane_rows(
+    name: &str,
+    angles: Option<Sample<Deflection>>,
+    limit_deg: Option<f64>,
+    theme: Theme,
+    now: Duration,
+) -> Vec<Line<'static>> {
+    let (mark, role) = angles.map_or((" ", Role::Label), |angles| age_mark(&angles, now));
+    let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
+    let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
+    let text = |value: Option<f64>| value.map_or_else(|| "--".to_owned(), |value| fixed(value, 1));
+    let stop = limit_deg.map_or_else(String::new, |limit| format!(" ±{}", shortest(limit)));
+    vec![
+        Line::from(vec![
+            Span::styled(format!(" {name:<5}"), theme.style(Role::Label)),
+            Span::styled(format!("{mark}o{:>6} #{:>6}", text(commanded), text(measured)), theme.style(role)),
+            Span::styled(" deg", theme.style(Role::Label)),
+        ]),
+        Line::from(vec![
+            Span::styled(
+                format!(" {}", bar(commanded, measured, limit_deg.unwrap_or(DEFAULT_SCALE_DEG))),
+                theme.style(role),
+            ),
+            Span::styled(stop, theme.style(Role::Label)),
+        ]),
     ]
 }
 

@@ -45,7 +45,10 @@ pub fn alarm(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>
         count => format!(" (+{} more)", count - 1),
     };
     let age = seconds(now.saturating_sub(alarm.raised_at));
-    let line = if alarm.acknowledged {
+    let line = if alarm.past && !alarm.acknowledged {
+        let text = format!(" past alarm: {}, raised {age} ago{more}  Space: seen", alarm.text);
+        Line::styled(text, theme.style(Role::Caution))
+    } else if alarm.acknowledged {
         Line::styled(format!(" alarm seen: {} {age}{more}", alarm.text), theme.style(Role::Caution))
     } else {
         let over = if alarm.active { "" } else { ", over" };

@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
 use super::theme::{Role, Theme};
-use super::{alarms, dialog, draw_lines, pages, top};
+use super::{alarms, dialog, draw_lines, next, pages, top};
 use crate::model::Model;
 use crate::model::command::CommandKind;
 
@@ -32,6 +32,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         return;
     }
     lines.extend(top::pad_wait(model, theme));
+    lines.extend(next::line(model, theme, now));
     lines.extend(model.playing.map(|playing| alarms::replay(playing, theme)));
     if model.playing.is_none() {
         lines.extend(alarms::alarm(model, theme, now));

@@ -7,35 +7,40 @@ use ratatui::text::Line;
 use super::number::row;
 use super::theme::Theme;
 use crate::model::Model;
-use crate::model::vehicle::Sample;
+use crate::model::motion::{Attitude, BodySpeed, Motion};
 
-/// The panel's rows.
+/// The panel's rows: in the plane with their signs, in space as sizes, because nobody reads a sign of east.
 pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let motion = model.vehicle.best_motion();
-    let attitude = model.vehicle.attitude;
-    let body = model.vehicle.body_speed();
-    let of = |value: Option<f64>, received_at: Option<Duration>| {
-        value.zip(received_at).map(|(value, received_at)| Sample { value, received_at })
-    };
-    let motion_at = motion.map(|motion| motion.received_at);
-    let attitude_at = attitude.map(|attitude| attitude.received_at);
-    let body_at = body.map(|body| body.received_at);
-    let altitude = of(motion.map(|m| m.value.altitude_m), motion_at);
-    let climb = of(motion.map(|m| m.value.climb_m_s), motion_at);
-    let horizontal = of(motion.map(|m| m.value.vx_m_s), motion_at);
-    let u = of(body.map(|b| b.value.u_m_s), body_at);
-    let w = of(body.map(|b| b.value.w_m_s), body_at);
-    let pitch = of(attitude.map(|a| a.value.pitch_rad.to_degrees()), attitude_at);
-    let tilt = of(attitude.map(|a| a.value.tilt_rad.to_degrees()), attitude_at);
-    let rate = of(attitude.map(|a| a.value.pitch_rate_rad_s.to_degrees()), attitude_at);
-    vec![
-        row(theme, "altitude", altitude, 2, "m", now),
-        row(theme, "vertical", climb, 2, "m/s", now),
-        row(theme, "horizontal", horizontal, 2, "m/s", now),
-        row(theme, "u axial", u, 2, "m/s", now),
-        row(theme, "w lateral", w, 3, "m/s", now),
-        row(theme, "pitch", pitch, 2, "deg", now),
-        row(theme, "tilt", tilt, 2, "deg", now),
-        row(theme, "pitch rate", rate, 2, "deg/s", now),
-    ]
+    let vehicle = &model.vehicle;
+    let (motion, attitude, body) = (vehicle.best_motion(), vehicle.attitude, vehicle.body_speed());
+    let of_motion = |pick: fn(&Motion) -> f64| motion.map(|known| known.map(pick));
+    let of_attitude = |pick: fn(&Attitude) -> f64| attitude.map(|known| known.map(pick));
+    let of_body = |pick: fn(&BodySpeed) -> f64| body.map(|known| known.map(pick));
+    let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
+    let mut rows = vec![
+        line("altitude", of_motion(|m| m.altitude_m), 2, "m"),
+        line("vertical", of_motion(|m| m.climb_m_s), 2, "m/s"),
+    ];
+    let tilt = of_attitude(|a| a.tilt_rad.to_degrees());
+    let axial = of_body(|b| b.u_m_s);
+    if vehicle.in_space {
+        rows.extend([
+            line("horizontal", of_motion(Motion::horizontal_m_s), 2, "m/s"),
+            line("distance", of_motion(Motion::distance_m), 1, "m"),
+            line("u axial", axial, 2, "m/s"),
+            line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
+            line("tilt", tilt, 2, "deg"),
+            line("turn rate", of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
+        ]);
+    } else {
+        rows.extend([
+            line("horizontal", of_motion(|m| m.vx_m_s), 2, "m/s"),
+            line("u axial", axial, 2, "m/s"),
+            line("w lateral", of_body(|b| b.w_m_s), 3, "m/s"),
+            line("pitch", of_attitude(|a| a.pitch_rad.to_degrees()), 2, "deg"),
+            line("tilt", tilt, 2, "deg"),
+            line("pitch rate", of_attitude(|a| a.pitch_rate_rad_s.to_degrees()), 2, "deg/s"),
+        ]);
+    }
+    rows
 }

@@ -10,7 +10,9 @@ use crate::model::Model;
 use crate::model::reckoning::reckon;
 
 /// The scale reaches at least this high, m.
-const TOP_MIN_M: f64 = 20.0;
+const TOP_MIN_M: f64 = 25.0;
+/// Steps to ten times the height (Renard's series of ten, ISO 3): a scale that changed with every frame could not be read.
+const STEPS: [f64; 10] = [1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0];
 
 /// One line a row, the greatest height first.
 pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
@@ -18,11 +20,13 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         return Vec::new();
     }
     let descent = model.vehicle.descent.as_ref();
+    // A motor that will not be lit has no band.
+    let to_light = descent.filter(|_| model.vehicle.may_light());
     let motion = model.vehicle.best_motion();
     let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
-    let band = descent
+    let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
-    let chosen = descent.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
+    let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
     let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
     let lost = reckon(&model.vehicle, now);
     let (height, mark, role) = match (lost, motion) {
@@ -34,7 +38,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         (None, None) => (None, " ", Role::Label),
     };
     let marks = [height, band.map(|band| band.1), chosen, commit];
-    let top = marks.into_iter().flatten().fold(TOP_MIN_M, f64::max) * 1.1;
+    let top = top_m(marks.into_iter().flatten().fold(0.0, f64::max));
     let per_row = top / (rows - 1) as f64;
     (0..rows)
         .rev()
@@ -60,4 +64,26 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
             Line::from(spans)
         })
         .collect()
+}
+
+/// The step of the scale above a height, m.
+fn top_m(highest_m: f64) -> f64 {
+    let highest_m = highest_m.clamp(TOP_MIN_M, 1e6);
+    let decade = libm::exp10(libm::floor(libm::log10(highest_m)));
+    STEPS.into_iter().map(|step| step * decade).find(|top| *top >= highest_m).unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_goes_in_steps() {
+        for (highest_m, top) in
+            [(0.0, 25.0), (25.0, 25.0), (26.0, 31.5), (99.0, 100.0), (101.0, 125.0), (299.0, 315.0)]
+        {
+            assert!((top_m(highest_m) - top).abs() < 1e-9, "{highest_m}: {}", top_m(highest_m));
+        }
+        assert!(top_m(f64::MAX) >= 1e6 && top_m(f64::MAX).is_finite());
+    }
 }

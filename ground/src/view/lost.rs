@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use super::number::{fixed, seconds};
 use super::theme::{Role, Theme};
 use crate::model::Model;
-use crate::model::reckoning::reckon;
+use crate::model::reckoning::{By, reckon};
 
 /// Whether only a prediction is left of the flight.
 pub fn is_lost(model: &Model, now: Duration) -> bool {
@@ -26,11 +26,23 @@ pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             ),
         ])
     };
-    let source = if at.by_plan { "along the last plan" } else { "free fall; no plan" };
-    vec![
-        row("alt", at.altitude_m),
-        row("x", at.x_m),
+    let source = match at.by {
+        By::Plan => "along the last plan",
+        By::LastThrust => "by the last thrust",
+        By::FallThenBurn => "fall, then the burn",
+        By::Fall => "fall, drag as last",
+        By::FreeFall => "free fall; no plan",
+    };
+    let across = if model.vehicle.in_space {
+        vec![row("north", at.x_m), row("east", at.y_m)]
+    } else {
+        vec![row("x", at.x_m)]
+    };
+    let mut rows = vec![row("alt", at.altitude_m)];
+    rows.extend(across);
+    rows.extend([
         Line::styled(format!(" {source}"), theme.style(Role::Label)),
         Line::styled(format!(" last heard {} ago", seconds(at.age)), theme.style(Role::Caution)),
-    ]
+    ]);
+    rows
 }

@@ -18,12 +18,14 @@ pub mod flight;
 pub mod gauge;
 pub mod happenings;
 pub mod lost;
+pub mod next;
 pub mod number;
 pub mod pages;
 pub mod side;
 pub mod theme;
 pub mod top;
 pub mod touchdown;
+pub mod verdict;
 pub mod wide;
 
 use std::time::Duration;

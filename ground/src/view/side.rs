@@ -1,16 +1,18 @@
-//! The side view: where it flew (line), where it will fly (dots), the pad; after the loss of the link where it
+//! The side view: where it flew (line), where it will fly (dots), the pad and the limits of the touchdown; after the loss of the link where it
 //! probably is (a cross) and how far from there it may be (a circle).
 
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
 
+use super::number::shortest;
 use super::theme::Theme;
 use crate::model::Model;
+use crate::model::motion::NorthEastUp;
 use crate::model::reckoning::reckon;
 
 /// Braille dots in a cell.
@@ -18,24 +20,82 @@ const DOTS_ACROSS: f64 = 2.0;
 const DOTS_UP: f64 = 4.0;
 /// The picture shows at least this altitude.
 const ALTITUDE_MIN_M: f64 = 5.0;
+/// Dots that a limit of the touchdown stands up from the ground.
+const LIMIT_DOTS: f64 = 5.0;
+/// Columns that a picture needs.
+const PICTURE_COLUMNS: u16 = 22;
 /// The pad's half width, m.
 const PAD_HALF_M: f64 = 1.0;
 
+/// The limits of a touchdown are part of the picture if it grows by no more than this for them.
+const LIMITS_COST_MAX: f64 = 2.0;
+
+/// What of the flight is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// What was flown under the landing motor's thrust, once it has begun.
+    Burn,
+}
+
+/// Where it is seen from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// North is right. The plan is told as it looks from here.
+    East,
+    /// East is right.
+    South,
+}
+
+impl From {
+    fn sees(self, [north_m, east_m, altitude_m]: NorthEastUp) -> (f64, f64) {
+        match self {
+            Self::East => (north_m, altitude_m),
+            Self::South => (east_m, altitude_m),
+        }
+    }
+}
+
+/// The pictures that an area has room for, with their titles: for a vehicle in space from the east and from the south, side
+/// by side, or from the east alone.
+pub fn pictures(model: &Model, area: Rect) -> Vec<(From, &'static str, Rect)> {
+    if !model.vehicle.in_space {
+        return vec![(From::East, "Side view", area)];
+    }
+    if area.width < 2 * PICTURE_COLUMNS {
+        return vec![(From::East, "From east", area)];
+    }
+    let [east, south] = area.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+    vec![(From::East, "From east", east), (From::South, "From south", south)]
+}
+
 /// Draws the picture; both axes have the same scale.
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw(
+    model: &Model,
+    (part, from): (Part, From),
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
     if area.width < 8 || area.height < 3 {
         return;
     }
-    let flown = &model.vehicle.flown;
-    let predicted: &[(f64, f64)] = match &model.vehicle.path {
-        // After touchdown the last plan is history.
-        Some(path) if model.vehicle.verdict.is_none() => &path.value,
-        _ => &[],
+    let vehicle = &model.vehicle;
+    let flown = match part {
+        Part::Burn if !vehicle.burn.points().is_empty() => vehicle.burn.points(),
+        _ => vehicle.flown.points(),
     };
-    let lost = reckon(&model.vehicle, now);
-    let reckoned: Vec<(f64, f64)> = lost.iter().map(|at| (at.x_m, at.altitude_m)).collect();
-    let points = flown.iter().chain(predicted).chain(&reckoned);
-    let ([left, right], [bottom, top]) = bounds(points, area);
+    let flown: Vec<(f64, f64)> = flown.iter().map(|point| from.sees(*point)).collect();
+    let predicted = if from == From::East { vehicle.planned() } else { &[] };
+    let lost = reckon(vehicle, now).map(|at| (from.sees([at.x_m, at.y_m, at.altitude_m]), at.error_m));
+    let reckoned: Vec<(f64, f64)> = lost.iter().map(|(at, _)| *at).collect();
+    let points: Vec<(f64, f64)> = [&flown, predicted, &reckoned].concat();
+    let limit_m = vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m));
+    let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
+    let view = Bounds::around(&points, limit_m, area);
+    let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
     let colour = |colour| if theme.colour { colour } else { Color::Reset };
     let canvas = Canvas::default()
         .marker(Marker::Braille)
@@ -46,35 +106,64 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             for side in [-PAD_HALF_M, PAD_HALF_M] {
                 context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: colour(Color::Reset) });
             }
+            for x in limit_m.into_iter().flat_map(|limit_m| [-limit_m, limit_m]) {
+                let y2 = LIMIT_DOTS * per_dot;
+                context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: colour(Color::Red) });
+            }
             context.draw(&Points { coords: predicted, color: colour(Color::Cyan) });
             for pair in flown.windows(2) {
                 let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
                 context.draw(&Line { x1, y1, x2, y2, color: colour(Color::Yellow) });
             }
-            if let Some(at) = lost {
-                let (x, y, radius) = (at.x_m, at.altitude_m, at.error_m);
+            if let Some(((x, y), radius)) = lost {
                 context.draw(&Circle { x, y, radius, color: colour(Color::Magenta) });
                 context.print(x, y, "+");
             }
-            let scale = (right - left) / 4.0;
             context.print(left, top, format!("{:.0} m up", top.floor()));
-            context.print(right - scale, bottom, format!("{:.0} m", right.floor()));
+            let corner = view.corner(limit_m);
+            let columns = corner.chars().count() as f64;
+            context.print(right - columns * DOTS_ACROSS * per_dot, bottom, corner);
         });
     frame.render_widget(canvas, area);
 }
 
-fn bounds<'a>(points: impl Iterator<Item = &'a (f64, f64)>, area: Rect) -> ([f64; 2], [f64; 2]) {
-    let (mut left, mut right, mut top) = (-PAD_HALF_M, PAD_HALF_M, ALTITUDE_MIN_M);
-    for (x, altitude) in points {
-        left = left.min(*x);
-        right = right.max(*x);
-        top = top.max(*altitude);
+/// What the picture shows, m.
+struct Bounds {
+    x: [f64; 2],
+    y: [f64; 2],
+    per_dot: f64,
+}
+
+impl Bounds {
+    fn around(points: &[(f64, f64)], limit_m: Option<f64>, area: Rect) -> Self {
+        let (mut left, mut right, mut top) = (-PAD_HALF_M, PAD_HALF_M, ALTITUDE_MIN_M);
+        for (x, altitude) in points {
+            left = left.min(*x);
+            right = right.max(*x);
+            top = top.max(*altitude);
+        }
+        let across = f64::from(area.width) * DOTS_ACROSS;
+        let up = f64::from(area.height) * DOTS_UP;
+        // A little room around, and two rows of dots below the ground.
+        let per_dot = |left: f64, right: f64| ((right - left) * 1.1 / across).max(top * 1.05 / (up - 3.0));
+        if let Some(limit_m) = limit_m {
+            let (wider_left, wider_right) = (left.min(-limit_m), right.max(limit_m));
+            if per_dot(wider_left, wider_right) <= LIMITS_COST_MAX * per_dot(left, right) {
+                (left, right) = (wider_left, wider_right);
+            }
+        }
+        let per_dot = per_dot(left, right);
+        let middle = f64::midpoint(left, right);
+        let half = per_dot * across / 2.0;
+        Self { x: [middle - half, middle + half], y: [-2.0 * per_dot, per_dot * (up - 2.0)], per_dot }
     }
-    let across = f64::from(area.width) * DOTS_ACROSS;
-    let up = f64::from(area.height) * DOTS_UP;
-    // A little room around, and two rows of dots below the ground.
-    let per_dot = ((right - left) * 1.1 / across).max(top * 1.05 / (up - 3.0));
-    let middle = f64::midpoint(left, right);
-    let half = per_dot * across / 2.0;
-    ([middle - half, middle + half], [-2.0 * per_dot, per_dot * (up - 2.0)])
+
+    /// How far the picture reaches; or where the limits are that it does not reach.
+    fn corner(&self, limit_m: Option<f64>) -> String {
+        let [left, right] = self.x;
+        match limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
+            Some(limit_m) => format!("limit ±{} m", shortest(limit_m)),
+            None => format!("{:.0} m", right.floor()),
+        }
+    }
 }

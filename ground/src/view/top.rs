@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::dialect::TD_FLIGHT_STATUS_DATA;
 use ratatui::text::{Line, Span};
 
+use super::next;
 use super::number::{STALE_MARK, age_mark, seconds};
 use super::theme::{Role, Theme};
 use crate::model::command::{Acknowledged, CommandKind, Track};
@@ -12,6 +13,8 @@ use crate::model::link::LinkState;
 use crate::model::vehicle::Sample;
 use crate::model::{self, Model, too_late, words};
 
+/// In flight, a command whose effect is not seen stands before what happens next for this long. Its alarm stays.
+const OPEN_SHOWN: Duration = Duration::from_secs(10);
 /// The abort key, in words.
 pub const ABORT_KEY: &str = "Ctrl-X Enter";
 
@@ -172,11 +175,15 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// The wait after an abort; else the latest command besides an abort; before the first, whether the
-/// vehicle may be armed.
+/// The wait after an abort; else the latest command besides an abort while something is still open about it; else what
+/// happens next; on the pad the latest command, and before the first, whether the vehicle may be armed.
 pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(wait) = pad_wait(model, theme) {
         return wait;
+    }
+    let next = next::line(model, theme, now);
+    if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
+        return next;
     }
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
     if let Some(track) = latest {
@@ -188,6 +195,12 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
             Line::styled(format!(" NO-GO: {failing}"), theme.style(Role::Caution))
         })
     })
+}
+
+/// The latest command besides an abort, while its effect is waited for.
+pub fn open_command(model: &Model, now: Duration) -> Option<&Track> {
+    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
+    latest.filter(|track| track.observed_at.is_none() && now.saturating_sub(track.commanded_at) < OPEN_SHOWN)
 }
 
 /// How the arming checks stand, where none is known to fail.

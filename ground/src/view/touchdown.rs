@@ -6,8 +6,10 @@ use ratatui::text::{Line, Span};
 
 use super::number::{age_mark, fixed};
 use super::theme::{Role, Theme};
+use super::verdict;
 use crate::limits::Touchdown;
 use crate::model::Model;
+use crate::model::judgement::LEGS;
 
 /// The panel's title and rows: the verdict once there is one, the prediction before.
 pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
@@ -15,7 +17,12 @@ pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<L
         let mut rows = limit_rows(model, &verdict.value.touchdown, theme, " ", Role::Plain);
         let (word, role) = verdict_word(verdict.value.landed);
         rows.push(Line::styled(word, theme.style(role)));
-        return ("Verdict", rows);
+        let title = match verdict::own(model.vehicle.limits.as_ref()) {
+            Some(standard) if standard == LEGS => "Verdict by the legs",
+            Some(_) => "Verdict by Table 2",
+            None => "Verdict",
+        };
+        return (title, rows);
     }
     let Some(prediction) = model.vehicle.prediction else {
         return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(Role::Label))]);
@@ -40,7 +47,7 @@ pub fn verdict_word(landed: bool) -> (&'static str, Role) {
 }
 
 /// Six characters with the sign, whatever the size: three decimals decide about a speed, two about an angle.
-fn decimals(value: f64) -> usize {
+pub(super) fn decimals(value: f64) -> usize {
     match value.abs() {
         0.0..10.0 => 3,
         10.0..100.0 => 2,

@@ -3,10 +3,11 @@
 use ground::key::Key;
 use ground::model::alarm::{AlarmKind, RING_EVERY};
 use ground::model::command::CommandKind;
+use ground::model::{Role, Settings};
 use ground::update::Action;
 use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
 
-use crate::bench::Bench;
+use crate::bench::{Bench, settings};
 use crate::hand::ladder;
 
 fn bells(bench: &Bench) -> usize {
@@ -45,6 +46,39 @@ fn an_alarm_that_is_over_stays_until_it_was_seen() {
     assert!(bench.screen(80, 24).contains(", over"));
     bench.key(Key::Char(' '));
     assert!(!bench.screen(80, 24).contains("ALARM"));
+}
+
+/// A screen that attaches, or attaches again, is told everything from the start: it rings for what holds, not for
+/// what was.
+#[test]
+fn attaching_rings_no_old_bells() {
+    let attached = |seconds_after: f64| {
+        let mut bench = Bench::new(Settings { role: Role::Attached, ..settings(false, true) });
+        bench.run(1.0);
+        bench.speaks = false;
+        bench.run(30.0);
+        bench.speaks = true;
+        bench.run(seconds_after);
+        assert_eq!(bells(&bench), 0, "the past rings");
+        bench.model.history_ends();
+        bench
+    };
+    let mut over = attached(60.0);
+    over.run(30.0);
+    assert_eq!(bells(&over), 0);
+    let screen = over.screen(80, 24);
+    assert!(
+        screen.contains(" past alarm: LINK LOST: the vehicle is not heard, raised 116 s ago"),
+        "{screen}"
+    );
+    over.speaks = false;
+    over.run(5.0);
+    assert_eq!(bells(&over), 1, "lost anew");
+    assert!(over.screen(80, 24).contains("ALARM LINK LOST"));
+    let mut lasting = attached(0.0);
+    lasting.speaks = false;
+    lasting.run(0.1);
+    assert_eq!(bells(&lasting), 1, "it still holds");
 }
 
 #[test]
@@ -122,15 +156,15 @@ fn an_abort_that_would_arrive_too_late_says_so() {
 #[test]
 fn after_the_loss_of_the_link_the_position_is_a_prediction_that_grows_uncertain() {
     let mut bench = Bench::crewed();
-    bench.phase = TdPhase::TD_PHASE_POWERED;
+    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
     bench.run(1.0);
     bench.state(1.0, 60.0, 0.0, -5.0, 90.0);
     bench.speaks = false;
     bench.run(2.0);
     let early = bench.screen(80, 24);
     assert!(early.contains("PREDICTED, not heard") && early.contains("free fall"), "{early}");
-    // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + t^2.
-    assert!(early.contains("30.4 ±6.5 m"), "{early}");
+    // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + 2.5 t^2: the drag is not known.
+    assert!(early.contains("30.4 ±12.5 m"), "{early}");
     bench.run(1.0);
-    assert!(bench.screen(80, 24).contains("0.9 ±12.0 m"));
+    assert!(bench.screen(80, 24).contains("0.9 ±25.5 m"));
 }

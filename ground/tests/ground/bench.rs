@@ -1,5 +1,7 @@
 //! A ground station on a bench: its model, a clock turned by hand, and a vehicle made of frames.
 
+mod telemetry;
+
 use std::time::Duration;
 
 use ground::key::Key;
@@ -9,17 +11,16 @@ use ground::view::theme::Theme;
 use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
-    MavCmd, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck, TdChute, TdControlLevel,
-    TdInterlock, TdLimit, TdPhase, TdSolverStatus,
+    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
+    TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::text::chunks;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
+use ratatui::buffer::Cell;
+use ratatui::style::{Color, Modifier};
 
 pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
 
@@ -187,135 +188,6 @@ impl Bench {
         }
     }
 
-    /// Upright at an altitude, moving.
-    pub(crate) fn state(&mut self, x: f32, altitude: f32, vx: f32, climb: f32, pitch_deg: f64) {
-        let (sin, cos) = libm::sincos(pitch_deg.to_radians() / 2.0);
-        let time_boot_ms = self.boot_ms();
-        self.hear(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
-            time_boot_ms,
-            q1: cos as f32,
-            q3: sin as f32,
-            pitchspeed: -0.005,
-            ..Default::default()
-        }));
-        self.hear(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
-            time_boot_ms,
-            x,
-            z: -altitude,
-            vx,
-            vz: -climb,
-            ..Default::default()
-        }));
-    }
-
-    pub(crate) fn actuators(&mut self, gimbal_cdeg: i16) {
-        let time_boot_ms = self.boot_ms();
-        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
-            time_boot_ms,
-            commanded: [9000; 4],
-            measured: [9000, 8990, 9000, 8400],
-        }));
-        self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
-            time_boot_ms,
-            pitch_commanded: gimbal_cdeg,
-            pitch_measured: gimbal_cdeg / 2,
-            ..Default::default()
-        }));
-    }
-
-    /// What acts, and how its solver does.
-    pub(crate) fn controller(&mut self, level: TdControlLevel) {
-        self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
-            time_boot_ms: self.boot_ms(),
-            tick: 12,
-            cost: 8465.2,
-            kkt_stationarity: 2.4e-7,
-            kkt_feasibility: 1.1e-9,
-            thrust_scale: 1.0,
-            solve_time_us: 1_234,
-            deadline_margin_us: 98_766,
-            iterations: 3,
-            level,
-            solver_status: TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
-        }));
-    }
-
-    pub(crate) fn plan(&mut self, violated: TdLimit) {
-        let time_boot_ms = self.boot_ms();
-        self.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
-        self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
-            time_boot_ms,
-            time_to_go_ms: 2_300,
-            x_m: -1.4,
-            altitude_m: 0.0,
-            pitch_rad: 1.555,
-            u_m_s: -0.05,
-            w_m_s: 0.03,
-            q_rad_s: -0.008,
-            limits_violated: violated,
-        }));
-        let (mut x, mut altitude) = ([0; 12], [0; 12]);
-        for k in 0..12_i16 {
-            x[usize::from(11_u8) - usize::from(k.unsigned_abs())] = -140 + 10 * k;
-            altitude[usize::from(11_u8) - usize::from(k.unsigned_abs())] = 60 * k;
-        }
-        self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-            time_boot_ms,
-            x,
-            altitude,
-            count: 12,
-        }));
-    }
-
-    /// Coming down under fins, this far above the pad.
-    pub(crate) fn descent(&mut self, height_m: f32) {
-        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
-            time_boot_ms: self.boot_ms(),
-            height_m,
-            vertical_speed_m_s: -21.5,
-            band_low_m: 48.0,
-            band_high_m: 71.5,
-            chosen_height_m: 58.0,
-            commit_height_m: 95.0,
-            time_to_ignition_s: (height_m - 58.0) / 21.5,
-            wind_x_m_s: 2.4,
-            wind_y_m_s: -1.8,
-            drag_scale: 1.042,
-            thrust_scale: 0.985,
-            touchdown_x_m: 0.8,
-            touchdown_y_m: -1.1,
-            chute: TdChute::TD_CHUTE_STOWED,
-        }));
-    }
-
-    /// What counts as a landing for this vehicle.
-    pub(crate) fn limits(&mut self) {
-        self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
-            x_m: 20.0,
-            altitude_min_m: 0.0,
-            altitude_max_m: 0.2,
-            pitch_error_rad: 5.0_f32.to_radians(),
-            u_m_s: 0.4,
-            w_m_s: 0.1,
-            q_rad_s: 2.0_f32.to_radians(),
-            gimbal_limit_rad: 20.0_f32.to_radians(),
-        }));
-    }
-
-    pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
-        self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
-            time_boot_ms: self.boot_ms(),
-            x_m: -1.428,
-            altitude_m: 0.0,
-            pitch_rad: 1.554,
-            u_m_s: if landed { -0.058 } else { -1.2 },
-            w_m_s: 0.029,
-            q_rad_s: -0.0078,
-            limits_violated: violated,
-            landed: u8::from(landed),
-        }));
-    }
-
     /// Takes everything done since the last call; of that, the commands sent.
     pub(crate) fn take_commands(&mut self) -> Vec<COMMAND_LONG_DATA> {
         let commands = self.commands();
@@ -348,11 +220,35 @@ impl Bench {
         terminal.backend().to_string()
     }
 
+    /// The same screen's styles, a letter a cell: `.` plain, `d` dim, `b` bold, `s` stale, and by their first letters
+    /// green, yellow, red, cyan, magenta; a capital is bold, `!` is reversed.
+    pub(crate) fn styles(&self, columns: u16, rows: u16) -> String {
+        let terminal = self.draw(columns, rows, Theme { colour: true, ascii: false });
+        let cells = &terminal.backend().buffer().content;
+        let lines =
+            cells.chunks(usize::from(columns)).map(|line| line.iter().map(letter).collect::<String>());
+        lines.map(|line| line.trim_end_matches('.').to_owned()).collect::<Vec<_>>().join("\n")
+    }
+
     pub(crate) fn draw(&self, columns: u16, rows: u16, theme: Theme) -> Terminal<TestBackend> {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test terminal");
         terminal.draw(|frame| view(&self.model, theme, self.now, frame)).expect("drawing in memory");
         terminal
     }
+}
+
+fn letter(cell: &Cell) -> char {
+    let (bold, dim) = (cell.modifier.contains(Modifier::BOLD), cell.modifier.contains(Modifier::DIM));
+    let letter = match cell.fg {
+        _ if cell.modifier.contains(Modifier::REVERSED) => '!',
+        _ if cell.modifier.contains(Modifier::ITALIC) => 's',
+        Color::Reset if bold => 'b',
+        Color::Reset if dim => 'd',
+        Color::Reset => '.',
+        Color::DarkGray => 'd',
+        other => other.to_string().to_lowercase().chars().next().unwrap_or('?'),
+    };
+    if bold && cell.fg != Color::Reset { letter.to_ascii_uppercase() } else { letter }
 }
 
 pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {

@@ -1,4 +1,6 @@
-//! Whole screens, as text. `cargo insta review` or `INSTA_UPDATE=always cargo test` takes new ones.
+//! Whole screens, as text without colour, and the styles of their cells with colour.
+//!
+//! `cargo insta review` or `INSTA_UPDATE=always cargo test` takes new ones.
 
 use crate::bench::{Bench, MONO, is_abort, settings, typed};
 use ground::key::Key;
@@ -10,13 +12,14 @@ use ratatui::style::Color;
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (40, 12), (20, 5)];
 
-fn snapshot(name: &str, bench: &Bench) {
+pub(crate) fn snapshot(name: &str, bench: &Bench) {
     for (columns, rows) in SIZES {
         insta::assert_snapshot!(format!("{name}_{columns}x{rows}"), bench.screen(columns, rows));
+        insta::assert_snapshot!(format!("{name}_{columns}x{rows}_styles"), bench.styles(columns, rows));
     }
 }
 
-fn on_the_pad() -> Bench {
+pub(crate) fn on_the_pad() -> Bench {
     let mut bench = Bench::crewed();
     bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
     bench.actuators(0);
@@ -25,7 +28,7 @@ fn on_the_pad() -> Bench {
     bench
 }
 
-fn armed() -> Bench {
+pub(crate) fn armed() -> Bench {
     let mut bench = on_the_pad();
     bench.keys(&[typed("AARM"), vec![Key::Enter]].concat());
     bench.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
@@ -36,7 +39,7 @@ fn armed() -> Bench {
     bench
 }
 
-fn counting() -> Bench {
+pub(crate) fn counting() -> Bench {
     let mut bench = armed();
     bench.keys(&[Key::Char('S'), Key::Enter]);
     bench.answer(MavCmd::MAV_CMD_MISSION_START, 0);
@@ -45,7 +48,7 @@ fn counting() -> Bench {
     bench
 }
 
-fn powered() -> Bench {
+pub(crate) fn powered() -> Bench {
     let mut bench = counting();
     bench.phase = TdPhase::TD_PHASE_POWERED;
     bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
@@ -59,21 +62,6 @@ fn powered() -> Bench {
     bench.actuators(-640);
     bench.plan(TdLimit::empty());
     bench
-}
-
-#[test]
-fn regress_pad() {
-    snapshot("pad", &on_the_pad());
-}
-
-#[test]
-fn regress_pad_no_go() {
-    let mut bench = on_the_pad();
-    bench.checks_failed = 0b1010;
-    bench.run(0.1);
-    bench.key(Key::Char('A'));
-    bench.keys(&typed("AR"));
-    snapshot("pad_no_go_arming", &bench);
 }
 
 /// Until the vehicle has said its limits the screen shows none.
@@ -110,16 +98,6 @@ fn the_links_capacity_is_shown_beside_its_rate() {
 }
 
 #[test]
-fn regress_countdown() {
-    snapshot("countdown", &counting());
-}
-
-#[test]
-fn regress_powered() {
-    snapshot("powered", &powered());
-}
-
-#[test]
 fn regress_abort_chord_and_abort() {
     let mut bench = powered();
     bench.key(Key::CtrlX);
@@ -131,42 +109,7 @@ fn regress_abort_chord_and_abort() {
     snapshot("abort_sent", &bench);
 }
 
-#[test]
-fn regress_landed() {
-    let mut bench = powered();
-    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
-    bench.verdict(true, TdLimit::empty());
-    bench.run(0.5);
-    snapshot("landed", &bench);
-}
-
-#[test]
-fn regress_not_landed() {
-    let mut bench = powered();
-    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    bench.verdict(false, TdLimit::TD_LIMIT_AXIAL_SPEED | TdLimit::TD_LIMIT_PITCH);
-    bench.run(0.5);
-    snapshot("not_landed", &bench);
-}
-
-#[test]
-fn regress_link_lost() {
-    let mut bench = powered();
-    bench.speaks = false;
-    bench.run(6.0);
-    snapshot("link_lost", &bench);
-}
-
-#[test]
-fn regress_nothing_heard() {
-    let mut bench = Bench::new(settings(false, true));
-    bench.speaks = false;
-    bench.run(1.0);
-    snapshot("nothing_heard", &bench);
-}
-
-fn descending() -> Bench {
+pub(crate) fn descending() -> Bench {
     let mut bench = armed();
     bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
     bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
@@ -175,19 +118,6 @@ fn descending() -> Bench {
     bench.actuators(0);
     bench.descent(132.0);
     bench
-}
-
-#[test]
-fn regress_descent() {
-    snapshot("descent", &descending());
-}
-
-#[test]
-fn regress_descent_without_its_data() {
-    let mut bench = armed();
-    bench.phase = TdPhase::TD_PHASE_COAST;
-    bench.run(1.0);
-    snapshot("coast", &bench);
 }
 
 /// Every screen by its digit, before and during a flight.

@@ -5,7 +5,7 @@ use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
 use flight::estimator::Estimate;
 use flight::phase::Phase;
-use flight::pilot::{FRAMES_PER_PLAN, Pilot};
+use flight::pilot::{FRAMES_PER_PLAN, Pilot, touchdown_m};
 use flight::powered::{Plane, PoweredReport};
 use flight::verdict::LandingVerdict;
 use nalgebra::Vector2;
@@ -115,7 +115,7 @@ impl Rocket {
         let outlook = pilot.outlook();
         let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
         let height_m = place.z - feet_m;
-        let to_ground_s = height_m.max(0.0) / (-velocity.z).max(1.0);
+        let touchdown = touchdown_m(place, velocity, height_m);
         let motor = pilot.motor();
         let deciding = self.mode.phase.in_descent();
         // Also on the ground, after a descent under it.
@@ -133,7 +133,7 @@ impl Rocket {
             wind_m_s: [estimate.wind_m_s.x, -estimate.wind_m_s.y],
             drag_scale: motor.air_scale(),
             thrust_scale: motor.impulse_scale(),
-            touchdown_m: [place.x + velocity.x * to_ground_s, -(place.y + velocity.y * to_ground_s)],
+            touchdown_m: [touchdown.x, -touchdown.y],
             chute: match self.mode.phase {
                 Phase::Chute if carried => Chute::Open,
                 Phase::Chute => Chute::Fired,

@@ -19,7 +19,7 @@ const GAUGE_COLUMNS: u16 = 27;
 /// Columns of the numbers.
 const NUMBER_COLUMNS: u16 = 28;
 /// Rows of the numbers, their title included.
-const NUMBER_ROWS: u16 = 16;
+const NUMBER_ROWS: u16 = 18;
 
 /// Gauge on the left, numbers in the middle, fins and side view on the right.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -38,10 +38,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     draw_lines(frame, below, &[happenings::link(model, theme, now, usize::from(below.width))]);
     let [fin_area, picture] =
         right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
-    let inside = titled("Fins from above", theme, frame, fin_area);
-    draw_lines(frame, inside, &fins::lines(model, theme, now));
-    let inside = titled("Side view", theme, frame, picture);
-    side::draw(model, theme, now, frame, inside);
+    let inside = titled(&fins::title(model, now), theme, frame, fin_area);
+    fins::draw(model, theme, now, frame, inside);
+    for (from, title, area) in side::pictures(model, picture) {
+        let inside = titled(title, theme, frame, area);
+        side::draw(model, (side::Part::Whole, from), theme, now, frame, inside);
+    }
 }
 
 /// The numbers, the most important first.
@@ -62,16 +64,21 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(band_word(model, theme, now));
     lines.push(row(theme, "height", height, 1, "m", now));
     lines.push(row(theme, "vertical", speed, 1, "m/s", now));
-    lines.push(row(theme, "ignite in", of(|d| d.time_to_ignition_s), 1, "s", now));
-    lines.push(row(theme, "ignite at", of(|d| d.chosen_height_m), 1, "m", now));
+    let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
+    lines.push(row(theme, "ignite in", lights(of(|d| d.time_to_ignition_s)), 1, "s", now));
+    lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
     lines.push(row(theme, "band high", of(|d| d.band_high_m), 1, "m", now));
     lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
     lines.push(chute(descent, theme, now));
+    let attitude = model.vehicle.attitude;
+    let tilt = attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "horizontal", of_motion(motion.map(|m| m.value.horizontal_m_s())), 1, "m/s", now));
+    lines.push(row(theme, "distance", of_motion(motion.map(|m| m.value.distance_m())), 1, "m", now));
+    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
     lines.push(row(theme, "wind", wind_speed(descent), 1, "m/s", now));
     lines.push(row(theme, "wind from", wind_from(descent), 0, "deg", now));
     lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
-    lines.push(row(theme, "thrust x", of(|d| d.thrust_scale), 3, "", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
     lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
     lines
@@ -79,6 +86,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 
 /// Where the height stands against the band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
+        return Line::styled(" NO BURN: motor inhibited", theme.style(Role::Alarm));
+    }
     let Some(descent) = model.vehicle.descent.as_ref() else {
         return Line::styled(" ignition band: no data", theme.style(Role::Caution));
     };

@@ -18,11 +18,11 @@ pub fn lines() -> Vec<Line<'static>> {
         " Ctrl-L          draw the screen again",
         " In a replay: Space, Left, Right, [ and ] (phases), + and - (speed), g, G",
         " q, Ctrl-C       quit; asks when armed or in flight",
-        "",
         " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
         " observed are three facts; armed is what HEARTBEAT says.",
         " o command, # actual. A line is flown, dots are planned; after the",
-        " loss of the link the position is a PREDICTION, + and its circle.",
+        " loss of the link the position is a PREDICTION, + and the circle that holds it",
+        " 19 times in 20. From above N is north, P the way to the pad. * computed here.",
     ]
     .into_iter()
     .map(Line::raw)

@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 
 use super::titled;
 use crate::model::Model;
-use crate::model::command::CommandKind;
+use crate::model::motion::BodySpeed;
 use crate::model::vehicle::Sample;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{Role, Theme};
@@ -30,9 +30,15 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let [left, right] =
         below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
     draw_left(model, theme, now, frame, left);
-    let title = if lost::is_lost(model, now) { "Side view: PREDICTION +" } else { "Side view: flown, plan" };
-    let inside = titled(title, theme, frame, right);
-    side::draw(model, theme, now, frame, inside);
+    let shows = if lost::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
+    for (from, title, area) in side::pictures(model, right) {
+        let title = match from {
+            side::From::East => format!("{title}: {shows}"),
+            side::From::South => format!("{title}: flown"),
+        };
+        let inside = titled(&title, theme, frame, area);
+        side::draw(model, (side::Part::Burn, from), theme, now, frame, inside);
+    }
 }
 
 fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -91,7 +97,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     // The newest event earns a line before anything else does.
     lines.extend(newest_event(model, theme));
     // An abort has its place above.
-    if let Some(track) = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort) {
+    if let Some(track) = top::open_command(model, now) {
         lines.push(top::facts_short(track, theme, now));
     }
     lines.push(attitude(model, theme, now));
@@ -103,7 +109,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     }));
     lines.push(verdict);
     lines.extend(controller::rows(model, theme, now).into_iter().take(2));
-    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
+    // In the plane command and actual, in space either plane's.
+    let gimbal = actuators::gimbal_rows(model, theme, now).into_iter();
+    lines.extend(gimbal.step_by(if model.vehicle.in_space { 2 } else { 1 }).take(2));
     lines.extend(actuators::fin_rows(model, theme, now));
     lines.push(happenings::link(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
@@ -130,27 +138,27 @@ fn value(
 
 fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let motion = model.vehicle.best_motion();
-    let altitude =
-        motion.map(|motion| Sample { value: motion.value.altitude_m, received_at: motion.received_at });
-    let climb =
-        motion.map(|motion| Sample { value: motion.value.climb_m_s, received_at: motion.received_at });
+    let altitude = motion.map(|motion| motion.map(|m| m.altitude_m));
+    let climb = motion.map(|motion| motion.map(|m| m.climb_m_s));
     let mut spans = value(theme, "alt", altitude, 1, now);
     spans.extend(value(theme, "vz", climb, 1, now));
     Line::from(spans)
 }
 
 fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let body = model.vehicle.body_speed();
-    let attitude = model.vehicle.attitude;
-    let u = body.map(|body| Sample { value: body.value.u_m_s, received_at: body.received_at });
-    let w = body.map(|body| Sample { value: body.value.w_m_s, received_at: body.received_at });
-    let pitch = attitude.map(|attitude| Sample {
-        value: attitude.value.pitch_rad.to_degrees(),
-        received_at: attitude.received_at,
-    });
-    let mut spans = value(theme, "pitch", pitch, 1, now);
-    spans.extend(value(theme, "u", u, 1, now));
-    spans.extend(value(theme, "w", w, 2, now));
+    let vehicle = &model.vehicle;
+    let (body, attitude) = (vehicle.body_speed(), vehicle.attitude);
+    let axial = body.map(|body| body.map(|b| b.u_m_s));
+    let mut spans;
+    if vehicle.in_space {
+        spans = value(theme, "tilt", attitude.map(|a| a.map(|a| a.tilt_rad.to_degrees())), 1, now);
+        spans.extend(value(theme, "u", axial, 1, now));
+        spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
+    } else {
+        spans = value(theme, "pitch", attitude.map(|a| a.map(|a| a.pitch_rad.to_degrees())), 1, now);
+        spans.extend(value(theme, "u", axial, 1, now));
+        spans.extend(value(theme, "w", body.map(|body| body.map(|b| b.w_m_s)), 2, now));
+    }
     Line::from(spans)
 }
 

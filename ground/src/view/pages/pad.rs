@@ -10,11 +10,11 @@ use ratatui::text::{Line, Span};
 use super::titled;
 use crate::model::Model;
 use crate::model::command::CommandKind;
-use crate::model::vehicle::Vehicle;
+use crate::model::vehicle::{Vehicle, is_on_pad};
 use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{Role, Theme};
-use crate::view::{draw_lines, flight, happenings, top};
+use crate::view::{draw_lines, flight, happenings, next, top};
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
@@ -47,7 +47,11 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 /// The failing checks first: they are what a small screen must show.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = vec![top::command(model, theme, now)];
+    // What is next in flight stands above already.
+    let mut lines: Vec<Line> = match next::line(model, theme, now) {
+        Some(_) => Vec::new(),
+        None => vec![top::command(model, theme, now)],
+    };
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
@@ -59,7 +63,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 
 /// One line a check: GO or NO, its name, the value found, and why it refuses.
 fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let status = model.vehicle.status.as_ref();
+    // Off the pad the vehicle checks nothing of this, and sends no failing check either.
+    let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
+    let status = model.vehicle.status.as_ref().filter(|_| !off_pad);
     let stale = status.is_some_and(|status| status.is_stale(now));
     let mut lines: Vec<Line> = TdCheck::all()
         .iter_names()
@@ -82,6 +88,9 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         })
         .collect();
     let summary = match status {
+        None if off_pad => {
+            Line::styled(" off the pad nothing is checked for arming", theme.style(Role::Label))
+        }
         None => Line::styled(" the vehicle has not said how its checks stand", theme.style(Role::Caution)),
         Some(status) => top::readiness(status, theme, now).unwrap_or_else(|| {
             let count = status.value.checks_failed.iter_names().count();
@@ -115,9 +124,9 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_ABORT_LATCH => yes_no(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, "latched", "free"),
         TdCheck::TD_CHECK_PIN => yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"),
         TdCheck::TD_CHECK_TILT => number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"),
-        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.pitch_rate_rad_s.to_degrees()), 1, "deg/s"),
+        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"),
         TdCheck::TD_CHECK_SPEED => {
-            let speed = vehicle.motion.map(|m| libm::hypot(m.value.vx_m_s, m.value.climb_m_s));
+            let speed = vehicle.motion.map(|m| m.value.speed_m_s());
             number(speed, 2, "m/s")
         }
         TdCheck::TD_CHECK_FINS => {
@@ -164,7 +173,9 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
     let phase = vehicle.phase().map(|phase| phase.value);
     let armed = vehicle.armed().is_some_and(|armed| armed.value);
-    let checked = vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
+    let on_pad = phase.is_some_and(is_on_pad);
+    let checked =
+        on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
     let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
     let counting = vehicle.countdown_s().is_some();
     let rungs = [

@@ -7,29 +7,32 @@ use ratatui::text::{Line, Span};
 use crate::model::{Model, words};
 use crate::view::number::fixed;
 use crate::view::theme::{Role, Theme};
-use crate::view::touchdown;
+use crate::view::{touchdown, verdict};
 
-/// Columns of the verdict beside the greatest values.
-const VERDICT_COLUMNS: usize = 38;
+/// Columns of the plan's end beside the greatest values.
+const PLAN_COLUMNS: usize = 37;
+/// Columns of the greatest values.
+const MAXIMA_COLUMNS: usize = 34;
 
 /// The word that decides, then limits and maxima, then the timeline.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let mut lines = vec![match model.vehicle.verdict {
-        Some(verdict) => {
-            let (word, role) = touchdown::verdict_word(verdict.value.landed);
-            Line::styled(format!(" {word}"), theme.style(role))
-        }
-        None => Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution)),
-    }];
-    let (title, mut limits) = touchdown::panel(model, theme, now);
-    if model.vehicle.verdict.is_some() {
-        limits.pop();
-    }
-    limits.insert(0, Line::styled(title, theme.style(Role::Title)));
+    let (head, limits, limit_columns) = if let Some(judged) = &model.vehicle.verdict {
+        (
+            verdict::words(model, &judged.value, theme, columns),
+            verdict::table(model, &judged.value, theme, columns),
+            verdict::table_columns(model, &judged.value),
+        )
+    } else {
+        let (title, mut limits) = touchdown::panel(model, theme, now);
+        limits.insert(0, Line::styled(title, theme.style(Role::Title)));
+        let none = Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution));
+        (none, limits, PLAN_COLUMNS)
+    };
+    let mut lines = vec![head];
     let mut maxima = maxima(model, theme);
     maxima.insert(0, Line::styled(" Greatest values in flight", theme.style(Role::Title)));
-    if columns >= 2 * VERDICT_COLUMNS {
-        lines.extend(beside(limits, maxima));
+    if columns > limit_columns + MAXIMA_COLUMNS {
+        lines.extend(beside(limits, limit_columns + 1, maxima));
     } else {
         lines.extend(limits);
         lines.extend(maxima);
@@ -40,13 +43,13 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<
     lines
 }
 
-fn beside(left: Vec<Line<'static>>, right: Vec<Line<'static>>) -> Vec<Line<'static>> {
+fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -> Vec<Line<'static>> {
     let rows = left.len().max(right.len());
     let (mut left, mut right) = (left.into_iter(), right.into_iter());
     (0..rows)
         .map(|_| {
             let line = left.next().unwrap_or_default();
-            let gap = VERDICT_COLUMNS.saturating_sub(line.width() + 1);
+            let gap = columns.saturating_sub(line.width() + 1);
             let mut spans = vec![Span::raw(" ")];
             let style = line.style;
             spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
@@ -73,8 +76,9 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     vec![
         row("altitude", most.altitude_m, 2, "m"),
         row("descent speed", most.descent_m_s, 2, "m/s"),
+        row("distance", most.distance_m, 1, "m"),
         row("tilt", most.tilt_rad.map(f64::to_degrees), 2, "deg"),
-        row("pitch rate", most.pitch_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
+        row("turn rate", most.turn_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
         row("gimbal", most.gimbal_rad.map(f64::to_degrees), 2, "deg"),
         row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
         row("least margin", milliseconds(most.margin_min_s), 2, "ms"),

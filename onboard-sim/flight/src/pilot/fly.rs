@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::known::Burning;
-use super::outlook::commit_height_m;
+use super::outlook::{commit_height_m, touchdown_m};
 use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
 use crate::aim::Aim;
 use crate::airframe::MassProperties;
@@ -138,8 +138,7 @@ impl Pilot {
         let ignition =
             self.known.mission.ignition.outlook(&column, &self.known.curve, height_m, vertical_m_s, fins_m2);
         let parachute = &self.known.airframe().parachute;
-        let to_ground_s = height_m.max(0.0) / (-vertical_m_s).max(5.0);
-        let drifting = state.position_m + state.velocity_m_s * to_ground_s;
+        let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
         // What the fall from apogee has made of the speed so far, by drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let fallen_m = (self.known.mission.start.height_m - state.position_m.z).max(0.0);
@@ -154,7 +153,7 @@ impl Pilot {
             ),
             height_m,
             predicted_speed_m_s: terminal_m_s * (1.0 - shed).max(0.0).sqrt(),
-            touchdown_distance_m: libm::hypot(drifting.x, drifting.y),
+            touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
         };
     }
 

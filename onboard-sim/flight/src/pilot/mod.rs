@@ -16,7 +16,7 @@ mod restart;
 mod sample;
 
 use known::Known;
-pub use outlook::Outlook;
+pub use outlook::{Outlook, touchdown_m};
 
 use crate::aim::AimLoop;
 use crate::airframe::MassModel;

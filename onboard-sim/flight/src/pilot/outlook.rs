@@ -1,9 +1,14 @@
 //! What the flight computer expects of the next seconds.
 
+use nalgebra::{Vector2, Vector3};
+
 use crate::ignition::IgnitionOutlook;
 
 /// Room the parachute needs, times this, is left above the ground.
 const COMMIT_MARGIN: f64 = 1.5;
+
+/// A fall is taken to be no slower than this, m/s: at apogee the time to the ground is not without end.
+const FALL_MIN_M_S: f64 = 5.0;
 
 /// Expectations before ignition, made anew five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,8 +30,16 @@ pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_d
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }
 
+/// Where a vehicle would touch down if it were steered no more, m, in the world's horizontal axes: from a place, m, with
+/// a velocity, m/s, and its feet at a height, m.
+pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m: f64) -> Vector2<f64> {
+    let to_ground_s = height_m.max(0.0) / (-velocity_m_s.z).max(FALL_MIN_M_S);
+    (place_m + velocity_m_s * to_ground_s).xy()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::pilot::sample::{falling, input};
     use crate::pilot::{Pilot, PilotInput};
 
@@ -40,5 +53,15 @@ mod tests {
         let pilot = falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
         assert!(abort_releases(&mut pilot.restarted(0.1), 21));
+    }
+
+    #[test]
+    fn a_fall_leads_on_along_its_velocity_and_a_slow_one_not_for_ever() {
+        let place_m = Vector3::new(10.0, -4.0, 80.4);
+        let falling = touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, -40.0), 80.0);
+        assert_eq!(falling, Vector2::new(6.0, -2.0));
+        let at_apogee = touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, 0.0), 80.0);
+        assert_eq!(at_apogee, Vector2::new(-22.0, 12.0));
+        assert_eq!(touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, -0.2), -0.1), place_m.xy());
     }
 }
