@@ -9,11 +9,10 @@ use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
-use replay::recover::recover;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 use replay::tick::tick;
-use replay::verify::{Obstacle, Outcome, verify};
+use replay::verify::{Outcome, verify};
 
 use crate::asked::{settings, with, with_plant};
 use crate::command_line::{replay, run};
@@ -28,21 +27,6 @@ fn it_landed_and_verifies() {
     assert!(LANDED.landed && recording().verdict.unwrap().landed);
     let report = verify(&LANDED.log).unwrap();
     assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
-}
-
-/// What a damaged log has lost is no restart of the flight computer.
-#[test]
-fn frames_that_a_log_has_lost_are_a_gap() {
-    let (damaged, recovered) = (LANDED.beside("damaged.mcap"), LANDED.beside("recovered.mcap"));
-    let mut bytes = std::fs::read(&LANDED.log).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(&damaged, bytes).unwrap();
-    recover(&damaged, &recovered).unwrap();
-    let report = verify(&recovered).unwrap();
-    assert_eq!(report.outcome, Outcome::NotReplayable, "{report:?}");
-    assert!(matches!(report.obstacle, Some(Obstacle::Gap { .. })), "{:?}", report.obstacle);
-    assert_eq!(report.first_divergence, None);
 }
 
 #[test]

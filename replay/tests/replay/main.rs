@@ -11,6 +11,7 @@ mod flown;
 mod foreign;
 mod from_apogee;
 mod limits;
+mod lost_frames;
 mod obstacles;
 mod pages;
 mod pilot;

@@ -48,7 +48,7 @@ pub(super) struct AtStart<'a> {
 impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
-        let (pilot_start, frames) = recording.replayable_frames()?;
+        let (pilot_start, frames) = recording.recorded_frames()?;
         if options.from == From::Estimate {
             let reason =
                 "the world at the start is the true one; --from estimate is for planar landings".to_owned();
@@ -58,11 +58,10 @@ impl<'a> AtStart<'a> {
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
-        let mut recorded = frames[..place].iter();
         while rerun.flight.frame() + 1 < first_frame && rerun.step()? {
             let flight = &rerun.flight;
             if let (Some(input), Some(piloted)) = (flight.input(), flight.piloted())
-                && let Some(then) = recorded.next()
+                && let Some(then) = recorded_frame(&frames[..place], flight.frame())
             {
                 reached.frames += 1;
                 let now = tick_to_log(input, piloted, flight.pilot().digest());
@@ -130,9 +129,8 @@ impl<'a> AtStart<'a> {
             let flight = &rerun.flight;
             if let (Some(_), Some(piloted)) = (flight.input(), flight.piloted()) {
                 ticks += 1;
-                if let Ok(place) = self.frames.binary_search_by_key(&flight.frame(), |tick| tick.input.frame)
-                {
-                    let then = &self.frames[place].output.gimbal_rad;
+                if let Some(then) = recorded_frame(self.frames, flight.frame()) {
+                    let then = &then.output.gimbal_rad;
                     let pairs = || then.iter().zip(&piloted.gimbal_rad);
                     commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
                     let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -250,6 +248,12 @@ impl<'a> AtStart<'a> {
         }
         Ok(rerun)
     }
+}
+
+/// A recorded frame by its number; a log may have lost it.
+fn recorded_frame(frames: &[flight_v1::PilotTick], number: u64) -> Option<&flight_v1::PilotTick> {
+    let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
+    frames.get(place)
 }
 
 /// The plant has an airframe and what chance decided, the controller everything but the latter.
