@@ -1,5 +1,6 @@
 //! The jobs of a sweep, several at a time.
 
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -36,10 +37,7 @@ pub fn sweep(
     let missing: Vec<usize> = (0..all).filter(|job| state.outcome(*job).is_none()).collect();
     let mut done = all - missing.len();
     progress(Progress { done, jobs: all });
-    let prepared: Vec<Prepared> =
-        flights.iter().map(|flight| Prepared::new(flight, options)).collect::<Result<_, _>>().map_err(
-            |source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) },
-        )?;
+    let prepared = prepare(flights, &missing, options)?;
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let mut failed: Option<(usize, SweepError)> = None;
@@ -52,7 +50,9 @@ pub fn sweep(
                 while !stop.load(Ordering::Relaxed)
                     && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
                 {
-                    let outcome = fly(prepared, points, options, job);
+                    // Whatever is missing was made ready.
+                    let Some(flight) = prepared.get(&(job % flights.len())) else { return };
+                    let outcome = fly(flight, points, options, job / flights.len());
                     if results.send((job, outcome)).is_err() {
                         return;
                     }
@@ -90,18 +90,34 @@ pub fn sweep(
     Ok(SweepReport::ranked(flights.iter().map(|flight| flight.name.clone()).collect(), outcomes.collect()))
 }
 
+/// Every flight that a missing job needs, made ready; to fly one up to its start may take as long as the rest of it.
+fn prepare<'a>(
+    flights: &'a [Recording],
+    missing: &[usize],
+    options: &ReflyOptions,
+) -> Result<BTreeMap<usize, Prepared<'a>>, SweepError> {
+    let needed = flights
+        .iter()
+        .enumerate()
+        .filter(|(place, _)| missing.iter().any(|job| job % flights.len() == *place));
+    let prepared = needed.map(|(place, flight)| Ok((place, Prepared::new(flight, options)?)));
+    prepared
+        .collect::<Result<_, ReflyError>>()
+        .map_err(|source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) })
+}
+
 fn fly(
-    flights: &[Prepared],
+    flight: &Prepared,
     points: &[Choice],
     options: &ReflyOptions,
-    job: usize,
+    point: usize,
 ) -> Result<FlightOutcome, ReflyError> {
     let mut options = options.clone();
-    if let Some(choice) = points.get(job / flights.len()) {
+    if let Some(choice) = points.get(point) {
         options.settings.extend(choice.settings.iter().cloned());
         options.plant_settings.extend(choice.plant_settings.iter().cloned());
     }
-    let report = flights[job % flights.len()].fly(&options)?;
+    let report = flight.fly(&options)?;
     Ok(FlightOutcome { landed: report.reflown.is_some_and(|verdict| verdict.landed), margin: report.margin })
 }
 

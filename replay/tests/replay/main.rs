@@ -16,6 +16,7 @@ mod obstacles;
 mod pages;
 mod pilot;
 mod recovery;
+mod resumed_sweep;
 mod simulated;
 mod tables;
 mod what_if;
