@@ -1,12 +1,14 @@
 //! The frames of a flight computer, counted, and what can be done with them.
 
+use protocol::log::flight_v1::PilotTiming;
 use serde::Serialize;
 
-use super::{Grade, GradeLevel, ProfileFacts};
+use super::solve_times::SolveTimeCounter;
+use super::{Grade, GradeLevel, ProfileFacts, SolveTimes};
 use crate::log::{FrameOrder, Gap, TickRanges};
 
 /// The frames of the flight computer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameFacts {
     /// The lowest number.
     pub first: u64,
@@ -22,6 +24,8 @@ pub struct FrameFacts {
     pub repeated: u64,
     /// There is a record of how the computer was let go.
     pub start: bool,
+    /// How long those took that plan; `None` of a flight that was simulated without a clock.
+    pub solve_time: Option<SolveTimes>,
 }
 
 /// Counts frames.
@@ -31,6 +35,7 @@ pub(super) struct FrameCounter {
     order: FrameOrder,
     lost: usize,
     first_lost: Option<Gap>,
+    solve_times: SolveTimeCounter,
     /// The flight computer was let go on record.
     start: bool,
 }
@@ -49,6 +54,10 @@ impl FrameCounter {
         }
     }
 
+    pub(super) fn time(&mut self, timing: &PilotTiming) {
+        self.solve_times.count(timing.solve_time_s, timing.deadline_s);
+    }
+
     pub(super) fn into_facts(self) -> Option<FrameFacts> {
         let (first, last) = self.frames.bounds()?;
         // What is lost before the first frame is no gap between frames.
@@ -61,6 +70,7 @@ impl FrameCounter {
             first_lost: self.first_lost,
             repeated: self.frames.repeated(),
             start: self.start,
+            solve_time: self.solve_times.into_facts(),
         })
     }
 }

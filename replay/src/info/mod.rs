@@ -4,13 +4,15 @@ mod channels;
 mod facts;
 mod frames;
 mod phases;
+mod solve_times;
 mod ticks;
 
 pub use channels::ChannelFacts;
 pub use facts::{Completeness, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit};
 pub use frames::FrameFacts;
 pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
-pub use ticks::{Named, SolveTimes, TickFacts};
+pub use solve_times::SolveTimes;
+pub use ticks::{Named, TickFacts};
 
 use std::io::Read;
 use std::path::Path;
@@ -85,6 +87,7 @@ impl Seen {
                 self.unreadable.get_or_insert(reason);
             }
             Entry::PilotStart(_) => self.frames.let_go(),
+            Entry::PilotTiming(timing) => self.frames.time(&timing),
             Entry::PilotTick(tick) => {
                 self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
                 self.frames.count(tick.input.frame, record);

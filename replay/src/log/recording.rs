@@ -95,6 +95,8 @@ pub struct Recording {
     pub frames: Vec<flight_v1::PilotTick>,
     /// How many of them stand before the first that the log has lost.
     pub frames_unbroken: usize,
+    /// How long those took that plan, in file order; none of a flight that was simulated without a clock.
+    pub timings: Vec<flight_v1::PilotTiming>,
     /// Its simulated world, in file order.
     pub world: Vec<flight_v1::TruthSample>,
     /// The simulated plant, in file order.
@@ -135,6 +137,7 @@ impl Recording {
                     tick.output.plan.gimbal_rad = Vec::new();
                     recording.ticks.push(*tick);
                 }
+                Entry::PilotTiming(timing) => recording.timings.push(timing),
                 Entry::World(sample) => recording.world.push(*sample),
                 Entry::Truth(truth) => recording.truth.push(*truth),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
@@ -168,6 +171,7 @@ impl Recording {
         let kinds = [
             ("controller ticks", self.ticks.len()),
             ("frames of the flight computer", self.frames.len()),
+            ("timings of the flight computer", self.timings.len()),
             ("records of the world", self.world.len()),
             ("records of the plant", self.truth.len() / 10),
             ("records of telemetry", self.telemetry.len()),

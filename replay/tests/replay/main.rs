@@ -18,5 +18,6 @@ mod pilot;
 mod recovery;
 mod resumed_sweep;
 mod simulated;
+mod solve_times;
 mod tables;
 mod what_if;
