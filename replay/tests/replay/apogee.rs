@@ -220,6 +220,8 @@ fn every_plan_solved_again_is_the_flown_one() {
     assert!(plans > 5 && warm_iterations < cold_iterations, "{plans}: {warm_iterations}, {cold_iterations}");
     let between = tick(&recording, 3).unwrap();
     assert!(between.identical && between.warm.is_none() && between.path.is_empty());
+    let nearest = tick(&recording, between.nearest_solved.unwrap()).unwrap();
+    assert!(nearest.warm.is_some() && nearest.nearest_solved == Some(nearest.tick));
     let refusal = tick(&recording, 99_999).unwrap_err().to_string();
     assert!(refusal.contains("no tick 99999 that can be re-executed; there are 1 to"), "{refusal}");
 }

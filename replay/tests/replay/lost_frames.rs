@@ -15,12 +15,14 @@ use replay::verify::{Obstacle, Outcome, verify};
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
 
-/// The landed flight's log, with a bit turned in its middle, recovered.
+/// The landed flight's log, with a bit turned in a chunk in its middle, recovered.
 static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
     let (damaged, recovered) = (LANDED.beside("damaged.mcap"), LANDED.beside("recovered.mcap"));
     let mut bytes = std::fs::read(&LANDED.log).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
+    let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let chunk = &chunks[chunks.len() / 2];
+    let within = usize::try_from(chunk.chunk_start_offset + chunk.chunk_length / 2).unwrap();
+    bytes[within] ^= 1;
     std::fs::write(&damaged, bytes).unwrap();
     recover(&damaged, &recovered).unwrap();
     recovered

@@ -15,6 +15,7 @@ mod lost_frames;
 mod obstacles;
 mod pages;
 mod pilot;
+mod plain_answers;
 mod planned_paths;
 mod recovery;
 mod resumed_sweep;

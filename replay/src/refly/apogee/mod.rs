@@ -122,7 +122,8 @@ impl<'a> AtStart<'a> {
         mut kept: Option<&mut Kept>,
     ) -> Result<(ReflyReport, Option<protocol::log::v1::LandingVerdict>), ReflyError> {
         let mut rerun = self.changed(options)?;
-        let (mut ticks, mut commands_identical, mut gimbal_difference_max_rad) = (0, 0, 0.0_f64);
+        let (mut ticks, mut commands_recorded, mut commands_identical) = (0, 0, 0);
+        let mut gimbal_difference_max_rad = 0.0_f64;
         let mut phase = rerun.flight.pilot().mode().phase;
         loop {
             let goes_on = rerun.step()?;
@@ -132,6 +133,7 @@ impl<'a> AtStart<'a> {
                 if let Some(then) = recorded_frame(self.frames, flight.frame()) {
                     let then = &then.output.gimbal_rad;
                     let pairs = || then.iter().zip(&piloted.gimbal_rad);
+                    commands_recorded += 1;
                     commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
                     let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                     gimbal_difference_max_rad = gimbal_difference_max_rad.max(apart_rad);
@@ -152,6 +154,7 @@ impl<'a> AtStart<'a> {
             reached: Some(self.reached),
             thrust_scale: rerun.flight.world().truth().impulse_scale,
             ticks,
+            commands_recorded,
             commands_identical,
             gimbal_difference_max_rad,
             ..report(self.recording, options, self.state, self.recorded.clone(), reflown)
