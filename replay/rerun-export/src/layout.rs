@@ -87,7 +87,7 @@ impl Layout<'_> {
         let log = self.view("TextLog", "Events", "log", &texts, &[("TextLogColumns", &columns)])?;
         let report = self.view("TextDocument", "Verdict and run", entity::REPORT, &["$origin"], &[])?;
         let words = self.container(ContainerKind::Horizontal, &[&log, &report], &[3.0, 2.0])?;
-        let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[5.0, 1.2, 2.6])?;
+        let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[4.6, 1.7, 2.6])?;
         let plots = plots
             .iter()
             .map(|plot| {
