@@ -5,8 +5,8 @@ use super::page::{escaped, put};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
-/// Height of a picture that is higher than wide.
-const TALL_MAX: f64 = 820.0;
+/// Height of a picture that is higher than wide: three others stand beside it.
+const TALL: f64 = 800.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 52.0;
@@ -55,11 +55,10 @@ impl Chart {
             return String::new();
         };
         // What is in one scale and higher than wide gets a picture that is too.
-        let slimness = (y_to - y_from) / (x_to - x_from);
-        let tall = self.equal_scales && slimness > 1.0;
+        let tall = self.equal_scales && y_to - y_from > x_to - x_from;
         let width = if self.full && !tall { 2.0 * WIDTH } else { WIDTH };
         let height = match (self.equal_scales, tall) {
-            (_, true) => (TOP + BOTTOM + (WIDTH - LEFT - RIGHT) * slimness).min(TALL_MAX),
+            (_, true) => TALL,
             (true, false) => 2.0 * HEIGHT,
             (false, false) => HEIGHT,
         };
@@ -227,8 +226,7 @@ mod tests {
             full: true,
             ..Chart::default()
         };
-        assert!(path(20.0).svg().starts_with("<figure class=\"tall\"><svg viewBox=\"0 0 520 "));
-        assert!(path(110.0).svg().contains("viewBox=\"0 0 520 820\""));
+        assert!(path(110.0).svg().starts_with("<figure class=\"tall\"><svg viewBox=\"0 0 520 800\""));
         assert!(path(5.0).svg().starts_with("<figure class=\"full\"><svg viewBox=\"0 0 1040 520\""));
     }
 }
