@@ -10,6 +10,7 @@ mod divergence;
 mod flown;
 mod foreign;
 mod from_apogee;
+mod from_estimate;
 mod limits;
 mod lost_frames;
 mod obstacles;

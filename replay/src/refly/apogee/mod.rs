@@ -17,7 +17,7 @@ use tick_log::pilot::tick_to_log;
 use world::Truth;
 use world::sensors::FRAME_S;
 
-use self::place::{find, phase_of};
+use self::place::{find, phase_of, put_where_it_believes, recorded_frame};
 use self::rerun::{Recipe, Rerun};
 use super::start::{From, StartState};
 use super::{Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report};
@@ -49,11 +49,6 @@ impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.recorded_frames()?;
-        if options.from == From::Estimate {
-            let reason =
-                "the world at the start is the true one; --from estimate is for planar landings".to_owned();
-            return Err(ReflyError::Recipe { name: recording.name.clone(), reason });
-        }
         let Recipe { dispersion, number, mut rerun } = Recipe::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
@@ -82,6 +77,9 @@ impl<'a> AtStart<'a> {
             }
             None => None,
         };
+        if options.from == From::Estimate {
+            put_where_it_believes(recording, &mut rerun, first_frame)?;
+        }
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
         let before = place
@@ -91,7 +89,7 @@ impl<'a> AtStart<'a> {
             tick: first_frame,
             time_s: frames[place].input.time_s,
             phase: before,
-            from: From::Truth,
+            from: options.from,
             x_m: libm::hypot(place_m.x, place_m.y),
             z_m: world.height_m(),
         };
@@ -251,12 +249,6 @@ impl<'a> AtStart<'a> {
         }
         Ok(rerun)
     }
-}
-
-/// A recorded frame by its number; a log may have lost it.
-fn recorded_frame(frames: &[flight_v1::PilotTick], number: u64) -> Option<&flight_v1::PilotTick> {
-    let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
-    frames.get(place)
 }
 
 /// The plant has an airframe and what chance decided, the controller everything but the latter.
