@@ -1,7 +1,8 @@
 //! The jobs of a sweep, several at a time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 
@@ -37,7 +38,7 @@ pub fn sweep(
     let missing: Vec<usize> = (0..all).filter(|job| state.outcome(*job).is_none()).collect();
     let mut done = all - missing.len();
     progress(Progress { done, jobs: all });
-    let prepared = prepare(flights, &missing, options)?;
+    let prepared = prepare(flights, &missing, options, jobs)?;
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let mut failed: Option<(usize, SweepError)> = None;
@@ -90,17 +91,32 @@ pub fn sweep(
     Ok(SweepReport::ranked(flights.iter().map(|flight| flight.name.clone()).collect(), outcomes.collect()))
 }
 
-/// Every flight that a missing job needs, made ready; to fly one up to its start may take as long as the rest of it.
+/// Every flight that a missing job needs, made ready, `jobs` at a time: to fly one up to its start may take as long as the
+/// rest of it.
 fn prepare<'a>(
     flights: &'a [Recording],
     missing: &[usize],
     options: &ReflyOptions,
+    jobs: NonZeroUsize,
 ) -> Result<BTreeMap<usize, Prepared<'a>>, SweepError> {
-    let needed = flights
-        .iter()
-        .enumerate()
-        .filter(|(place, _)| missing.iter().any(|job| job % flights.len() == *place));
-    let prepared = needed.map(|(place, flight)| Ok((place, Prepared::new(flight, options)?)));
+    let needed: BTreeSet<usize> = missing.iter().map(|job| job % flights.len()).collect();
+    let needed: Vec<usize> = needed.into_iter().collect();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut prepared = Vec::new();
+        while let Some(place) = needed.get(next.fetch_add(1, Ordering::Relaxed)) {
+            prepared.push((*place, Prepared::new(&flights[*place], options)));
+        }
+        prepared
+    };
+    let prepared: BTreeMap<usize, Result<Prepared, ReflyError>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..jobs.get().min(needed.len())).map(|_| scope.spawn(work)).collect();
+        let joined =
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        joined.flatten().collect()
+    });
+    // Of several errors that of the first flight, whichever came first.
+    let prepared = prepared.into_iter().map(|(place, flight)| Ok((place, flight?)));
     prepared
         .collect::<Result<_, ReflyError>>()
         .map_err(|source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) })

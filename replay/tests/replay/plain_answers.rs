@@ -8,6 +8,7 @@ use replay::refly::{ReflyOptions, refly};
 
 use crate::asked::with_plant;
 use crate::command_line::{replay, run};
+use crate::foreign::foreign_mcap;
 use crate::from_apogee::LANDED;
 use crate::simulated::{NOMINAL, WITH_FRAMES};
 
@@ -31,6 +32,16 @@ fn flights_with_nothing_in_common_are_not_within_tolerance() {
     for name in ["| pitch error | ", "| vertical speed | - | "] {
         assert!(stdout.contains(name), "{name} is not in\n{stdout}");
     }
+}
+
+/// What is no flight log leaves nothing behind.
+#[test]
+fn a_foreign_file_exports_to_no_folder() {
+    let (foreign, tables) = (NOMINAL.beside("foreign.mcap"), NOMINAL.beside("no-tables"));
+    std::fs::write(&foreign, foreign_mcap("/pose")).unwrap();
+    let (code, _, stderr) = run(replay("export", &foreign).args(["--to", "csv", "--output"]).arg(&tables));
+    assert!(code == 2 && stderr.contains("none of /controller/tick, /pilot/tick"), "{stderr}");
+    assert!(!tables.exists());
 }
 
 fn telemetry_only() -> PathBuf {
