@@ -151,6 +151,12 @@ fn what_cannot_be_flown_again_is_said() {
     assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
     assert!(refused(&with(&["truth.wind_m_s=3"])).contains("the plant's alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
+    let landing = |tick: &PilotTick| tick.output.phase != u32::from(Phase::AeroDescent.index());
+    let fallen = recording.frames.iter().position(landing).unwrap();
+    let mut falling = recording.clone();
+    falling.frames.truncate(fallen);
+    let refusal = refly(&falling, &ReflyOptions::default()).unwrap_err().to_string();
+    assert!(refusal.contains("a frame, a time or a phase names another moment"), "{refusal}");
     recording.head.run.remove("flight");
     let message = refly(&recording, &ReflyOptions::default()).unwrap_err().to_string();
     assert!(message.contains("apogee.mcap") && message.contains("`flight`"), "{message}");

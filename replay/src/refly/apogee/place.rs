@@ -34,7 +34,10 @@ pub(super) fn find(
         let last = frames.last().map(LoggedPilot::moment);
         let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
         let reason = match start {
-            StartAt::Landing => "no frame of a landing to start from".to_owned(),
+            StartAt::Landing => {
+                "no frame of a landing to start from; a frame, a time or a phase names another moment"
+                    .to_owned()
+            }
             StartAt::Tick(asked) => {
                 format!("no frame {asked}; there are {} to {}", number(first), number(last))
             }
