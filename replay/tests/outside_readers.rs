@@ -1,5 +1,5 @@
-//! The files that replay writes, read by other people's programs: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core`, Rerun,
-//! pandas, polars, pyarrow, pymavlink. `tests/outside/setup` installs them into the target folder and nowhere else.
+//! The files that replay writes, read by other people's programs: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core` and application,
+//! Rerun, pandas, polars, pyarrow, pymavlink. `tests/outside/setup` installs them into the target folder and nowhere else.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 #[path = "replay/from_apogee.rs"]
@@ -7,18 +7,20 @@ mod from_apogee;
 #[path = "replay/simulated.rs"]
 mod simulated;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, OnceLock};
 
 use e2e::install;
 use replay::export::{TableFormat, export_tables, export_tlog};
+use replay::info::info;
 use replay::log::{FlightLog, Recording};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 
 use from_apogee::LANDED;
-use simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
+use simulated::{DISPERSED, MK2, NOMINAL, WITH_FRAMES};
 
 /// The folder with the outside readers, installed by the first call. `None`, and a loud line, where this machine cannot
 /// have them.
@@ -63,8 +65,8 @@ static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     let recovered = NOMINAL.beside("recovered.mcap");
     recover(&cut, &recovered).unwrap();
     assert!(LANDED.landed);
-    let planar = [&NOMINAL, &DISPERSED, &WITH_FRAMES].map(|flight| flight.log.clone());
-    planar.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
+    let flown = [&NOMINAL, &DISPERSED, &WITH_FRAMES, &MK2].map(|flight| flight.log.clone());
+    flown.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
 });
 
 /// A topic's messages, and the last gimbal command, rad.
@@ -105,10 +107,60 @@ fn logs_are_read_by_foxgloves_library() {
         assert_eq!(of_commands[2], count.to_string(), "{read}");
         assert!(read.contains("/tf foxglove.FrameTransform"), "{read}");
         // Every one but the words of events and operators has something to plot.
-        let plottable = |channel: Vec<&str>| channel[3].parse::<u32>().unwrap() >= 8;
+        let plottable = |channel: Vec<&str>| {
+            let least = if channel[0] == "/pilot/timing" { 4 } else { 8 };
+            channel[3].parse::<u32>().unwrap() >= least
+        };
         let wordy = |channel: &Vec<&str>| matches!(channel[0], "/events" | "/operator/actions");
         assert!(channels.all(|channel| wordy(&channel) || plottable(channel)), "{read}");
     }
+}
+
+/// A browser that needs no window. `None`, and a loud line, where there is none.
+fn browser() -> Option<PathBuf> {
+    const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+    let folders: Vec<PathBuf> =
+        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    let found = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let found = found.into_iter().find(|path| path.is_file());
+    if found.is_none() {
+        assert!(std::env::var_os("TOUCHDOWN_CLIENTS_REQUIRED").is_none(), "no Chromium for Foxglove");
+        // Past the test's captured output, so that nobody overlooks it; nothing is left to do if it cannot be said.
+        let _ =
+            writeln!(std::io::stderr(), "NOT RUN: Foxglove's application needs Chromium, which is not here");
+    }
+    found
+}
+
+/// Foxglove's own application lists every topic with its messages, and draws what it is asked to plot.
+#[test]
+fn logs_open_in_foxglove_with_plots() {
+    let (Some(folder), Some(browser)) = (readers(), browser()) else { return };
+    let flights = [
+        (&NOMINAL, "/vehicle/truth.state.z_m", "/controller/tick.output.gimbal_command_rad"),
+        (&MK2, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[0]"),
+    ];
+    for (flight, height, gimbal) in flights {
+        let picture = flight.beside("foxglove.png");
+        let mut open = Command::new("node");
+        open.arg(script("open_in_foxglove.mjs")).args([&browser, &flight.log]);
+        open.args([height, gimbal]).arg(&picture).current_dir(folder.join("foxglove"));
+        let shown: serde_json::Value = serde_json::from_str(&said(&mut open)).unwrap();
+        let words = shown["words"].as_str().unwrap();
+        for channel in info(&flight.log).unwrap().channels {
+            let listed = format!("{}\n{}\n{}\n", channel.topic, channel.schema, grouped(channel.messages));
+            assert!(words.contains(&listed), "{listed} is not in\n{words}");
+        }
+        let drawn: Vec<u64> =
+            shown["pixels"].as_array().unwrap().iter().filter_map(serde_json::Value::as_u64).collect();
+        assert!(drawn.len() == 2 && drawn.iter().all(|pixels| *pixels > 300), "{shown}");
+        assert_eq!(shown["crashes"].as_array().unwrap().len(), 0, "{shown}");
+    }
+}
+
+/// A count as Foxglove writes it, with commas at the thousands.
+fn grouped(count: u64) -> String {
+    if count < 1000 { count.to_string() } else { format!("{},{:03}", grouped(count / 1000), count % 1000) }
 }
 
 #[test]

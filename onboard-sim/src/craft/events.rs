@@ -57,6 +57,10 @@ pub enum VehicleEvent {
     Tick(Box<Tick>),
     /// The flight computer from apogee ran a frame with a plan in it.
     Planned {
+        /// The frame's number, from apogee.
+        frame: u64,
+        /// Its time since apogee, s.
+        time_s: f64,
         /// Measured, s.
         took_s: f64,
         /// Allowed, s.

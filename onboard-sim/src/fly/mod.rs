@@ -251,7 +251,7 @@ pub async fn fly_observed(
             observe(time_s, event);
             match event {
                 VehicleEvent::Tick(tick) => solve_times.add(tick.solve_time_s, tick.deadline_s),
-                VehicleEvent::Planned { took_s, deadline_s } => solve_times.add(*took_s, *deadline_s),
+                VehicleEvent::Planned { took_s, deadline_s, .. } => solve_times.add(*took_s, *deadline_s),
                 _ => {}
             }
         }

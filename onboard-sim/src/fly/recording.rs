@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use protocol::frame::Frame;
+use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 
@@ -49,7 +50,12 @@ pub(super) fn record(recorder: &Recorder, craft: &dyn Craft, events: &[VehicleEv
                 Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
                 None => continue,
             },
-            VehicleEvent::Planned { .. } => continue,
+            VehicleEvent::Planned { frame, time_s, took_s, deadline_s } => Record::PilotTiming(PilotTiming {
+                frame: *frame,
+                time_s: *time_s,
+                solve_time_s: *took_s,
+                deadline_s: *deadline_s,
+            }),
             VehicleEvent::Text { severity, text } => Record::Event(Event {
                 level: match severity {
                     Severity::Info | Severity::Notice => EventLevel::Info,

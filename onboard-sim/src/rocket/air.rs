@@ -61,7 +61,12 @@ impl Rocket {
             if plans && flight.frame().is_multiple_of(FRAMES_PER_PLAN) {
                 let took_s = flight.pilot_took().as_secs_f64();
                 air.took_s = took_s;
-                self.events.push(VehicleEvent::Planned { took_s, deadline_s: FRAME_S });
+                self.events.push(VehicleEvent::Planned {
+                    frame: input.frame,
+                    time_s: input.time_s,
+                    took_s,
+                    deadline_s: FRAME_S,
+                });
             }
         }
         self.tell(&before);

@@ -71,6 +71,8 @@ pub enum Record {
     PilotStart(Box<flight_v1::PilotStart>),
     /// `/pilot/tick`.
     PilotTick(Box<flight_v1::PilotTick>),
+    /// `/pilot/timing`.
+    PilotTiming(flight_v1::PilotTiming),
     /// `/pilot/estimate`.
     Estimate(Box<flight_v1::Estimate>),
     /// `/vehicle/truth3d`, and with it `/tf`.
@@ -97,6 +99,8 @@ pub const TOPIC_EVENTS: &str = "/events";
 pub const TOPIC_PILOT_START: &str = "/pilot/start";
 /// Topic of the flight computer's frames.
 pub const TOPIC_PILOT_TICK: &str = "/pilot/tick";
+/// Topic of how long its frames with a plan took.
+pub const TOPIC_PILOT_TIMING: &str = "/pilot/timing";
 /// Topic of its estimates.
 pub const TOPIC_ESTIMATE: &str = "/pilot/estimate";
 /// Topic of the simulated vehicle in space.

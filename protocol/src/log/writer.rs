@@ -11,8 +11,9 @@ use super::build::build_info;
 use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
     METADATA_RUN, RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR,
-    TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY,
-    TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform, transform_in_space,
+    TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
+    transform_in_space,
 };
 use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
@@ -147,6 +148,9 @@ impl<W: Write + Seek> LogWriter<W> {
             }
             Record::PilotTick(tick) => {
                 self.write_message(TOPIC_PILOT_TICK, (FLIGHT, "PilotTick"), tick.as_ref(), log_time)
+            }
+            Record::PilotTiming(timing) => {
+                self.write_message(TOPIC_PILOT_TIMING, (FLIGHT, "PilotTiming"), timing, log_time)
             }
             Record::Estimate(estimate) => {
                 self.write_message(TOPIC_ESTIMATE, (FLIGHT, "Estimate"), estimate.as_ref(), log_time)

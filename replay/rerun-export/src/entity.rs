@@ -26,24 +26,32 @@ pub const THRUST: &str = "world/rocket/nozzle/thrust";
 pub const FLOWN: &str = "world/path/flown";
 /// The path up to now, a piece at each record.
 pub const TRAIL: &str = "world/path/trail";
-/// The path the controller plans at each tick.
+/// The path the controller plans at each tick. A flight computer's plans are not in its log: these are made by running it
+/// again.
 pub const PREDICTED: &str = "world/path/predicted";
 /// Where that path ends.
 pub const PREDICTED_TOUCHDOWN: &str = "world/path/predicted_touchdown";
+/// The path that the controller of a planar landing, run again on the recorded inputs, plans at each tick.
+pub const PREDICTED_REPLAYED: &str = "world/path/predicted_replayed";
 /// The first plan under thrust, at all times: what the flight was meant to be.
 pub const FIRST_PLAN: &str = "world/path/first_plan";
 
-/// Everything that is plotted.
+/// Everything that is plotted. A line `replayed` is what the controller, run again on the recorded inputs, decides beside
+/// what is recorded.
 pub const PLOTS: &str = "plots";
 /// The flight phase, as states.
 pub const PHASE: &str = "states/phase";
 /// What decides the gimbal command, as states.
 pub const LEVEL: &str = "states/level";
+/// The same, run again on the recorded inputs.
+pub const LEVEL_REPLAYED: &str = "states/level_replayed";
 
 /// The log's events, as text.
 pub const EVENTS: &str = "log/events";
 /// Each change of phase, as text.
 pub const PHASES: &str = "log/phases";
+/// Where running the controller again differs from the record or ends, as text.
+pub const REPLAY: &str = "log/replay";
 /// The landing verdict, as text.
 pub const VERDICT: &str = "log/verdict";
 /// What flight this is and how it ended, as a document.

@@ -1,20 +1,21 @@
 //! A log into a recording, record by record.
 
 use std::io::{Read, Write};
-use std::path::Path;
 
-use flight::dynamics::PlanarState as FlightState;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::controller::ControlLevel;
 use protocol::log::flight_v1::{PilotTick, TruthSample};
 use protocol::log::v1::{
     ControllerTick, LandingVerdict as RecordedVerdict, PlanarState, PlantTruth, Telemetry,
 };
-use re_sdk::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
+use re_sdk::{RecordingStream, RecordingStreamResult};
 use replay::log::{Entry, FlightLog, StampedEntry};
 
 use crate::ExportError;
+use crate::again::{Again, FrameAgain};
+use crate::identity;
 use crate::layout::send_layout;
-use crate::plots::{FROM_APOGEE, PLANAR, PlotLimit, Plots, plot_of_verdict};
+use crate::plot_list::{FROM_APOGEE, PLANAR, Plot, limits_of};
+use crate::plots::Plots;
 use crate::pose::{
     Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket, world_from_rocket_in_space,
 };
@@ -23,9 +24,6 @@ use crate::scene::{Scene, Seen};
 use crate::survey::{PoseSource, StampedEvent, Survey};
 use crate::times::Times;
 use crate::words;
-
-/// Recordings of one application share a layout in the viewer.
-const APPLICATION: &str = "touchdown";
 
 /// What was exported.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -57,26 +55,9 @@ pub fn export<R: Read, W: Write + Send + 'static>(
     survey: &Survey,
     output: W,
 ) -> Result<(Exported, W), ExportError> {
-    let writer = RrdWriter::new(builder(log.name(), survey), output)?;
+    let writer = RrdWriter::new(identity::builder(log.name(), survey), output)?;
     let exported = Export::new(writer.recording(), survey)?.run(log)?;
     Ok((exported, writer.finish()?))
-}
-
-/// The recording's identity: a log gives the same one every time, and two runs never share one.
-fn builder(log_name: &str, survey: &Survey) -> RecordingStreamBuilder {
-    let stem = Path::new(log_name).file_stem().map_or(log_name.into(), |stem| stem.to_string_lossy());
-    let start_ns = survey.start_unix_ns();
-    let id =
-        start_ns.map_or_else(|| format!("recorded-{stem}"), |start_ns| format!("recorded-{start_ns}-{stem}"));
-    let builder = RecordingStreamBuilder::new(APPLICATION)
-        .enabled(true)
-        .recording_id(id)
-        .recording_name(format!("{stem} (recorded)"))
-        .send_properties(true);
-    match start_ns.and_then(|start_ns| i64::try_from(start_ns).ok()) {
-        Some(start_ns) => builder.recording_started(start_ns),
-        None => builder,
-    }
 }
 
 /// An export under way.
@@ -87,6 +68,9 @@ struct Export<'a> {
     times: Times,
     scene: Scene<'a>,
     plots: Plots<'a>,
+    again: Again,
+    /// The flight computer, run again, flies by a plan.
+    planning: bool,
     verdict: Option<RecordedVerdict>,
     done: Exported,
 }
@@ -100,6 +84,8 @@ impl<'a> Export<'a> {
             times: Times::default(),
             scene: Scene::new(recording, survey)?,
             plots: Plots::new(recording),
+            again: Again::of(survey.profile.as_ref()),
+            planning: false,
             verdict: None,
             done: Exported {
                 events_left_out: survey.events_left_out,
@@ -110,7 +96,7 @@ impl<'a> Export<'a> {
     }
 
     fn run<R: Read>(mut self, log: &mut FlightLog<R>) -> Result<Exported, ExportError> {
-        while let Some(StampedEntry { entry, log_time_ns, .. }) = log.next_entry()? {
+        while let Some(StampedEntry { entry, log_time_ns, sequence, .. }) = log.next_entry()? {
             if self.times.known() {
                 self.events_until(log_time_ns)?;
             }
@@ -127,22 +113,30 @@ impl<'a> Export<'a> {
                     self.done.unreadable += 1;
                     self.done.first_unreadable.get_or_insert(reason);
                 }
-                Entry::PilotTick(tick) => self.frame(&tick, log_time_ns)?,
-                Entry::World(truth) => self.world(&truth, log_time_ns)?,
-                Entry::PilotStart(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {
+                Entry::PilotStart(start) => self.again.let_go(self.survey, &start),
+                Entry::PilotTick(tick) => self.frame(&tick, sequence, log_time_ns)?,
+                Entry::PilotTiming(timing) => {
+                    self.times.learn(timing.time_s, log_time_ns);
+                    self.times.at_vehicle_time(self.recording, timing.time_s);
+                    self.plots.timing(&timing)?;
                 }
+                Entry::World(truth) => self.world(&truth, log_time_ns)?,
+                Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
             }
         }
         self.events_until(u64::MAX)?;
         self.done.damage = log.damage().map(ToString::to_string);
         if let Some(span) = self.times.span() {
-            self.plots.limits(&self.limits(), span)?;
+            self.plots.limits(&limits_of(self.survey, self.verdict.as_ref()), span)?;
         }
-        let Self { recording, survey, scene, verdict, done, .. } = self;
-        words::report(recording, log.name(), survey, verdict.as_ref(), done.damage.as_deref())?;
+        let Self { recording, survey, scene, verdict, plots, again, done, .. } = self;
+        let again = again.words();
+        let remarks = words::Remarks { damage: done.damage.as_deref(), again: again.as_deref() };
+        words::report(recording, log.name(), survey, verdict.as_ref(), remarks)?;
         let extent = scene.finish()?;
-        let plots = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
-        send_layout(recording, APPLICATION, &extent, plots, survey.events.is_empty())?;
+        let known: &[Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
+        let shown: Vec<&Plot> = known.iter().filter(|plot| plots.has(plot)).collect();
+        send_layout(recording, identity::APPLICATION, &extent, &shown, survey.events.is_empty())?;
         Ok(done)
     }
 
@@ -154,7 +148,11 @@ impl<'a> Export<'a> {
         self.phase(tick.input.phase)?;
         let alone = self.survey.pose_source == PoseSource::Estimate;
         self.plots.tick(tick, alone)?;
-        self.scene.plan(tick)?;
+        let again = self.run_again(|again| again.tick(tick))?;
+        self.scene.plan(tick, again.as_ref())?;
+        if let Some(again) = &again {
+            self.plots.tick_again(again)?;
+        }
         if alone {
             let gimbal_rad = Some(tick.input.gimbal_applied_rad);
             self.planar_rocket(&tick.input.state, gimbal_rad, None)?;
@@ -172,13 +170,43 @@ impl<'a> Export<'a> {
     }
 
     /// A frame of a flight from apogee; its numbers stand beside the truth.
-    fn frame(&mut self, tick: &PilotTick, log_time_ns: u64) -> RecordingStreamResult<()> {
+    fn frame(&mut self, tick: &PilotTick, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
         self.times.learn(tick.input.time_s, log_time_ns);
         self.times.tick(tick.input.frame);
         self.times.at_vehicle_time(self.recording, tick.input.time_s);
         self.done.ticks += 1;
         self.phase(tick.output.phase)?;
-        self.plots.level(tick.output.level)
+        self.plots.level(tick.output.level)?;
+        let Some(FrameAgain { tick: again, plan }) = self.run_again(|again| again.frame(tick, record))?
+        else {
+            return Ok(());
+        };
+        self.plots.frame_again(&again, plan.as_ref().map(|(_, iterations)| *iterations))?;
+        let planning = again.output.level != u32::from(ControlLevel::Idle.index());
+        match plan {
+            Some((path_m, _)) => self.scene.path(path_m, again.output.phase, false)?,
+            // What is planned no more is shown no more.
+            None if self.planning && !planning => self.scene.path(Vec::new(), again.output.phase, false)?,
+            None => {}
+        }
+        self.planning = planning;
+        Ok(())
+    }
+
+    /// Runs the controller again, and says so where that differs for the first time or ends.
+    fn run_again<T>(
+        &mut self,
+        run: impl FnOnce(&mut Again) -> Option<T>,
+    ) -> RecordingStreamResult<Option<T>> {
+        let before = (self.again.first_different, self.again.obstacle.is_some());
+        let again = run(&mut self.again);
+        if let (None, Some(tick)) = (before.0, self.again.first_different) {
+            words::replay(self.recording, &format!("tick {tick}, run again, differs from the record"))?;
+        }
+        if let (false, Some(reason)) = (before.1, &self.again.obstacle) {
+            words::replay(self.recording, &format!("from here on nothing is run again: {reason}"))?;
+        }
+        Ok(again)
     }
 
     fn world(&mut self, truth: &TruthSample, log_time_ns: u64) -> RecordingStreamResult<()> {
@@ -247,41 +275,5 @@ impl<'a> Export<'a> {
             self.done.events += 1;
         }
         Ok(())
-    }
-
-    /// The limits a landing is judged by, as recorded with the verdict or else by the profile, and the gimbal's.
-    fn limits(&self) -> Vec<PlotLimit> {
-        let profile = self.survey.profile.as_ref();
-        let limit = |name: &str, lowest, highest| {
-            plot_of_verdict(name).map(|plot| PlotLimit { plot, lowest, highest })
-        };
-        let mut limits: Vec<PlotLimit> = match (&self.verdict, profile) {
-            (Some(verdict), _) => verdict
-                .limits
-                .iter()
-                .filter_map(|judged| limit(&judged.name, judged.minimum, judged.maximum))
-                .collect(),
-            (None, Some(profile)) => {
-                let judged =
-                    LandingVerdict::judge(&TouchdownLimits::from_profile(profile), &FlightState::default());
-                judged
-                    .results
-                    .iter()
-                    .filter_map(|judged| limit(judged.name, judged.lowest, judged.highest))
-                    .collect()
-            }
-            (None, None) => Vec::new(),
-        };
-        if let Some(mission) = &self.survey.mission {
-            let limit_deg = mission.airframe.gimbal.limit_rad().to_degrees();
-            for plot in ["gimbal_pitch_deg", "gimbal_yaw_deg"] {
-                limits.push(PlotLimit { plot, lowest: -limit_deg, highest: limit_deg });
-            }
-        }
-        if let Some(profile) = profile {
-            let limit_deg = profile.gimbal.limit_deg;
-            limits.push(PlotLimit { plot: "gimbal_deg", lowest: -limit_deg, highest: limit_deg });
-        }
-        limits
     }
 }

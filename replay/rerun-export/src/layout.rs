@@ -21,7 +21,7 @@ use re_sdk_types::components::Plane3D;
 use re_sdk_types::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, Uuid, VisibleTimeRange};
 
 use crate::entity;
-use crate::plots::Plot;
+use crate::plot_list::Plot;
 use crate::scene::Extent;
 
 /// Sends the layout of a recording.
@@ -29,7 +29,7 @@ pub(crate) fn send_layout(
     recording: &RecordingStream,
     application: &'static str,
     extent: &Extent,
-    plots: &[Plot],
+    plots: &[&Plot],
     phases_as_text: bool,
 ) -> RecordingStreamResult<()> {
     let blueprint_id = StoreId::random(StoreKind::Blueprint, application);
@@ -70,14 +70,14 @@ impl Layout<'_> {
     fn whole(
         &mut self,
         extent: &Extent,
-        plots: &[Plot],
+        plots: &[&Plot],
         phases_as_text: bool,
     ) -> RecordingStreamResult<RootContainer> {
         let overview = self.overview(extent)?;
         let close_up = self.close_up(extent)?;
         let spaces = self.container(ContainerKind::Horizontal, &[&overview, &close_up], &[3.0, 2.0])?;
         let states = self.view("StateTimeline", "Phase and control level", "states", &["$origin/**"], &[])?;
-        let mut texts = vec!["+ /log/events", "+ /log/verdict"];
+        let mut texts = vec!["+ /log/events", "+ /log/replay", "+ /log/verdict"];
         if phases_as_text {
             texts.push("+ /log/phases");
         }
@@ -87,7 +87,7 @@ impl Layout<'_> {
         let log = self.view("TextLog", "Events", "log", &texts, &[("TextLogColumns", &columns)])?;
         let report = self.view("TextDocument", "Verdict and run", entity::REPORT, &["$origin"], &[])?;
         let words = self.container(ContainerKind::Horizontal, &[&log, &report], &[3.0, 2.0])?;
-        let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[5.0, 1.2, 2.6])?;
+        let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[4.6, 1.7, 2.6])?;
         let plots = plots
             .iter()
             .map(|plot| {

@@ -11,12 +11,15 @@
 //! This is a crate of its own because Rerun costs more to compile than everything else here together.
 #![warn(missing_docs)]
 
+mod again;
 pub mod entity;
 mod error;
 pub mod export;
 mod file;
 mod flown;
+mod identity;
 mod layout;
+mod plot_list;
 mod plots;
 pub mod pose;
 mod rrd;

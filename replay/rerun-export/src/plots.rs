@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use flight::controller::ControlLevel;
 use flight::phase::Phase;
-use protocol::log::flight_v1::TruthSample;
+use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
 use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
 use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Scalars, SeriesLines, StateChange};
@@ -13,49 +13,15 @@ use re_sdk_types::datatypes::Rgba32;
 use tick_log::pilot::state_from_log;
 
 use crate::entity;
+use crate::plot_list::{GIMBAL_IN_SPACE, Plot, PlotLimit};
 use crate::pose::pitch_error_deg;
 use crate::times::{Instant, Times};
 
 const BLUE: Rgba32 = Rgba32::from_rgb(92, 170, 255);
 const ORANGE: Rgba32 = Rgba32::from_rgb(255, 176, 59);
 const GREEN: Rgba32 = Rgba32::from_rgb(120, 200, 130);
+const VIOLET: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const RED: Rgba32 = Rgba32::from_rgb(200, 70, 70);
-
-/// A plot: its name with its unit, as in its entity path, and its title.
-pub(crate) struct Plot {
-    pub(crate) name: &'static str,
-    pub(crate) title: &'static str,
-    /// A legend covers much of a plot; the colours mean the same in all of them.
-    pub(crate) legend: bool,
-}
-
-/// Every plot of a planar landing, in the order of the layout.
-pub(crate) const PLANAR: [Plot; 10] = [
-    Plot { name: "altitude_m", title: "Altitude, m", legend: true },
-    Plot { name: "x_m", title: "Horizontal position, m", legend: false },
-    Plot { name: "u_m_s", title: "Axial velocity u, m/s", legend: false },
-    Plot { name: "w_m_s", title: "Lateral velocity w, m/s", legend: false },
-    Plot { name: "pitch_error_deg", title: "Pitch from upright, deg", legend: false },
-    Plot { name: "q_deg_s", title: "Pitch rate q, deg/s", legend: false },
-    Plot { name: "gimbal_deg", title: "Gimbal, deg", legend: true },
-    Plot { name: "solve_time_ms", title: "Solve time, ms", legend: false },
-    Plot { name: "iterations", title: "Newton iterations", legend: false },
-    Plot { name: "level", title: "Control level (0 idle, 2 converged, 5 stabiliser)", legend: false },
-];
-
-/// Every plot of a flight from apogee, in the order of the layout.
-pub(crate) const FROM_APOGEE: [Plot; 10] = [
-    Plot { name: "altitude_m", title: "Height of the feet, m", legend: false },
-    Plot { name: "vertical_m_s", title: "Vertical speed, m/s", legend: false },
-    Plot { name: "x_m", title: "Position x, m", legend: false },
-    Plot { name: "y_m", title: "Position y, m", legend: false },
-    Plot { name: "lateral_m_s", title: "Lateral speed, m/s", legend: false },
-    Plot { name: "tilt_deg", title: "Tilt, deg", legend: false },
-    Plot { name: "gimbal_pitch_deg", title: "Gimbal in pitch, deg", legend: true },
-    Plot { name: "gimbal_yaw_deg", title: "Gimbal in yaw, deg", legend: false },
-    Plot { name: "fins_mean_deg", title: "Fins, mean opening, deg", legend: false },
-    Plot { name: "thrust_n", title: "Thrust, N", legend: false },
-];
 
 /// Whose number it is, or what else a line shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +32,7 @@ enum Line {
     Commanded,
     Actual,
     Measured,
+    Replayed,
     Deadline,
     Lowest,
     Highest,
@@ -80,6 +47,7 @@ impl Line {
             Self::Commanded => "commanded",
             Self::Actual => "actual",
             Self::Measured => "controller",
+            Self::Replayed => "replayed",
             Self::Deadline => "deadline",
             Self::Lowest => "limit_low",
             Self::Highest => "limit_high",
@@ -91,40 +59,14 @@ impl Line {
             Self::Truth | Self::Actual | Self::Measured => (BLUE, 1.5),
             Self::Estimate | Self::Commanded => (ORANGE, 1.0),
             Self::Telemetry => (GREEN, 1.0),
+            Self::Replayed => (VIOLET, 0.75),
             Self::Deadline | Self::Lowest | Self::Highest => (RED, 0.75),
         };
         let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([self.name()]);
         // What a tick decides holds until the next one.
-        let steps = matches!(self, Self::Commanded | Self::Measured);
+        let steps = matches!(self, Self::Commanded | Self::Measured | Self::Replayed);
         if steps { style.with_interpolation_mode(InterpolationMode::StepAfter) } else { style }
     }
-}
-
-/// A range that a plot's number should stay in.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PlotLimit {
-    /// The plot's name.
-    pub(crate) plot: &'static str,
-    /// Lowest value, in the plot's unit.
-    pub(crate) lowest: f64,
-    /// Highest value, in the plot's unit.
-    pub(crate) highest: f64,
-}
-
-/// The plot of a number that the landing verdict judges, by the verdict's name for it.
-pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "x" => "x_m",
-        "altitude" => "altitude_m",
-        "pitch error" => "pitch_error_deg",
-        "u" => "u_m_s",
-        "w" => "w_m_s",
-        "pitch rate" => "q_deg_s",
-        "vertical speed" => "vertical_m_s",
-        "lateral speed" => "lateral_m_s",
-        "tilt" => "tilt_deg",
-        _ => return None,
-    })
 }
 
 /// The plots being recorded.
@@ -132,12 +74,13 @@ pub(crate) struct Plots<'a> {
     recording: &'a RecordingStream,
     styled: BTreeSet<String>,
     level: Option<u32>,
+    level_replayed: Option<u32>,
     phase: Option<u32>,
 }
 
 impl<'a> Plots<'a> {
     pub(crate) fn new(recording: &'a RecordingStream) -> Self {
-        Self { recording, styled: BTreeSet::new(), level: None, phase: None }
+        Self { recording, styled: BTreeSet::new(), level: None, level_replayed: None, phase: None }
     }
 
     /// What the plant really does.
@@ -151,10 +94,6 @@ impl<'a> Plots<'a> {
     pub(crate) fn in_space(&mut self, truth: &TruthSample) -> RecordingStreamResult<()> {
         let (at, moving) = (&truth.state.position_m, &truth.state.velocity_m_s);
         let degrees = |angles_rad: &[f64], axis: usize| angles_rad.get(axis).copied().map(f64::to_degrees);
-        let mean_deg = |angles_rad: &[f64]| {
-            let sum_rad: f64 = angles_rad.iter().sum();
-            (!angles_rad.is_empty()).then(|| (sum_rad / angles_rad.len() as f64).to_degrees())
-        };
         self.draw("altitude_m", Line::Truth, truth.height_m)?;
         self.draw("x_m", Line::Truth, at.x)?;
         self.draw("y_m", Line::Truth, at.y)?;
@@ -162,7 +101,7 @@ impl<'a> Plots<'a> {
         self.draw("lateral_m_s", Line::Truth, libm::hypot(moving.x, moving.y))?;
         self.draw("tilt_deg", Line::Truth, state_from_log(&truth.state).tilt_rad().to_degrees())?;
         self.draw("thrust_n", Line::Truth, truth.thrust_n)?;
-        for (axis, plot) in ["gimbal_pitch_deg", "gimbal_yaw_deg"].into_iter().enumerate() {
+        for (axis, plot) in GIMBAL_IN_SPACE.into_iter().enumerate() {
             self.maybe(plot, Line::Commanded, degrees(&truth.gimbal_commanded_rad, axis))?;
             self.maybe(plot, Line::Actual, degrees(&truth.gimbal_actual_rad, axis))?;
         }
@@ -246,13 +185,52 @@ impl<'a> Plots<'a> {
 
     /// The control level now.
     pub(crate) fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
-        if self.level == Some(level) {
+        if self.level.replace(level) == Some(level) {
             return Ok(());
         }
-        self.level = Some(level);
-        let known = u8::try_from(level).ok().and_then(ControlLevel::from_index).map(ControlLevel::name);
-        let name = known.map_or_else(|| format!("unknown ({level})"), str::to_owned);
-        self.recording.log(entity::LEVEL, &StateChange::single(name))
+        self.recording.log(entity::LEVEL, &level_state(level))
+    }
+
+    fn replayed_level(&mut self, level: u32) -> RecordingStreamResult<()> {
+        if self.level_replayed.replace(level) == Some(level) {
+            return Ok(());
+        }
+        self.recording.log(entity::LEVEL_REPLAYED, &level_state(level))
+    }
+
+    /// What a tick of a planar landing decides, run again.
+    pub(crate) fn tick_again(&mut self, again: &ControllerTick) -> RecordingStreamResult<()> {
+        let output = &again.output;
+        self.draw("gimbal_deg", Line::Replayed, output.gimbal_command_rad.to_degrees())?;
+        self.draw("iterations", Line::Replayed, f64::from(output.solver.iterations))?;
+        self.replayed_level(output.level)
+    }
+
+    /// What a frame of a flight computer decides, run again, and the iterations of a plan that it made.
+    pub(crate) fn frame_again(
+        &mut self,
+        again: &PilotTick,
+        iterations: Option<usize>,
+    ) -> RecordingStreamResult<()> {
+        let output = &again.output;
+        for (plot, angle_rad) in GIMBAL_IN_SPACE.into_iter().zip(&output.gimbal_rad) {
+            self.draw(plot, Line::Replayed, angle_rad.to_degrees())?;
+        }
+        self.maybe("fins_mean_deg", Line::Replayed, mean_deg(&output.fins_rad))?;
+        self.maybe("iterations", Line::Replayed, iterations.map(|count| count as f64))?;
+        self.replayed_level(output.level)
+    }
+
+    /// How long a frame took that plans.
+    pub(crate) fn timing(&mut self, timing: &PilotTiming) -> RecordingStreamResult<()> {
+        self.draw("solve_time_ms", Line::Measured, 1e3 * timing.solve_time_s)?;
+        self.draw("solve_time_ms", Line::Deadline, 1e3 * timing.deadline_s)
+    }
+
+    /// Whether a plot has a line.
+    pub(crate) fn has(&self, plot: &Plot) -> bool {
+        let below = format!("{}/{}/", entity::PLOTS, plot.name);
+        self.styled.iter().any(|path| path.starts_with(&below))
     }
 
     fn maybe(&mut self, plot: &str, line: Line, value: Option<f64>) -> RecordingStreamResult<()> {
@@ -269,24 +247,12 @@ impl<'a> Plots<'a> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use flight::dynamics::PlanarState as FlightState;
-    use flight::profile::Profile;
-    use flight::verdict::{LandingVerdict, TouchdownLimits};
+fn level_state(level: u32) -> StateChange {
+    let known = u8::try_from(level).ok().and_then(ControlLevel::from_index).map(ControlLevel::name);
+    StateChange::single(known.map_or_else(|| format!("unknown ({level})"), str::to_owned))
+}
 
-    #[test]
-    fn every_number_of_the_verdict_has_a_plot() {
-        let limits = TouchdownLimits::from_profile(&Profile::builtin("paper-calibrated").unwrap());
-        for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
-            let plot = plot_of_verdict(result.name).unwrap();
-            assert!(PLANAR.iter().any(|known| known.name == plot), "{plot}");
-        }
-        for judged in ["vertical speed", "lateral speed", "tilt"] {
-            let plot = plot_of_verdict(judged).unwrap();
-            assert!(FROM_APOGEE.iter().any(|known| known.name == plot), "{plot}");
-        }
-        assert_eq!(plot_of_verdict("colour"), None);
-    }
+fn mean_deg(angles_rad: &[f64]) -> Option<f64> {
+    let sum_rad: f64 = angles_rad.iter().sum();
+    (!angles_rad.is_empty()).then(|| (sum_rad / angles_rad.len() as f64).to_degrees())
 }

@@ -21,6 +21,7 @@ const FLAME: Rgba32 = Rgba32::from_rgb(255, 110, 30);
 const FLOWN: Rgba32 = Rgba32::from_rgb(84, 102, 122);
 const TRAIL: Rgba32 = Rgba32::from_rgb(110, 190, 255);
 const PREDICTED: Rgba32 = Rgba32::from_rgb(255, 205, 70);
+const REPLAYED: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const REHEARSED: Rgba32 = Rgba32::from_rgb(150, 140, 90);
 const FIRST_PLAN: Rgba32 = Rgba32::from_rgb(120, 95, 40);
 
@@ -137,15 +138,30 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// Records what a tick plans.
-    pub(crate) fn plan(&mut self, tick: &ControllerTick) -> RecordingStreamResult<()> {
-        let points_m = path_in_world_m(&tick.output.plan.states);
+    /// Records what a tick plans, and what it plans when it is run again.
+    pub(crate) fn plan(
+        &mut self,
+        tick: &ControllerTick,
+        again: Option<&ControllerTick>,
+    ) -> RecordingStreamResult<()> {
+        if let Some(again) = again {
+            let points_m = path_in_world_m(&again.output.plan.states);
+            self.recording.log(entity::PREDICTED_REPLAYED, &strip(points_m, REPLAYED, 1.0))?;
+        }
         let rehearsed = tick.output.level == u32::from(ControlLevel::Rehearsal.index());
+        self.path(path_in_world_m(&tick.output.plan.states), tick.input.phase, rehearsed)
+    }
+
+    /// Records a path that is planned in a phase; none clears the one before.
+    pub(crate) fn path(
+        &mut self,
+        points_m: Vec<[f32; 3]>,
+        phase: u32,
+        rehearsed: bool,
+    ) -> RecordingStreamResult<()> {
         let color = if rehearsed { REHEARSED } else { PREDICTED };
-        let in_burn = u8::try_from(tick.input.phase)
-            .ok()
-            .and_then(Phase::from_index)
-            .is_some_and(Phase::in_landing_burn);
+        let in_burn =
+            u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn);
         if in_burn && !points_m.is_empty() && !self.planned_under_thrust {
             self.planned_under_thrust = true;
             let first = LineStrips3D::new([points_m.clone()]).with_colors([FIRST_PLAN]);
@@ -155,10 +171,7 @@ impl<'a> Scene<'a> {
             .with_colors([color])
             .with_radii([Radius::new_ui_points(4.0)]);
         self.recording.log(entity::PREDICTED_TOUCHDOWN, &end)?;
-        // A tick without a plan clears the one before.
-        let strips = if points_m.is_empty() { vec![] } else { vec![points_m] };
-        let path = LineStrips3D::new(strips).with_colors([color]);
-        self.recording.log(entity::PREDICTED, &path.with_radii([Radius::new_ui_points(1.5)]))
+        self.recording.log(entity::PREDICTED, &strip(points_m, color, 1.5))
     }
 
     /// Records the whole path, and says how much space it took.
@@ -188,6 +201,12 @@ impl<'a> Scene<'a> {
             .with_colors([FLAME])
             .with_radii([0.35 * self.shape.radius_m])
     }
+}
+
+/// A path, or nothing without a point.
+fn strip(points_m: Vec<[f32; 3]>, color: Rgba32, radius: f32) -> LineStrips3D {
+    let strips = if points_m.is_empty() { vec![] } else { vec![points_m] };
+    LineStrips3D::new(strips).with_colors([color]).with_radii([Radius::new_ui_points(radius)])
 }
 
 fn transform(pose: &Pose) -> Transform3D {

@@ -51,6 +51,8 @@ pub struct Survey {
     pub run: BTreeMap<String, String>,
     /// Which build wrote it.
     pub build: BTreeMap<String, String>,
+    /// The text of the profile or mission.
+    pub profile_toml: Option<String>,
     /// The profile, if the log has one that this build can use.
     pub profile: Option<Profile>,
     /// The mission, if it is a flight from apogee and this build can use it.
@@ -120,6 +122,7 @@ impl Survey {
             parsed.map(|profile| self.profile = Some(profile)).map_err(|error| error.to_string())
         };
         self.profile_problem = problem.err();
+        self.profile_toml = Some(text);
     }
 
     fn take_message(&mut self, topic: &str, schema_name: &str, log_time_ns: u64, data: &[u8]) {

@@ -44,15 +44,29 @@ pub(crate) fn verdict(recording: &RecordingStream, verdict: &LandingVerdict) -> 
     recording.log(entity::VERDICT, &TextLog::new(text).with_level(level))
 }
 
+/// Records what came of running the controller again.
+pub(crate) fn replay(recording: &RecordingStream, text: &str) -> RecordingStreamResult<()> {
+    recording.log(entity::REPLAY, &TextLog::new(text).with_level(TextLogLevel::WARN))
+}
+
+/// What is to be said of a log besides.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Remarks<'a> {
+    /// What ended the reading early.
+    pub(crate) damage: Option<&'a str>,
+    /// What came of running the controller again.
+    pub(crate) again: Option<&'a str>,
+}
+
 /// Records which flight this is and how it ended, as a document.
 pub(crate) fn report(
     recording: &RecordingStream,
     log_name: &str,
     survey: &Survey,
     verdict: Option<&LandingVerdict>,
-    damage: Option<&str>,
+    remarks: Remarks<'_>,
 ) -> RecordingStreamResult<()> {
-    let text = report_text(log_name, survey, verdict, damage);
+    let text = report_text(log_name, survey, verdict, remarks);
     let document = TextDocument::new(text).with_media_type(MediaType::MARKDOWN);
     recording.log_static(entity::REPORT, &document)
 }
@@ -61,7 +75,7 @@ fn report_text(
     log_name: &str,
     survey: &Survey,
     verdict: Option<&LandingVerdict>,
-    damage: Option<&str>,
+    remarks: Remarks<'_>,
 ) -> String {
     let heading = match verdict {
         None => "No touchdown recorded",
@@ -82,8 +96,11 @@ fn report_text(
         }
         text.push('\n');
     }
-    if let Some(damage) = damage {
+    if let Some(damage) = remarks.damage {
         let _ = writeln!(text, "**The log is damaged:** {damage}. Only what stands before is shown.\n");
+    }
+    if let Some(again) = remarks.again {
+        let _ = writeln!(text, "The controller: {}.\n", cell(again));
     }
     let _ = writeln!(text, "Log `{}`", cell(log_name));
     if let Some(profile) = &survey.profile {
@@ -125,9 +142,11 @@ mod tests {
             passed: false,
         };
         let verdict = LandingVerdict { limits: vec![limit], landed: false, ..LandingVerdict::default() };
-        let text = report_text("a|b.mcap", &Survey::default(), Some(&verdict), Some("cut"));
+        let remarks = Remarks { damage: Some("cut"), again: Some("run again") };
+        let text = report_text("a|b.mcap", &Survey::default(), Some(&verdict), remarks);
         assert!(text.starts_with("# Touchdown outside its limits\n"), "{text}");
         assert!(text.contains("| u | -0.7500 m/s | -0.4 to 0.4 | **FAILED** |"), "{text}");
         assert!(text.contains("damaged:** cut") && text.contains("`a/b.mcap`"), "{text}");
+        assert!(text.contains("The controller: run again."), "{text}");
     }
 }

@@ -9,7 +9,7 @@ use replay::log::Recording;
 use replay::print::{print_evaluate, print_evaluate_csv, print_json};
 
 use super::settings::SettingArguments;
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -34,7 +34,7 @@ impl Ask {
             () if self.csv => print_evaluate_csv(&report, output),
             () => print_evaluate(&report, output),
         })?;
-        warn_of_damage(&recording.name, recording.damage.as_deref());
+        warn_of_what_is_missing(&recording);
         Ok(Answer::Given)
     }
 }

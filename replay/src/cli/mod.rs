@@ -18,6 +18,7 @@ use std::io::{self, Write};
 
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
+use replay::log::{Gap, Recording};
 use replay::verify::Outcome;
 
 /// The answer is no: the controller decides otherwise than recorded, or flights differ by more than is tolerated.
@@ -137,6 +138,17 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
 /// Says something beside the answer; if nobody can hear it, nothing is lost.
 fn say(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {text}");
+}
+
+/// Warns that a log is used up to its damage, or up to a gap in it, only.
+fn warn_of_what_is_missing(recording: &Recording) {
+    if let Some(Gap { after, before }) = recording.gap() {
+        let name = &recording.name;
+        say(&format!(
+            "warning: {name}: after tick {after} comes tick {before}; nothing behind the gap was run again"
+        ));
+    }
+    warn_of_damage(&recording.name, recording.damage.as_deref());
 }
 
 /// Warns that a log is used up to its damage only.

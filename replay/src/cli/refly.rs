@@ -61,7 +61,7 @@ pub(super) struct FlownHow {
 enum Origin {
     /// The simulated plant's, where the log has it.
     Truth,
-    /// What the controller believed; of planar landings only.
+    /// What the controller believed: with it the plant begins where the estimate was.
     Estimate,
 }
 

@@ -8,7 +8,7 @@ use replay::log::Recording;
 use replay::print::{print_json, print_tick};
 use replay::tick::tick;
 
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -26,7 +26,7 @@ impl Ask {
         let recording = Recording::open(&self.file)?;
         let report = tick(&recording, self.tick)?;
         answer(|output| if self.json { print_json(&report, output) } else { print_tick(&report, output) })?;
-        warn_of_damage(&recording.name, recording.damage.as_deref());
+        warn_of_what_is_missing(&recording);
         Ok(Answer::Given)
     }
 }

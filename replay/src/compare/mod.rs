@@ -95,6 +95,10 @@ pub fn compare(
     let mut failures: Vec<String> = signals.iter().filter_map(SignalDifference::failure).collect();
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
+    if signals.is_empty() {
+        // Flights of two kinds, for instance; that nothing differs would say too much.
+        failures.push("the logs have no signal in common: nothing was compared".to_owned());
+    }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
     let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
     if tolerances.verdict_must_agree() && landed(&verdicts.0) != landed(&verdicts.1) {

@@ -12,10 +12,11 @@ use crate::table::{Cell, Kind, TableReader, TableShape};
 const VALUES_MAX: usize = 20_000_000;
 
 /// Columns that are times or numbers of records, and those that were measured rather than decided.
-const NO_SIGNALS: [&str; 9] = [
+const NO_SIGNALS: [&str; 10] = [
     "log_time_ns",
     "time_s",
     "input.time_s",
+    "frame",
     "input.tick",
     "input.frame",
     "output.tick",

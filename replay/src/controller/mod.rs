@@ -6,9 +6,11 @@
 
 mod pilot;
 mod planar;
+mod plans;
 
 pub use pilot::{FrameError, LoggedPilot, PilotStartError, SETTINGS_IN_FLIGHT, settings_in_flight};
 pub use planar::LoggedController;
+pub use plans::{NewPlans, path_in_world_m};
 
 use prost::Message;
 use prost_reflect::MessageDescriptor;

@@ -128,13 +128,14 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
 
 /// The planar landing's ticks.
 fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Vec<EvaluatedTick>, EvaluateError> {
+    let recorded = recording.replayable_ticks()?;
     let profile = recording.profile()?;
     let recorded_s = profile.nmpc.sample_time_s;
     refuse(settings, &NOT_THE_CONTROLLERS, ("nmpc.sample_time_s", recorded_s))?;
     let schedule = Schedule::new(recording.profile_toml()?, settings)?;
     let then = LoggedController::new(&profile);
     let now = LoggedController::scheduled(&schedule).judged_by(TouchdownLimits::from_profile(&profile));
-    side_by_side(then, now, recording.replayable_ticks()?)
+    side_by_side(then, now, recorded)
 }
 
 /// The frames of a flight computer.

@@ -46,8 +46,6 @@ pub fn export_tables<R: Read>(
     format: TableFormat,
     directory: &Path,
 ) -> Result<Vec<ExportedFile>, ExportError> {
-    std::fs::create_dir_all(directory)
-        .map_err(|source| ExportError::Write { path: directory.to_owned(), source })?;
     let mut open: BTreeMap<usize, (ExportedFile, Table)> = BTreeMap::new();
     let mut reader = TableReader::new();
     reader.read::<R, ExportError>(log, |shape, row| {
@@ -77,6 +75,9 @@ fn create(
         TableFormat::Csv => "csv",
         TableFormat::Parquet => "parquet",
     };
+    // Not before there is a table to write: what is no flight log leaves nothing behind.
+    std::fs::create_dir_all(directory)
+        .map_err(|source| ExportError::Write { path: directory.to_owned(), source })?;
     let path = directory.join(format!("{}.{suffix}", shape.name));
     let table = match format {
         TableFormat::Csv => Table::Csv(CsvTable::create(&path, shape)?),

@@ -8,8 +8,8 @@ use protocol::log::reader::Damage;
 use protocol::log::v1;
 use serde::Serialize;
 
-use super::{ChannelFacts, PhaseTimeline, TickFacts};
-use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts, TickRanges};
+use super::{ChannelFacts, FrameFacts, PhaseTimeline, TickFacts};
+use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts};
 
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -59,28 +59,6 @@ pub struct Grade {
     pub reason: String,
 }
 
-/// The frames of the flight computer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct FrameFacts {
-    /// The lowest number.
-    pub first: u64,
-    /// The highest number.
-    pub last: u64,
-    /// Gaps between them, which restarts of the computer leave, and losses.
-    pub gaps: usize,
-    /// How often a number came that was there already.
-    pub repeated: u64,
-    /// There is a record of how the computer was let go.
-    pub start: bool,
-}
-
-impl FrameFacts {
-    pub(super) fn of(frames: &TickRanges, start: bool) -> Option<Self> {
-        let (first, last) = frames.bounds()?;
-        Some(Self { first, last, gaps: frames.gaps().count(), repeated: frames.repeated(), start })
-    }
-}
-
 /// How much can be done with a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -105,23 +83,6 @@ impl GradeLevel {
 }
 
 impl Grade {
-    pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
-        let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
-        match profile {
-            _ if !frames.start => numeric("no record of how the flight computer was let go"),
-            None => numeric("no attachment profile.toml to build the flight computer from"),
-            Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
-            Some(ProfileFacts { name, .. }) => {
-                let FrameFacts { first, last, gaps, .. } = frames;
-                let name = name.as_deref().unwrap_or_default();
-                let reason = format!(
-                    "frames {first} to {last} of the flight computer with {gaps} gaps, its start and its mission {name}"
-                );
-                Self { level: GradeLevel::BitExact, reason }
-            }
-        }
-    }
-
     pub(super) fn of(
         ticks: Option<&TickFacts>,
         profile: Option<&ProfileFacts>,

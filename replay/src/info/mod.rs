@@ -2,23 +2,26 @@
 
 mod channels;
 mod facts;
+mod frames;
 mod phases;
+mod solve_times;
 mod ticks;
 
 pub use channels::ChannelFacts;
-pub use facts::{
-    Completeness, FrameFacts, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit,
-};
+pub use facts::{Completeness, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit};
+pub use frames::FrameFacts;
 pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
-pub use ticks::{Named, SolveTimes, TickFacts};
+pub use solve_times::SolveTimes;
+pub use ticks::{Named, TickFacts};
 
 use std::io::Read;
 use std::path::Path;
 
 use protocol::log::v1;
 
-use crate::log::{Entry, FlightLog, LogError, SummaryFacts, TickRanges, summary_of};
+use crate::log::{Entry, FlightLog, LogError, SummaryFacts, summary_of};
 use channels::ChannelCounter;
+use frames::FrameCounter;
 use phases::PhaseTracker;
 use ticks::TickCounter;
 
@@ -48,7 +51,7 @@ pub fn info_of<R: Read>(
             None => (stamped.log_time_ns, stamped.log_time_ns),
             Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
         });
-        seen.take(stamped.entry);
+        seen.take(stamped.entry, stamped.sequence);
     }
     Ok(seen.into_info(log, summary))
 }
@@ -62,14 +65,12 @@ struct Seen {
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
     verdict: Option<v1::LandingVerdict>,
-    /// The flight computer was let go on record.
-    pilot_start: bool,
-    frames: TickRanges,
+    frames: FrameCounter,
     unreadable: Option<String>,
 }
 
 impl Seen {
-    fn take(&mut self, entry: Entry) {
+    fn take(&mut self, entry: Entry, record: u32) {
         match entry {
             Entry::Tick(tick) => {
                 self.vehicle_phases.note(tick.input.time_s, tick.input.phase);
@@ -85,10 +86,11 @@ impl Seen {
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
-            Entry::PilotStart(_) => self.pilot_start = true,
+            Entry::PilotStart(_) => self.frames.let_go(),
+            Entry::PilotTiming(timing) => self.frames.time(&timing),
             Entry::PilotTick(tick) => {
                 self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
-                self.frames.insert(tick.input.frame);
+                self.frames.count(tick.input.frame, record);
             }
             Entry::World(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
         }
@@ -98,6 +100,7 @@ impl Seen {
         let head = log.head();
         let profile = ProfileFacts::of(head);
         let ticks = self.ticks.into_facts();
+        let frames = self.frames.into_facts();
         let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
         let channels = self.channels.into_facts(log.channels());
         let completeness = Completeness::new(log.damage(), span.as_ref(), ticks.as_ref(), &channels, summary);
@@ -106,11 +109,11 @@ impl Seen {
         Info {
             file: log.name().to_owned(),
             size_bytes: None,
-            grade: match FrameFacts::of(&self.frames, self.pilot_start) {
-                Some(frames) => Grade::of_frames(&frames, profile.as_ref()),
+            grade: match &frames {
+                Some(frames) => Grade::of_frames(frames, profile.as_ref()),
                 None => Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
             },
-            frames: FrameFacts::of(&self.frames, self.pilot_start),
+            frames,
             library: head.library.clone(),
             build: head.build.clone(),
             build_comparison: head.compare_build(),

@@ -7,13 +7,12 @@ use flight::nmpc::SolveStatus;
 use protocol::log::v1;
 use serde::Serialize;
 
+use super::SolveTimes;
+use super::solve_times::SolveTimeCounter;
 use crate::log::{Gap, TickRanges};
 
 /// Gaps listed one by one.
 const GAPS_LISTED: usize = 20;
-
-/// Solve times kept for the percentiles: 8 MB, and more than a day of flight at 10 Hz.
-const SOLVE_TIMES_KEPT: usize = 1_000_000;
 
 /// The controller's ticks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -40,6 +39,8 @@ pub struct TickFacts {
     pub solver_statuses: Vec<Named>,
     /// How long the ticks took.
     pub solve_time: SolveTimes,
+    /// Ticks whose predecessor's output was dropped as too late: what was decided on board.
+    pub outputs_dropped: u64,
 }
 
 /// A name and how often it occurs.
@@ -51,23 +52,6 @@ pub struct Named {
     pub ticks: u64,
 }
 
-/// How long the ticks took, as measured on board.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SolveTimes {
-    /// Half of the ticks took no longer, s.
-    pub median_s: f64,
-    /// 99 of 100 took no longer, s.
-    pub p99_s: f64,
-    /// The longest, s.
-    pub max_s: f64,
-    /// The shortest deadline any tick had, s.
-    pub deadline_s: f64,
-    /// Ticks that took longer than their deadline.
-    pub over_deadline: u64,
-    /// Ticks whose predecessor's output was dropped as too late: what was decided on board.
-    pub recorded_misses: u64,
-}
-
 /// Counts ticks.
 #[derive(Default)]
 pub(super) struct TickCounter {
@@ -76,10 +60,8 @@ pub(super) struct TickCounter {
     times_s: Option<(f64, f64)>,
     levels: BTreeMap<u32, u64>,
     statuses: BTreeMap<u32, u64>,
-    solve_times_s: Vec<f64>,
-    deadline_s: Option<f64>,
-    over_deadline: u64,
-    recorded_misses: u64,
+    solve_times: SolveTimeCounter,
+    outputs_dropped: u64,
 }
 
 impl TickCounter {
@@ -90,20 +72,13 @@ impl TickCounter {
         self.times_s = Some((self.times_s.map_or(time_s, |(first_s, _)| first_s), time_s));
         *self.levels.entry(tick.output.level).or_default() += 1;
         *self.statuses.entry(tick.output.solver.status).or_default() += 1;
-        if self.solve_times_s.len() < SOLVE_TIMES_KEPT {
-            self.solve_times_s.push(tick.solve_time_s);
-        }
-        self.deadline_s =
-            Some(self.deadline_s.map_or(tick.deadline_s, |least_s| least_s.min(tick.deadline_s)));
-        self.over_deadline += u64::from(tick.solve_time_s > tick.deadline_s);
-        self.recorded_misses += u64::from(tick.input.deadline_missed);
+        self.solve_times.count(tick.solve_time_s, tick.deadline_s);
+        self.outputs_dropped += u64::from(tick.input.deadline_missed);
     }
 
-    pub(super) fn into_facts(mut self) -> Option<TickFacts> {
+    pub(super) fn into_facts(self) -> Option<TickFacts> {
         let (first, last) = self.ranges.bounds()?;
         let (first_time_s, last_time_s) = self.times_s?;
-        self.solve_times_s.sort_by(f64::total_cmp);
-        let times_s = &self.solve_times_s;
         Some(TickFacts {
             count: self.count,
             first,
@@ -115,22 +90,10 @@ impl TickCounter {
             gaps: self.ranges.gaps().take(GAPS_LISTED).collect(),
             levels: named(&self.levels, level_name),
             solver_statuses: named(&self.statuses, status_name),
-            solve_time: SolveTimes {
-                median_s: percentile(times_s, 50),
-                p99_s: percentile(times_s, 99),
-                max_s: percentile(times_s, 100),
-                deadline_s: self.deadline_s.unwrap_or(f64::NAN),
-                over_deadline: self.over_deadline,
-                recorded_misses: self.recorded_misses,
-            },
+            solve_time: self.solve_times.into_facts()?,
+            outputs_dropped: self.outputs_dropped,
         })
     }
-}
-
-/// The smallest element that at least `percent` of 100 do not exceed (nearest rank).
-fn percentile(sorted: &[f64], percent: usize) -> f64 {
-    let rank = (sorted.len() * percent).div_ceil(100);
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
 fn named(counts: &BTreeMap<u32, u64>, name: impl Fn(u32) -> Option<&'static str>) -> Vec<Named> {
@@ -156,19 +119,4 @@ fn status_name(number: u32) -> Option<&'static str> {
         SolveStatus::BadInput,
     ];
     statuses.into_iter().find(|status| u32::from(status.index()) == number).map(SolveStatus::name)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn percentiles_are_of_the_nearest_rank() {
-        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
-        for (percent, expected) in [(50, 50.0), (99, 99.0), (100, 100.0)] {
-            assert_eq!(percentile(&hundred, percent).to_bits(), f64::to_bits(expected));
-            assert_eq!(percentile(&[7.0], percent).to_bits(), 7.0_f64.to_bits());
-        }
-        assert!(percentile(&[], 50).is_nan());
-    }
 }

@@ -4,8 +4,8 @@ use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
     ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
-    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
-    TOPIC_VERDICT,
+    TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY,
+    TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
 };
 use protocol::log::{flight_v1, v1};
 
@@ -35,6 +35,8 @@ pub enum Entry {
     PilotStart(Box<flight_v1::PilotStart>),
     /// A frame of the flight computer from apogee to touchdown.
     PilotTick(Box<flight_v1::PilotTick>),
+    /// How long a frame of it took that plans.
+    PilotTiming(flight_v1::PilotTiming),
     /// The simulated world of a flight from apogee.
     World(Box<flight_v1::TruthSample>),
     /// The simulated plant.
@@ -73,6 +75,9 @@ impl Entry {
             TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
             TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
             TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
+            TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
+                Self::PilotTiming(*timing)
+            }),
             TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
             TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
             TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),

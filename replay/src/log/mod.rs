@@ -5,6 +5,7 @@
 
 mod entry;
 mod error;
+mod frame_order;
 mod head;
 mod new_log;
 mod recording;
@@ -15,6 +16,7 @@ mod tick_ranges;
 
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
+pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};

@@ -9,7 +9,7 @@ use flight::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::{Entry, FlightLog, Head, LogError};
+use super::{Entry, FlightLog, FrameOrder, Gap, Head, LogError};
 
 /// Most records of one kind that are held: five hours of ticks at 10 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -52,6 +52,16 @@ pub enum RecordingError {
         /// Why some record could not be read, if that is the reason.
         unreadable: Option<String>,
     },
+    /// The first frames are lost.
+    #[error(
+        "{name}: begins with frame {first} of the flight computer, and the frames before it are lost: what the computer remembered there is unknown"
+    )]
+    BeginningLost {
+        /// The file.
+        name: String,
+        /// The first frame there is.
+        first: u64,
+    },
     /// Nothing to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile {
@@ -83,6 +93,10 @@ pub struct Recording {
     pub pilot_start: Option<flight_v1::PilotStart>,
     /// Its frames, in file order.
     pub frames: Vec<flight_v1::PilotTick>,
+    /// How many of them stand before the first that the log has lost.
+    pub frames_unbroken: usize,
+    /// How long those took that plan, in file order; none of a flight that was simulated without a clock.
+    pub timings: Vec<flight_v1::PilotTiming>,
     /// Its simulated world, in file order.
     pub world: Vec<flight_v1::TruthSample>,
     /// The simulated plant, in file order.
@@ -114,7 +128,7 @@ impl Recording {
     /// As [`open`](Self::open).
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
         let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
-        let mut first_ns = None;
+        let (mut first_ns, mut frame_order, mut frames_lost) = (None, FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
             let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
             match stamped.entry {
@@ -123,6 +137,7 @@ impl Recording {
                     tick.output.plan.gimbal_rad = Vec::new();
                     recording.ticks.push(*tick);
                 }
+                Entry::PilotTiming(timing) => recording.timings.push(timing),
                 Entry::World(sample) => recording.world.push(*sample),
                 Entry::Truth(truth) => recording.truth.push(*truth),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
@@ -132,13 +147,19 @@ impl Recording {
                     recording.unreadable.get_or_insert(reason);
                 }
                 Entry::PilotStart(start) => recording.pilot_start = Some(*start),
-                Entry::PilotTick(tick) => recording.frames.push(*tick),
+                Entry::PilotTick(tick) => {
+                    if frame_order.note(tick.input.frame, stamped.sequence).is_some() {
+                        frames_lost.get_or_insert(recording.frames.len());
+                    }
+                    recording.frames.push(*tick);
+                }
                 Entry::RawFrame | Entry::Operator | Entry::Other => {}
             }
             recording.check_length()?;
         }
         recording.head = log.head().clone();
         recording.damage = log.damage().map(ToString::to_string);
+        recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
         recording.ticks.sort_by_key(|tick| tick.input.tick);
         recording.ticks_unbroken =
             (0..).zip(&recording.ticks).take_while(|(number, tick)| tick.input.tick == *number).count();
@@ -150,6 +171,7 @@ impl Recording {
         let kinds = [
             ("controller ticks", self.ticks.len()),
             ("frames of the flight computer", self.frames.len()),
+            ("timings of the flight computer", self.timings.len()),
             ("records of the world", self.world.len()),
             ("records of the plant", self.truth.len() / 10),
             ("records of telemetry", self.telemetry.len()),
@@ -166,11 +188,11 @@ impl Recording {
         self.pilot_start.is_some() || !self.frames.is_empty()
     }
 
-    /// The frames of a flight from apogee, and how its computer was let go.
+    /// How the flight computer of a flight from apogee was let go, and all its frames.
     ///
     /// # Errors
     /// There are none, or nothing to begin from.
-    pub fn replayable_frames(
+    pub fn recorded_frames(
         &self,
     ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
         match &self.pilot_start {
@@ -179,6 +201,32 @@ impl Recording {
                 Err(RecordingError::NoFrames { name: self.name.clone(), unreadable: self.unreadable.clone() })
             }
         }
+    }
+
+    /// The same, of the frames those that can be re-executed: up to the first that the log has lost.
+    ///
+    /// # Errors
+    /// There are none, or nothing to begin from.
+    pub fn replayable_frames(
+        &self,
+    ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
+        let (start, frames) = self.recorded_frames()?;
+        match (frames.get(..self.frames_unbroken), frames.first()) {
+            (Some([]), Some(first)) => {
+                Err(RecordingError::BeginningLost { name: self.name.clone(), first: first.input.frame })
+            }
+            (unbroken, _) => Ok((start, unbroken.unwrap_or(frames))),
+        }
+    }
+
+    /// Where the ticks or frames end that can be re-executed, if more are recorded behind.
+    pub fn gap(&self) -> Option<Gap> {
+        fn around<T>(records: &[T], place: usize, number: impl Fn(&T) -> u64) -> Option<Gap> {
+            let before = number(records.get(place)?);
+            Some(Gap { after: place.checked_sub(1).map_or(0, |last| number(&records[last])), before })
+        }
+        around(&self.frames, self.frames_unbroken, |tick| tick.input.frame)
+            .or_else(|| around(&self.ticks, self.ticks_unbroken, |tick| tick.input.tick))
     }
 
     /// The ticks that can be re-executed.

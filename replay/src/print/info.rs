@@ -7,7 +7,9 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use super::{counted, shown};
-use crate::info::{ChannelFacts, Info, Named, PhaseTimeline, TickFacts, VerdictFacts};
+use crate::info::{
+    ChannelFacts, FrameFacts, Info, Named, PhaseTimeline, SolveTimes, TickFacts, VerdictFacts,
+};
 
 /// Writes a description of a log as text.
 ///
@@ -31,6 +33,9 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     }
     if let Some(ticks) = &info.ticks {
         print_ticks(ticks, output)?;
+    }
+    if let Some(frames) = &info.frames {
+        print_frames(frames, output)?;
     }
     print_channels(&info.channels, output)?;
     let attached: Vec<String> = info
@@ -76,7 +81,7 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
     row(output, "written by", &or_none(shown(&info.library)))?;
     let listed = |entries: &BTreeMap<String, String>| {
         let listed: Vec<String> =
-            entries.iter().map(|(key, value)| format!("{} {}", shown(key), short(value))).collect();
+            entries.iter().map(|(key, value)| format!("{} {}", shown(key), or_none(short(value)))).collect();
         or_none(listed.join(", "))
     };
     row(output, "run", &listed(&info.run))?;
@@ -150,17 +155,42 @@ fn print_ticks(ticks: &TickFacts, output: &mut impl Write) -> io::Result<()> {
     }
     row(output, "levels", &names_text(&ticks.levels))?;
     row(output, "solver", &names_text(&ticks.solver_statuses))?;
-    let time = &ticks.solve_time;
-    let text = format!(
-        "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it, {} dropped as too late",
-        time.median_s * 1e3,
-        time.p99_s * 1e3,
-        time.max_s * 1e3,
-        time.deadline_s * 1e3,
-        time.over_deadline,
-        time.recorded_misses
+    let dropped = ticks.outputs_dropped;
+    row(
+        output,
+        "solve time",
+        &format!("{}, {dropped} dropped as too late", solve_time_text(&ticks.solve_time)),
+    )
+}
+
+fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> {
+    let FrameFacts { first, last, restarts, lost, repeated, start, solve_time, .. } = frames;
+    let start = if *start { "" } else { ", start NOT RECORDED" };
+    let lost = match lost {
+        0 => "none lost".to_owned(),
+        gaps => format!("{} LOST", counted(*gaps as u64, "gap")),
+    };
+    let restarts = counted(*restarts as u64, "restart");
+    row(output, "frames", &format!("{first} to {last}, {restarts}, {lost}{start}"))?;
+    if *repeated > 0 {
+        row(output, "", &format!("{repeated} repeated"))?;
+    }
+    let text = solve_time.as_ref().map_or_else(
+        || "not recorded: simulated without a clock".to_owned(),
+        |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
     );
     row(output, "solve time", &text)
+}
+
+fn solve_time_text(times: &SolveTimes) -> String {
+    format!(
+        "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it",
+        times.median_s * 1e3,
+        times.p99_s * 1e3,
+        times.max_s * 1e3,
+        times.deadline_s * 1e3,
+        times.over_deadline
+    )
 }
 
 fn gaps_text(ticks: &TickFacts) -> String {

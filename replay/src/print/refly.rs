@@ -60,8 +60,9 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     writeln!(output, "{answer}; margin to the nearest limit {margin}")?;
     writeln!(
         output,
-        "{}, {} with the recorded gimbal command bit for bit; largest difference {:.3e} rad",
+        "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
         counted(report.ticks as u64, "tick"),
+        report.commands_recorded,
         report.commands_identical,
         report.gimbal_difference_max_rad
     )

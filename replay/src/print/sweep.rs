@@ -82,22 +82,35 @@ pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Resul
     {
         match flip {
             None => writeln!(output, "{side}: no change of the verdict in steps of {step:.4e}")?,
-            Some(Flip { same_at, other_at, change, outcome }) => writeln!(
-                output,
-                "{side}: {} from {other_at:.9} on ({change:+.6e}), still {} at {same_at:.9}",
-                word(*outcome),
-                word(report.outcome)
-            )?,
+            Some(Flip { same_at, other_at, change, outcome }) => {
+                let (other_at, same_at) = told_apart(*other_at, *same_at);
+                writeln!(
+                    output,
+                    "{side}: {} from {other_at} on ({change:+.6e}), still {} at {same_at}",
+                    word(*outcome),
+                    word(report.outcome)
+                )?;
+            }
         }
     }
     match report.smallest() {
         None => writeln!(output, "no change within the range turns the verdict; {} flown", report.flown),
         Some(flip) => writeln!(
             output,
-            "the smallest change that turns the verdict: {:+.6e}, to {:.9}; {} flown",
-            flip.change, flip.other_at, report.flown
+            "the smallest change that turns the verdict: {:+.6e}, to {}; {} flown",
+            flip.change,
+            told_apart(flip.other_at, flip.same_at).0,
+            report.flown
         ),
     }
+}
+
+/// Two numbers with as many decimals as it takes to tell them apart.
+fn told_apart(a: f64, b: f64) -> (String, String) {
+    const DECIMALS: std::ops::RangeInclusive<usize> = 9..=16;
+    let rounded = |decimals: usize| (format!("{a:.decimals$}"), format!("{b:.decimals$}"));
+    // The shortest text of a number is that of no other.
+    DECIMALS.map(rounded).find(|(a, b)| a != b).unwrap_or_else(|| (format!("{a:?}"), format!("{b:?}")))
 }
 
 fn word(outcome: FlightOutcome) -> &'static str {
@@ -110,4 +123,23 @@ fn margin(margin: Option<f64>) -> String {
 
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_told_apart() {
+        let apart = |a: f64, b: f64| told_apart(a, b);
+        assert_eq!(apart(0.95, 0.96), ("0.950000000".to_owned(), "0.960000000".to_owned()));
+        assert_eq!(
+            apart(0.95, 0.950_000_000_000_3),
+            ("0.9500000000000".to_owned(), "0.9500000000003".to_owned())
+        );
+        for number in [0.95, 1e-30, 1e30, -7.0, f64::MIN_POSITIVE] {
+            let (a, b) = apart(number, f64::from_bits(number.to_bits() + 1));
+            assert_ne!(a, b);
+        }
+    }
 }

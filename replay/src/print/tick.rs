@@ -36,6 +36,13 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
         degrees(&report.recorded_gimbal_rad),
         degrees(&report.gimbal_rad)
     )?;
+    if report.warm.is_none() && report.cold.is_none() {
+        let nearest = report.nearest_solved.map_or_else(
+            || "no tick of this log does".to_owned(),
+            |nearest| format!("the nearest that does is {nearest}"),
+        );
+        return writeln!(output, "solve    this tick solves no landing; {nearest}");
+    }
     for (name, solved) in [("warm", &report.warm), ("cold", &report.cold)] {
         match solved {
             Some(solved) => print_solved(name, solved, output)?,

@@ -18,11 +18,11 @@ pub(super) fn words(verdict: Option<&VerdictFacts>, none: &str) -> String {
     }
 }
 
-/// The limits of `named`, with the values of both; `shown` makes text fit for where it is printed, `outside` marks a value
+/// The limits of `named`, then what else one of both was judged by, with the values of both; `shown` makes text fit for where it is printed, `outside` marks a value
 /// that is.
 pub(super) fn rows<'a>(
     named: Option<&'a VerdictFacts>,
-    both: [Option<&VerdictFacts>; 2],
+    both: [Option<&'a VerdictFacts>; 2],
     shown: fn(&str) -> String,
     outside: &str,
 ) -> Vec<LimitRow<'a>> {
@@ -36,9 +36,14 @@ pub(super) fn rows<'a>(
             },
         )
     };
-    let limits = named.map(|verdict| verdict.limits.as_slice()).unwrap_or_default();
+    let mut limits: Vec<&VerdictLimit> = Vec::new();
+    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(|verdict| &verdict.limits) {
+        if !limits.iter().any(|known| known.name == limit.name) {
+            limits.push(limit);
+        }
+    }
     limits
-        .iter()
+        .into_iter()
         .map(|limit| LimitRow { limit, values: both.map(|verdict| value(verdict, &limit.name)) })
         .collect()
 }

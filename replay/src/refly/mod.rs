@@ -199,7 +199,9 @@ pub struct ReflyReport {
     pub margin: Option<f64>,
     /// Ticks that the controller ran.
     pub ticks: usize,
-    /// Of these, how many recorded ticks of the same number decided the same gimbal command, bit for bit.
+    /// Of these, how many have a recorded tick of the same number.
+    pub commands_recorded: usize,
+    /// Of those, how many decided the same gimbal command, bit for bit.
     pub commands_identical: usize,
     /// The largest difference of a gimbal command from the recorded one of the same tick, rad.
     pub gimbal_difference_max_rad: f64,
@@ -254,6 +256,7 @@ fn report(
         reflown,
         verdict_changed,
         ticks: 0,
+        commands_recorded: 0,
         commands_identical: 0,
         gimbal_difference_max_rad: 0.0,
     }

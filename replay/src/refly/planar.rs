@@ -27,9 +27,10 @@ pub(super) fn fly(
             is: "a planar landing",
         });
     }
+    let ticks = recording.replayable_ticks()?;
     recording.profile()?;
     let toml = recording.profile_toml()?;
-    let ticks = recording.replayable_ticks()?;
+    refuse_wind_and_chance(recording, options)?;
     let plant_profile = plant_profile(recording, options)?;
     let schedule = Schedule::new(toml, &options.settings)?;
     let start = start::find(recording, ticks, options)?;
@@ -45,12 +46,13 @@ pub(super) fn fly(
         Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
     let flown = ReflownFlight { before, ..simulation.fly(&limits) };
 
-    let (commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
+    let (commands_recorded, commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
     let recorded = recording.verdict.as_ref().map(VerdictFacts::of);
     let reflown = flown.verdict.as_ref().map(VerdictFacts::of);
     let report = ReflyReport {
         thrust_scale: dispersed.thrust_scale,
         ticks: flown.ticks.len(),
+        commands_recorded,
         commands_identical,
         gimbal_difference_max_rad,
         ..report(recording, options, start.state, recorded, reflown)
@@ -69,17 +71,33 @@ fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profil
     Ok(profile_with(recording.profile_toml()?, &settings)?)
 }
 
-/// How many ticks command the same as the recorded ones, and by how much the others differ at most, rad.
-fn compare_commands(recorded: &[v1::ControllerTick], flown: &ReflownFlight) -> (usize, f64) {
-    let mut identical = 0;
+/// The planar plant flies in still air, and what chance decided about it is `plant.*` and `dispersion.*`.
+fn refuse_wind_and_chance(recording: &Recording, options: &ReflyOptions) -> Result<(), ReflyError> {
+    let of_apogee = |setting: &&Setting| setting.path.starts_with("truth.") || setting.path.contains("wind");
+    let mut settings = options.settings.iter().chain(&options.plant_settings);
+    settings.find(of_apogee).map_or(Ok(()), |setting| {
+        Err(ReflyError::OtherKind {
+            name: recording.name.clone(),
+            what: setting.to_string(),
+            of: "a flight from apogee",
+            is: "a planar landing, whose plant flies in still air",
+        })
+    })
+}
+
+/// How many ticks have a recorded one of their number, how many of those command the same, and by how much the others
+/// differ at most, rad.
+fn compare_commands(recorded: &[v1::ControllerTick], flown: &ReflownFlight) -> (usize, usize, f64) {
+    let (mut known, mut identical) = (0, 0);
     let mut largest_rad = 0.0_f64;
     for now in &flown.ticks {
         let then = usize::try_from(now.record.input.tick).ok().and_then(|number| recorded.get(number));
         if let Some(then) = then {
             let (then_rad, now_rad) = (then.output.gimbal_command_rad, now.record.output.gimbal_command_rad);
+            known += 1;
             identical += usize::from(then_rad.to_bits() == now_rad.to_bits());
             largest_rad = largest_rad.max((then_rad - now_rad).abs());
         }
     }
-    (identical, largest_rad)
+    (known, identical, largest_rad)
 }

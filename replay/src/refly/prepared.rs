@@ -21,6 +21,7 @@ impl<'a> Prepared<'a> {
         let at_start = if recording.is_from_apogee() {
             Some(Box::new(apogee::AtStart::new(recording, options)?))
         } else {
+            recording.replayable_ticks()?;
             None
         };
         Ok(Self { recording, at_start })

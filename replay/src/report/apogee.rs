@@ -18,7 +18,7 @@ use tick_log::pilot::state_from_log;
 use tick_log::state_to_log;
 
 use super::track::{AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, track_of};
-use crate::controller::{LoggedPilot, Replayed as _, settings_in_flight};
+use crate::controller::{LoggedPilot, NewPlans, Replayed as _, settings_in_flight};
 use crate::log::Recording;
 
 /// Records of the world this close to a frame are of the same moment, s.
@@ -99,19 +99,14 @@ fn run_again(recording: &Recording) -> Option<(Mission, ThrustCurve, Vec<Thought
     let mut controller = LoggedPilot::new(recording.profile_toml().ok()?, start, &in_flight).ok()?;
     let mission = controller.pilot().mission().clone();
     let curve = mission.motor().ok()?;
-    let (mut thoughts, mut flown) = (Vec::new(), Vec::new());
+    let (mut thoughts, mut plans) = (Vec::new(), NewPlans::default());
     for recorded in frames {
         let again = controller.run_again(recorded).ok()?;
         if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
             continue;
         }
         let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
-        let planned = again.output.level != u32::from(ControlLevel::Idle.index());
-        // A plan that is flown out, or flown on for want of a better one, was made at an earlier frame.
-        let plan = pilot.planned().filter(|(states, _)| planned && *states != flown.as_slice());
-        if let Some((states, _)) = plan {
-            flown = states.to_vec();
-        }
+        let plan = plans.made(pilot, again.output.level);
         thoughts.push(Thought {
             frame: recorded.input.frame,
             time_s,

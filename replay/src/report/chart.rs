@@ -1,9 +1,12 @@
 //! A line chart as SVG.
 
+use super::axis::{Axis, equalise, extent, number, padded};
 use super::page::{escaped, put};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
+/// Height of a picture that is higher than wide: three others stand beside it.
+const TALL: f64 = 800.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 52.0;
@@ -37,40 +40,6 @@ pub(super) struct Chart {
     pub(super) full: bool,
 }
 
-#[derive(Clone, Copy)]
-struct Axis {
-    from: f64,
-    to: f64,
-    /// Pixels at both ends.
-    at: (f64, f64),
-}
-
-impl Axis {
-    fn place(&self, value: f64) -> f64 {
-        self.at.0 + (value - self.from) / (self.to - self.from) * (self.at.1 - self.at.0)
-    }
-
-    /// Round numbers in the axis, five or so, and their decimals.
-    fn ticks(&self) -> (Vec<f64>, usize) {
-        let step = round_step((self.to - self.from) / 5.0);
-        let first = (self.from / step).ceil();
-        let count = ((self.to - first * step) / step).floor().clamp(0.0, 20.0) as usize;
-        let decimals = (-libm::log10(step) + 1e-9).ceil().clamp(0.0, 9.0) as usize;
-        ((0..=count).map(|k| (first + k as f64) * step).collect(), decimals)
-    }
-}
-
-/// 1, 2 or 5 times a power of ten.
-fn round_step(rough: f64) -> f64 {
-    if !(rough > 0.0 && rough.is_finite()) {
-        return 1.0;
-    }
-    let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
-    let mantissa = rough / power;
-    let nice = [1.0, 2.0, 5.0].into_iter().find(|nice| mantissa <= *nice).unwrap_or(10.0);
-    nice * power
-}
-
 impl Chart {
     /// The chart, or nothing without a point to draw.
     pub(super) fn svg(&self) -> String {
@@ -85,15 +54,25 @@ impl Chart {
         let Some((y_from, y_to)) = extent(values) else {
             return String::new();
         };
-        let width = if self.full { 2.0 * WIDTH } else { WIDTH };
-        let height = if self.equal_scales { 2.0 * HEIGHT } else { HEIGHT };
+        // What is in one scale and higher than wide gets a picture that is too.
+        let tall = self.equal_scales && y_to - y_from > x_to - x_from;
+        let width = if self.full && !tall { 2.0 * WIDTH } else { WIDTH };
+        let height = match (self.equal_scales, tall) {
+            (_, true) => TALL,
+            (true, false) => 2.0 * HEIGHT,
+            (false, false) => HEIGHT,
+        };
         let mut x = Axis { from: x_from, to: x_to, at: (LEFT, width - RIGHT) };
         let mut y = padded(Axis { from: y_from, to: y_to, at: (height - BOTTOM, TOP) });
         if self.equal_scales {
             x = padded(x);
             equalise(&mut x, &mut y);
         }
-        let class = if self.full { " class=\"full\"" } else { "" };
+        let class = match (tall, self.full) {
+            (true, _) => " class=\"tall\"",
+            (false, true) => " class=\"full\"",
+            (false, false) => "",
+        };
         let mut svg = format!(
             "<figure{class}><svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
              <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
@@ -101,7 +80,7 @@ impl Chart {
         );
         self.draw_axes(x, y, &mut svg);
         self.draw_lines(x, y, &mut svg);
-        self.draw_legend(&mut svg);
+        self.draw_legend(width, &mut svg);
         svg.push_str("</svg></figure>\n");
         svg
     }
@@ -186,12 +165,12 @@ impl Chart {
         }
     }
 
-    fn draw_legend(&self, svg: &mut String) {
+    fn draw_legend(&self, picture_width: f64, svg: &mut String) {
         let named: Vec<&Line> = self.lines.iter().filter(|line| !line.name.is_empty()).collect();
         if named.len() < 2 {
             return;
         }
-        let mut at = if self.full { 2.0 * WIDTH } else { WIDTH } - RIGHT;
+        let mut at = picture_width - RIGHT;
         for line in named.into_iter().rev() {
             let width = 6.2 * line.name.len() as f64;
             at -= width;
@@ -221,60 +200,9 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-/// The lowest and the highest; a single value is widened.
-fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let bounds = values.fold(None, |bounds: Option<(f64, f64)>, value| {
-        Some(bounds.map_or((value, value), |(from, to)| (from.min(value), to.max(value))))
-    });
-    // Numbers so far apart that their difference is no number cannot be drawn.
-    let bounds = bounds.filter(|(from, to)| (to - from).is_finite());
-    bounds.map(|(from, to)| if to - from > 1e-12 { (from, to) } else { (from - 0.5, to + 0.5) })
-}
-
-fn padded(axis: Axis) -> Axis {
-    let room = 0.06 * (axis.to - axis.from);
-    Axis { from: axis.from - room, to: axis.to + room, ..axis }
-}
-
-/// Widens the axis that has more pixels a unit until both have the same.
-fn equalise(x: &mut Axis, y: &mut Axis) {
-    let scale = |axis: &Axis| (axis.at.1 - axis.at.0).abs() / (axis.to - axis.from);
-    let wanted = scale(x).min(scale(y));
-    for axis in [x, y] {
-        let middle = 0.5 * (axis.from + axis.to);
-        let half = 0.5 * (axis.at.1 - axis.at.0).abs() / wanted;
-        (axis.from, axis.to) = (middle - half, middle + half);
-    }
-}
-
-fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    // A rounded negative nought.
-    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
-        format!("{:.decimals$}", 0.0)
-    } else {
-        text
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn axis(from: f64, to: f64) -> Axis {
-        Axis { from, to, at: (0.0, 100.0) }
-    }
-
-    #[test]
-    fn ticks_are_round_and_inside() {
-        for (from, to) in [(0.0, 10.0), (-0.37, 0.41), (1e-6, 3e-6), (-250.0, 1e4)] {
-            let (ticks, _) = axis(from, to).ticks();
-            assert!((3..=11).contains(&ticks.len()), "{from} to {to}: {ticks:?}");
-            assert!(ticks.iter().all(|tick| (from - 1e-9..=to + 1e-9).contains(tick)));
-        }
-        assert_eq!(round_step(0.03).to_bits(), 0.05_f64.to_bits());
-        assert_eq!(number(-0.0, 1), "0.0");
-    }
 
     #[test]
     fn peaks_survive_the_thinning_and_gaps_stay_gaps() {
@@ -288,5 +216,17 @@ mod tests {
         assert_eq!(svg.matches("class=\"l a\"").count(), 1);
         assert!(!svg.contains("NaN"), "{svg}");
         assert_eq!(Chart::default().svg(), "");
+    }
+
+    #[test]
+    fn a_steep_path_in_one_scale_is_a_tall_picture() {
+        let path = |height_m: f64| Chart {
+            lines: vec![Line { name: "", class: "a", points: vec![(0.0, 0.0), (10.0, height_m)] }],
+            equal_scales: true,
+            full: true,
+            ..Chart::default()
+        };
+        assert!(path(110.0).svg().starts_with("<figure class=\"tall\"><svg viewBox=\"0 0 520 800\""));
+        assert!(path(5.0).svg().starts_with("<figure class=\"full\"><svg viewBox=\"0 0 1040 520\""));
     }
 }

@@ -5,6 +5,7 @@
 //! has the section say so. A flight from apogee is seen in the plane of its landing.
 
 mod apogee;
+mod axis;
 mod chart;
 mod page;
 mod section;

@@ -29,7 +29,7 @@ td { white-space: nowrap; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); gap: 12px; }
 figure { margin: 0; overflow-x: auto; background: var(--card); border-radius: 6px; padding: 8px; }
-figure.full { grid-column: 1 / -1; } figure.full svg { min-width: 640px; }
+figure.full { grid-column: 1 / -1; } figure.full svg { min-width: 640px; } figure.tall { grid-row: span 3; }
 svg { display: block; width: 100%; height: auto; }
 svg text { fill: var(--muted); font: 11px system-ui, sans-serif; }
 svg .title { fill: var(--fg); font-size: 13px; font-weight: 600; }
@@ -42,6 +42,8 @@ svg .a { stroke: var(--a); } svg .b { stroke: var(--b); stroke-dasharray: 7 3; }
 svg .d { stroke: var(--d); stroke-dasharray: 2 2; } svg .thin { stroke: var(--muted); stroke-width: 0.7; fill: none; }
 svg .fa { fill: var(--a); } svg .fb { fill: var(--b); } svg .fc { fill: var(--c); } svg .fd { fill: var(--d); }
 svg .bar { fill: var(--a); } svg .barbad { fill: var(--bad); } svg .room { fill: var(--grid); }
+@media (max-width: 980px) { figure.tall { grid-row: auto; } }
+@media (max-width: 640px) { td { white-space: normal; } td.n { white-space: nowrap; } th, td { padding-right: 8px; } }
 @media print { main { max-width: none; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 ";
 
@@ -50,7 +52,8 @@ pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String
     let title = format!("Flight report: {}", flight.recording.name);
     let mut body = format!("<h1>{}</h1>\n", escaped(&title));
     let span = info.span.map(|span| format!("{:.1} s of log", span.duration_s)).unwrap_or_default();
-    let run: Vec<String> = info.run.iter().map(|(key, value)| format!("{key} {value}")).collect();
+    let said = info.run.iter().filter(|(_, value)| !value.is_empty());
+    let run: Vec<String> = said.map(|(key, value)| format!("{key} {value}")).collect();
     put(
         &mut body,
         format_args!(

@@ -1,6 +1,8 @@
 //! The jobs of a sweep, several at a time.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 
@@ -36,10 +38,7 @@ pub fn sweep(
     let missing: Vec<usize> = (0..all).filter(|job| state.outcome(*job).is_none()).collect();
     let mut done = all - missing.len();
     progress(Progress { done, jobs: all });
-    let prepared: Vec<Prepared> =
-        flights.iter().map(|flight| Prepared::new(flight, options)).collect::<Result<_, _>>().map_err(
-            |source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) },
-        )?;
+    let prepared = prepare(flights, &missing, options, jobs)?;
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let mut failed: Option<(usize, SweepError)> = None;
@@ -52,7 +51,9 @@ pub fn sweep(
                 while !stop.load(Ordering::Relaxed)
                     && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
                 {
-                    let outcome = fly(prepared, points, options, job);
+                    // Whatever is missing was made ready.
+                    let Some(flight) = prepared.get(&(job % flights.len())) else { return };
+                    let outcome = fly(flight, points, options, job / flights.len());
                     if results.send((job, outcome)).is_err() {
                         return;
                     }
@@ -90,18 +91,49 @@ pub fn sweep(
     Ok(SweepReport::ranked(flights.iter().map(|flight| flight.name.clone()).collect(), outcomes.collect()))
 }
 
+/// Every flight that a missing job needs, made ready, `jobs` at a time: to fly one up to its start may take as long as the
+/// rest of it.
+fn prepare<'a>(
+    flights: &'a [Recording],
+    missing: &[usize],
+    options: &ReflyOptions,
+    jobs: NonZeroUsize,
+) -> Result<BTreeMap<usize, Prepared<'a>>, SweepError> {
+    let needed: BTreeSet<usize> = missing.iter().map(|job| job % flights.len()).collect();
+    let needed: Vec<usize> = needed.into_iter().collect();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut prepared = Vec::new();
+        while let Some(place) = needed.get(next.fetch_add(1, Ordering::Relaxed)) {
+            prepared.push((*place, Prepared::new(&flights[*place], options)));
+        }
+        prepared
+    };
+    let prepared: BTreeMap<usize, Result<Prepared, ReflyError>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..jobs.get().min(needed.len())).map(|_| scope.spawn(work)).collect();
+        let joined =
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        joined.flatten().collect()
+    });
+    // Of several errors that of the first flight, whichever came first.
+    let prepared = prepared.into_iter().map(|(place, flight)| Ok((place, flight?)));
+    prepared
+        .collect::<Result<_, ReflyError>>()
+        .map_err(|source| SweepError::Refly { settings: "as recorded".to_owned(), source: Box::new(source) })
+}
+
 fn fly(
-    flights: &[Prepared],
+    flight: &Prepared,
     points: &[Choice],
     options: &ReflyOptions,
-    job: usize,
+    point: usize,
 ) -> Result<FlightOutcome, ReflyError> {
     let mut options = options.clone();
-    if let Some(choice) = points.get(job / flights.len()) {
+    if let Some(choice) = points.get(point) {
         options.settings.extend(choice.settings.iter().cloned());
         options.plant_settings.extend(choice.plant_settings.iter().cloned());
     }
-    let report = flights[job % flights.len()].fly(&options)?;
+    let report = flight.fly(&options)?;
     Ok(FlightOutcome { landed: report.reflown.is_some_and(|verdict| verdict.landed), margin: report.margin })
 }
 

@@ -107,6 +107,8 @@ pub struct TickReport {
     pub warm: Option<Solved>,
     /// The same problem from nothing.
     pub cold: Option<Solved>,
+    /// The nearest tick that solves a landing; this one if it does, `None` if none does.
+    pub nearest_solved: Option<u64>,
     /// Limits and conditions that the warm plan touches.
     pub active: Vec<ActiveConstraint>,
     /// The plan: time from the tick, s, and state at each node.
@@ -144,6 +146,10 @@ pub struct PathPoint {
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
     if recording.is_from_apogee() { pilot::frame(recording, number) } else { planar::tick(recording, number) }
+}
+
+fn nearest(number: u64, solved: impl Iterator<Item = u64>) -> Option<u64> {
+    solved.min_by_key(|tick| tick.abs_diff(number))
 }
 
 fn solved_facts(solution: &Solution) -> Solved {

@@ -1,15 +1,16 @@
 //! A frame of a flight computer: every tenth plans the landing while the motor burns.
 
+use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
 use flight::nmpc::Solution;
-use flight::pilot::Pilot;
+use flight::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::powered::Plane;
 use nalgebra::Vector3;
 use prost::Message as _;
 use protocol::log::flight_v1;
 use tick_log::pilot::{input_from_log, tick_to_log};
 
-use super::{InputFacts, PathPoint, TickError, TickReport, active_constraints, solved_facts};
+use super::{InputFacts, PathPoint, TickError, TickReport, active_constraints, nearest, solved_facts};
 use crate::controller::{LoggedPilot, PilotStartError, Replayed as _, settings_in_flight};
 use crate::log::Recording;
 
@@ -57,12 +58,22 @@ pub(super) fn frame(recording: &Recording, number: u64) -> Result<TickReport, Ti
         identical: again.encode_to_vec() == recorded.encode_to_vec(),
         warm: warm.map(solved_facts),
         cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
+        nearest_solved: nearest(
+            number,
+            frames.iter().filter(|tick| plans(tick)).map(|tick| tick.input.frame),
+        ),
         active: solved
             .as_ref()
             .map(|solved| active_constraints(&solved.problem, &solved.warm.solution))
             .unwrap_or_default(),
         path: warm.map(path).unwrap_or_default(),
     })
+}
+
+/// Whether a landing is planned in a frame.
+fn plans(tick: &flight_v1::PilotTick) -> bool {
+    let idle = u32::from(ControlLevel::Idle.index());
+    tick.input.frame.is_multiple_of(FRAMES_PER_PLAN) && tick.output.level != idle
 }
 
 /// The estimated motion in the plane of the landing, or before there is one in the world's x-z plane.

@@ -5,13 +5,13 @@ use flight::nmpc::{SolveStatus, solve};
 use protocol::log::v1;
 use tick_log::input_from_log;
 
-use super::{InputFacts, PathPoint, TickError, TickReport, active_constraints, solved_facts};
+use super::{InputFacts, PathPoint, TickError, TickReport, active_constraints, nearest, solved_facts};
 use crate::controller::{LoggedController, Replayed as _};
 use crate::log::Recording;
 
 pub(super) fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
-    let profile = recording.profile()?;
     let ticks = recording.replayable_ticks()?;
+    let profile = recording.profile()?;
     let place = usize::try_from(number).ok().filter(|place| *place < ticks.len()).ok_or_else(|| {
         TickError::NoTick {
             name: recording.name.clone(),
@@ -27,7 +27,7 @@ pub(super) fn tick(recording: &Recording, number: u64) -> Result<TickReport, Tic
     let recorded = &ticks[place];
     let input = input_from_log(&recorded.input)?;
     let again = controller.run_again(recorded)?;
-    let solved = again.output.solver.status != u32::from(SolveStatus::NotRun.index());
+    let solved = solves(&again);
     let problem = controller.state().last_problem();
     let kept = controller.state().kept_solution().filter(|_| solved && is_kept(&again));
     let cold = solved.then(|| solve(problem, None));
@@ -49,9 +49,15 @@ pub(super) fn tick(recording: &Recording, number: u64) -> Result<TickReport, Tic
         identical: identical(recorded, &again),
         warm: kept.map(solved_facts),
         cold: cold.as_ref().map(solved_facts),
+        nearest_solved: nearest(number, ticks.iter().filter(|tick| solves(tick)).map(|tick| tick.input.tick)),
         active: kept.map(|solution| active_constraints(problem, solution)).unwrap_or_default(),
         path: path(&again.output.plan),
     })
+}
+
+/// Whether a landing problem was solved.
+fn solves(tick: &v1::ControllerTick) -> bool {
+    tick.output.solver.status != u32::from(SolveStatus::NotRun.index())
 }
 
 /// The controller keeps what it flies or rehearses.

@@ -34,7 +34,7 @@ use flight::profile::Profile;
 use tally::Tally;
 
 use crate::controller::{LoggedController, LoggedPilot, PilotStartError, settings_in_flight};
-use crate::log::{Entry, FlightLog, Head, LogError, Ordered, Recording, TickOrder};
+use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, Ordered, Recording, TickOrder};
 
 /// Verifies a log file.
 ///
@@ -70,9 +70,7 @@ pub fn verify_log<R: Read>(
     let mut verifier = None;
     let mut pilot = None;
     let mut found = Found::default();
-    // Number of the last frame, and of its record: a computer that was restarted leaves out frames, a log that has lost
-    // some leaves out records.
-    let mut last: Option<(u64, u32)> = None;
+    let mut frame_order = FrameOrder::default();
     while let Some(stamped) = log.next_entry()? {
         match stamped.entry {
             Entry::Tick(tick) => {
@@ -105,14 +103,15 @@ pub fn verify_log<R: Read>(
             },
             Entry::PilotTick(tick) => {
                 found.ticks += 1;
-                let (before, record) = (tick.input.frame, stamped.sequence);
-                let lost = last.filter(|(_, earlier)| record > earlier.saturating_add(1));
-                last = Some((before, record));
+                let lost = frame_order.note(tick.input.frame, stamped.sequence);
                 if found.obstacle.is_none() {
                     found.obstacle = match (lost, &mut pilot) {
-                        (Some((after, _)), _) => Some(Obstacle::Gap { after, before }),
+                        (_, None) => Some(Obstacle::NoStart),
+                        (Some(Gap { after: 0, before }), _) => {
+                            Some(Obstacle::BeginningMissing { first: before })
+                        }
+                        (Some(Gap { after, before }), _) => Some(Obstacle::Gap { after, before }),
                         (None, Some(pilot)) => pilot.check(&tick).err().map(Obstacle::Frame),
-                        (None, None) => Some(Obstacle::NoStart),
                     };
                 }
             }

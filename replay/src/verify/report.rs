@@ -42,7 +42,9 @@ pub enum Obstacle {
         reason: String,
     },
     /// The log does not begin with the first tick.
-    #[error("it begins with tick {first}, not with tick 0: what the controller remembered then is unknown")]
+    #[error(
+        "it begins with tick {first}, and the ticks before it are missing: what the controller remembered then is unknown"
+    )]
     BeginningMissing {
         /// The first tick there is.
         first: u64,

@@ -9,11 +9,10 @@ use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
-use replay::recover::recover;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 use replay::tick::tick;
-use replay::verify::{Obstacle, Outcome, verify};
+use replay::verify::{Outcome, verify};
 
 use crate::asked::{settings, with, with_plant};
 use crate::command_line::{replay, run};
@@ -28,21 +27,6 @@ fn it_landed_and_verifies() {
     assert!(LANDED.landed && recording().verdict.unwrap().landed);
     let report = verify(&LANDED.log).unwrap();
     assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
-}
-
-/// What a damaged log has lost is no restart of the flight computer.
-#[test]
-fn frames_that_a_log_has_lost_are_a_gap() {
-    let (damaged, recovered) = (LANDED.beside("damaged.mcap"), LANDED.beside("recovered.mcap"));
-    let mut bytes = std::fs::read(&LANDED.log).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(&damaged, bytes).unwrap();
-    recover(&damaged, &recovered).unwrap();
-    let report = verify(&recovered).unwrap();
-    assert_eq!(report.outcome, Outcome::NotReplayable, "{report:?}");
-    assert!(matches!(report.obstacle, Some(Obstacle::Gap { .. })), "{:?}", report.obstacle);
-    assert_eq!(report.first_divergence, None);
 }
 
 #[test]
@@ -167,6 +151,12 @@ fn what_cannot_be_flown_again_is_said() {
     assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
     assert!(refused(&with(&["truth.wind_m_s=3"])).contains("the plant's alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
+    let landing = |tick: &PilotTick| tick.output.phase != u32::from(Phase::AeroDescent.index());
+    let fallen = recording.frames.iter().position(landing).unwrap();
+    let mut falling = recording.clone();
+    falling.frames.truncate(fallen);
+    let refusal = refly(&falling, &ReflyOptions::default()).unwrap_err().to_string();
+    assert!(refusal.contains("a frame, a time or a phase names another moment"), "{refusal}");
     recording.head.run.remove("flight");
     let message = refly(&recording, &ReflyOptions::default()).unwrap_err().to_string();
     assert!(message.contains("apogee.mcap") && message.contains("`flight`"), "{message}");
@@ -236,6 +226,8 @@ fn every_plan_solved_again_is_the_flown_one() {
     assert!(plans > 5 && warm_iterations < cold_iterations, "{plans}: {warm_iterations}, {cold_iterations}");
     let between = tick(&recording, 3).unwrap();
     assert!(between.identical && between.warm.is_none() && between.path.is_empty());
+    let nearest = tick(&recording, between.nearest_solved.unwrap()).unwrap();
+    assert!(nearest.warm.is_some() && nearest.nearest_solved == Some(nearest.tick));
     let refusal = tick(&recording, 99_999).unwrap_err().to_string();
     assert!(refusal.contains("no tick 99999 that can be re-executed; there are 1 to"), "{refusal}");
 }

@@ -63,16 +63,12 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     assert!(code == 2 && said.contains("is not a flight log"), "{said}");
 }
 
-/// Run by hand, since it writes a gigabyte.
-#[test]
-#[ignore = "writes a gigabyte"]
-fn a_gigabyte_is_described_within_200_megabytes() {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("long.mcap");
-    let file = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
+/// Writes a log of so many bytes or a little more; how many ticks it has.
+fn write_long_log(path: &Path, bytes: u64) -> u64 {
+    let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
     let mut writer = LogWriter::new(file, &LogHeader::default()).unwrap();
     let mut number = 0_u64;
-    while std::fs::metadata(&path).unwrap().len() < 1 << 30 {
+    while std::fs::metadata(path).unwrap().len() < bytes {
         for tick in &FLIGHT.ticks {
             let mut tick = tick.clone();
             tick.input.tick = number;
@@ -88,9 +84,44 @@ fn a_gigabyte_is_described_within_200_megabytes() {
         }
     }
     writer.finish().unwrap();
-    let (code, said) = within(200, &["info"], &path);
+    number
+}
+
+/// Whether a log is described in so much memory and no more.
+fn assert_described_within(megabytes: u32, bytes: u64) {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("long.mcap");
+    let ticks = write_long_log(&path, bytes);
+    let (code, said) = within(megabytes, &["info"], &path);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains(&format!("{number}, from 0")), "{said}");
+    assert!(said.contains(&format!("{ticks}, from 0")), "{said}");
+}
+
+/// The same memory for one megabyte as for a hundred: what is held does not grow with the log.
+#[test]
+fn a_hundred_megabytes_are_described_in_the_memory_of_one() {
+    assert_described_within(48, 1 << 20);
+    assert_described_within(48, 100 << 20);
+}
+
+/// The rows of a table are streamed too.
+#[test]
+fn a_hundred_megabytes_are_exported_in_bounded_memory() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("long.mcap");
+    let ticks = write_long_log(&path, 100 << 20);
+    let tables = directory.path().join("tables");
+    let arguments = ["export", "--to", "csv", "--output", tables.to_str().unwrap()];
+    let (code, said) = within(64, &arguments, &path);
+    assert_eq!(code, 0, "{said}");
+    let table = std::fs::read_to_string(tables.join("controller_tick.csv")).unwrap();
+    assert_eq!(table.lines().count() as u64, ticks + 1);
+}
+
+#[test]
+#[ignore = "writes a gigabyte; the ordinary tests hold a hundred megabytes to a quarter of the memory"]
+fn a_gigabyte_is_described_within_200_megabytes() {
+    assert_described_within(200, 1 << 30);
 }
 
 /// Changes some number of a tick to any bits at all.

@@ -26,6 +26,9 @@ pub(crate) static NOMINAL: LazyLock<Simulated> = LazyLock::new(|| simulate("pape
 /// A landing with a scattered start and motor.
 pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("paper-dispersed", 2, &[]));
 
+/// A rocket from apogee, flown as the vehicle flies it.
+pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 1, &[]));
+
 /// The nominal landing with its telemetry going nowhere, so that its log has raw frames.
 pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();

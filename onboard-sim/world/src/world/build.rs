@@ -63,9 +63,7 @@ impl World {
     ) -> Result<Self, WorldError> {
         airframe.validate()?;
         check(truth)?;
-        if !initial.is_finite() || (initial.world_from_body.coords.norm_squared() - 1.0).abs() > 1e-6 {
-            return Err(WorldError::State(format!("{initial:?}")));
-        }
+        check_state(initial)?;
         let mass_model = MassModel::new(&airframe.mass, motor.propellant_mass_kg()).scaled(truth.mass_scale);
         let empty = mass_model.at(f64::INFINITY);
         if !(mass_model.dry_mass_kg() > 0.0 && empty.pitch_inertia_kg_m2 > 0.0) {
@@ -111,6 +109,14 @@ impl World {
 fn fins_at(airframe: &Airframe, opening_rad: f64) -> [Servo; 4] {
     let stops_rad = (airframe.fins.closed_rad(), airframe.fins.open_rad());
     core::array::from_fn(|_| Servo::new(&airframe.fins.servo, stops_rad, opening_rad))
+}
+
+/// Whether a vehicle can be in a state.
+pub(super) fn check_state(state: &RigidState) -> Result<(), WorldError> {
+    if !state.is_finite() || (state.world_from_body.coords.norm_squared() - 1.0).abs() > 1e-6 {
+        return Err(WorldError::State(format!("{state:?}")));
+    }
+    Ok(())
 }
 
 fn check(truth: &Truth) -> Result<(), WorldError> {

@@ -1,8 +1,10 @@
 //! Another vehicle or another day from one moment on, in the middle of a flight.
 
 use flight::airframe::{Airframe, Servo as ServoData};
+use flight::rigid::RigidState;
 use flight::thrust_curve::ThrustCurve;
 
+use super::build::check_state;
 use super::{World, WorldError};
 use crate::servo::Servo;
 use crate::truth::Truth;
@@ -41,12 +43,20 @@ impl World {
             ..other
         })
     }
+
+    /// The same moment of the same flight with the vehicle in another place, attitude or motion; everything else goes on.
+    ///
+    /// # Errors
+    /// The state is not finite, or its attitude no rotation.
+    pub fn placed(&self, state: &RigidState) -> Result<Self, WorldError> {
+        check_state(state)?;
+        Ok(Self { state: *state, ..self.clone() })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use flight::motors;
-    use flight::rigid::RigidState;
 
     use super::*;
     use crate::{Actuators, Fault};
@@ -83,6 +93,25 @@ mod tests {
             assert_eq!(format!("{:?}", same.state()), format!("{:?}", world.state()));
         }
         assert_eq!(same.time_s().to_bits(), world.time_s().to_bits());
+    }
+
+    #[test]
+    fn in_another_place_it_flies_on_as_it_was() {
+        let mut world = burning();
+        let mut same = world.placed(world.state()).unwrap();
+        let mut there = *world.state();
+        there.position_m.x += 3.0;
+        let mut moved = world.placed(&there).unwrap();
+        for _ in 0..300 {
+            world.step(&IGNITED);
+            same.step(&IGNITED);
+            moved.step(&IGNITED);
+        }
+        assert_eq!(format!("{:?}", same.state()), format!("{:?}", world.state()));
+        assert!((moved.state().position_m.x - world.state().position_m.x - 3.0).abs() < 1e-9);
+        assert!((moved.state().velocity_m_s - world.state().velocity_m_s).norm() < 1e-9);
+        there.velocity_m_s.y = f64::NAN;
+        assert!(matches!(world.placed(&there), Err(WorldError::State(_))));
     }
 
     #[test]

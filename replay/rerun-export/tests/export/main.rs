@@ -4,5 +4,10 @@
 mod command_line;
 mod content;
 mod files;
+#[path = "../../../tests/replay/simulated.rs"]
+#[expect(dead_code, reason = "other tests fly more")]
+mod flown;
 mod logs;
+mod outside_reader;
 mod read_back;
+mod run_again;

@@ -17,7 +17,7 @@ use tick_log::pilot::tick_to_log;
 use world::Truth;
 use world::sensors::FRAME_S;
 
-use self::place::{find, phase_of};
+use self::place::{find, phase_of, put_where_it_believes, recorded_frame};
 use self::rerun::{Recipe, Rerun};
 use super::start::{From, StartState};
 use super::{Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report};
@@ -48,21 +48,15 @@ pub(super) struct AtStart<'a> {
 impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
-        let (pilot_start, frames) = recording.replayable_frames()?;
-        if options.from == From::Estimate {
-            let reason =
-                "the world at the start is the true one; --from estimate is for planar landings".to_owned();
-            return Err(ReflyError::Recipe { name: recording.name.clone(), reason });
-        }
+        let (pilot_start, frames) = recording.recorded_frames()?;
         let Recipe { dispersion, number, mut rerun } = Recipe::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
-        let mut recorded = frames[..place].iter();
         while rerun.flight.frame() + 1 < first_frame && rerun.step()? {
             let flight = &rerun.flight;
             if let (Some(input), Some(piloted)) = (flight.input(), flight.piloted())
-                && let Some(then) = recorded.next()
+                && let Some(then) = recorded_frame(&frames[..place], flight.frame())
             {
                 reached.frames += 1;
                 let now = tick_to_log(input, piloted, flight.pilot().digest());
@@ -83,6 +77,9 @@ impl<'a> AtStart<'a> {
             }
             None => None,
         };
+        if options.from == From::Estimate {
+            put_where_it_believes(recording, &mut rerun, first_frame)?;
+        }
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
         let before = place
@@ -92,7 +89,7 @@ impl<'a> AtStart<'a> {
             tick: first_frame,
             time_s: frames[place].input.time_s,
             phase: before,
-            from: From::Truth,
+            from: options.from,
             x_m: libm::hypot(place_m.x, place_m.y),
             z_m: world.height_m(),
         };
@@ -123,17 +120,18 @@ impl<'a> AtStart<'a> {
         mut kept: Option<&mut Kept>,
     ) -> Result<(ReflyReport, Option<protocol::log::v1::LandingVerdict>), ReflyError> {
         let mut rerun = self.changed(options)?;
-        let (mut ticks, mut commands_identical, mut gimbal_difference_max_rad) = (0, 0, 0.0_f64);
+        let (mut ticks, mut commands_recorded, mut commands_identical) = (0, 0, 0);
+        let mut gimbal_difference_max_rad = 0.0_f64;
         let mut phase = rerun.flight.pilot().mode().phase;
         loop {
             let goes_on = rerun.step()?;
             let flight = &rerun.flight;
             if let (Some(_), Some(piloted)) = (flight.input(), flight.piloted()) {
                 ticks += 1;
-                if let Ok(place) = self.frames.binary_search_by_key(&flight.frame(), |tick| tick.input.frame)
-                {
-                    let then = &self.frames[place].output.gimbal_rad;
+                if let Some(then) = recorded_frame(self.frames, flight.frame()) {
+                    let then = &then.output.gimbal_rad;
                     let pairs = || then.iter().zip(&piloted.gimbal_rad);
+                    commands_recorded += 1;
                     commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
                     let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                     gimbal_difference_max_rad = gimbal_difference_max_rad.max(apart_rad);
@@ -154,6 +152,7 @@ impl<'a> AtStart<'a> {
             reached: Some(self.reached),
             thrust_scale: rerun.flight.world().truth().impulse_scale,
             ticks,
+            commands_recorded,
             commands_identical,
             gimbal_difference_max_rad,
             ..report(self.recording, options, self.state, self.recorded.clone(), reflown)

@@ -3,6 +3,7 @@
 use flight::phase::Phase;
 use protocol::log::flight_v1;
 
+use super::rerun::Rerun;
 use crate::controller::{LoggedPilot, Moment, Replayed as _};
 use crate::log::Recording;
 use crate::refly::{ReflyError, StartAt};
@@ -33,7 +34,10 @@ pub(super) fn find(
         let last = frames.last().map(LoggedPilot::moment);
         let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
         let reason = match start {
-            StartAt::Landing => "no frame of a landing to start from".to_owned(),
+            StartAt::Landing => {
+                "no frame of a landing to start from; a frame, a time or a phase names another moment"
+                    .to_owned()
+            }
             StartAt::Tick(asked) => {
                 format!("no frame {asked}; there are {} to {}", number(first), number(last))
             }
@@ -47,4 +51,30 @@ pub(super) fn find(
         };
         ReflyError::Start { name: recording.name.clone(), reason }
     })
+}
+
+/// Puts the vehicle where its flight computer believed to be when the frame before the start was over.
+pub(super) fn put_where_it_believes(
+    recording: &Recording,
+    rerun: &mut Rerun,
+    first_frame: u64,
+) -> Result<(), ReflyError> {
+    let refused =
+        |reason: &str| ReflyError::Start { name: recording.name.clone(), reason: reason.to_owned() };
+    let Some(estimate) = rerun.flight.pilot().estimate().filter(|_| first_frame > 1) else {
+        return Err(refused("before its first frame the flight computer has estimated nothing yet"));
+    };
+    let world = rerun.flight.world();
+    if world.touchdown().is_some() {
+        return Err(refused("it is on the ground already; --from estimate puts what flies elsewhere"));
+    }
+    let placed = world.placed(&estimate.state)?;
+    *rerun.flight.world_mut() = placed;
+    Ok(())
+}
+
+/// A recorded frame by its number; a log may have lost it.
+pub(super) fn recorded_frame(frames: &[flight_v1::PilotTick], number: u64) -> Option<&flight_v1::PilotTick> {
+    let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
+    frames.get(place)
 }

@@ -37,7 +37,7 @@ impl Recipe {
     /// # Errors
     /// The log does not say all of it, or this build does not know it.
     pub(super) fn of(recording: &Recording) -> Result<Self, ReflyError> {
-        let (pilot_start, frames) = recording.replayable_frames()?;
+        let (pilot_start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
         let run = &recording.head.run;
         if let Some(original) = run.get("reflown_from") {

@@ -2,7 +2,7 @@
 
 use flight::phase::Phase;
 
-use crate::info::Info;
+use crate::info::{Info, PhaseSpan};
 use crate::report::page::{escaped, paragraph, put, table};
 use crate::report::track::{Flight, phase_of};
 
@@ -11,6 +11,7 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
         return paragraph("The log tells no phase.");
     };
     let mut html = strip(flight, &timeline.spans);
+    html.push_str(&times(flight, &timeline.spans));
     let mut rows: Vec<Vec<String>> = moments(flight)
         .into_iter()
         .map(|(what, value)| {
@@ -29,7 +30,7 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
 }
 
 /// The phases as a strip, with their times.
-fn strip(flight: &Flight, spans: &[crate::info::PhaseSpan]) -> String {
+fn strip(flight: &Flight, spans: &[PhaseSpan]) -> String {
     const WIDTH: f64 = 1040.0;
     let Some((first, last)) = spans.first().zip(spans.last()) else {
         return String::new();
@@ -64,6 +65,20 @@ fn strip(flight: &Flight, spans: &[crate::info::PhaseSpan]) -> String {
     }
     svg.push_str("</svg></figure>\n");
     svg + &format!("<p class=\"muted\">Times in {}.</p>\n", flight.axis_name())
+}
+
+/// The same in numbers, for narrow screens and for reading aloud.
+fn times(flight: &Flight, spans: &[PhaseSpan]) -> String {
+    let seconds = |time_s: f64| format!("{:.2} s", rounded(time_s));
+    let rows: Vec<Vec<String>> = spans
+        .iter()
+        .enumerate()
+        .map(|(place, span)| {
+            let until_s = spans.get(place + 1).map_or(span.until_s, |next| next.from_s);
+            vec![escaped(&span.phase), seconds(flight.axis_s(span.from_s)), seconds(until_s - span.from_s)]
+        })
+        .collect();
+    table(&["phase", "#from", "#for"], &rows)
 }
 
 /// To hundredths, without a negative nought.

@@ -26,13 +26,13 @@ pub(super) fn html(_: &Flight, info: &Info) -> String {
                 format!("{:.4}", limit.value),
                 escaped(&limit.unit),
                 format!("{:.4} to {:.4}", limit.minimum, limit.maximum),
-                bar(limit),
                 format!("<span class=\"{class}\">{word}</span>"),
+                bar(limit),
             ]
         })
         .collect();
     format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&words))
-        + &table(&["touchdown", "#value", "unit", "limit", "share of the limit", ""], &rows)
+        + &table(&["touchdown", "#value", "unit", "limit", "", "share of the limit"], &rows)
 }
 
 /// Where the value lies in its range, the range being the grey strip; a value outside stands at its end.

@@ -1,0 +1,145 @@
+//! The log's own controller, run again on its inputs beside the record.
+
+use flight::profile::Profile;
+use prost::Message as _;
+use protocol::log::flight_v1::{PilotStart, PilotTick};
+use protocol::log::v1::ControllerTick;
+use replay::controller::{
+    LoggedController, LoggedPilot, NewPlans, Replayed as _, path_in_world_m, settings_in_flight,
+};
+use replay::log::{FrameOrder, Gap};
+
+use crate::survey::Survey;
+
+/// The controller being run again.
+#[derive(Default)]
+pub(crate) struct Again {
+    controller: Controller,
+    /// The first tick that came out otherwise.
+    pub(crate) first_different: Option<u64>,
+    /// Ticks run again, and how many of them came out bit for bit.
+    pub(crate) ticks: u64,
+    pub(crate) identical: u64,
+    /// Why it was not run to the end.
+    pub(crate) obstacle: Option<String>,
+}
+
+#[derive(Default)]
+enum Controller {
+    #[default]
+    None,
+    Planar {
+        controller: Box<LoggedController>,
+        next: u64,
+    },
+    Pilot {
+        pilot: Box<LoggedPilot>,
+        plans: NewPlans,
+        order: FrameOrder,
+    },
+}
+
+/// A frame of a flight computer, run again.
+pub(crate) struct FrameAgain {
+    pub(crate) tick: PilotTick,
+    /// A plan that it made in this frame: where it leads, m, and the iterations it took.
+    pub(crate) plan: Option<(Vec<[f32; 3]>, usize)>,
+}
+
+impl Again {
+    /// The controller of a planar landing, if the log has its profile.
+    pub(crate) fn of(profile: Option<&Profile>) -> Self {
+        let planar =
+            |profile| Controller::Planar { controller: Box::new(LoggedController::new(profile)), next: 0 };
+        Self { controller: profile.map_or(Controller::None, planar), ..Self::default() }
+    }
+
+    /// The flight computer, let go.
+    pub(crate) fn let_go(&mut self, survey: &Survey, start: &PilotStart) {
+        let Some(mission_toml) = &survey.profile_toml else {
+            return self.give_up("the log has no mission to build the flight computer from".to_owned());
+        };
+        let settings = settings_in_flight(&survey.run).map_err(|error| error.to_string());
+        let pilot = settings.and_then(|settings| {
+            LoggedPilot::new(mission_toml, start, &settings).map_err(|error| error.to_string())
+        });
+        match pilot {
+            Ok(pilot) => {
+                let (plans, order) = (NewPlans::default(), FrameOrder::default());
+                self.controller = Controller::Pilot { pilot: Box::new(pilot), plans, order };
+            }
+            Err(reason) => self.give_up(reason),
+        }
+    }
+
+    /// Runs a tick of a planar landing again.
+    pub(crate) fn tick(&mut self, recorded: &ControllerTick) -> Option<ControllerTick> {
+        let Controller::Planar { controller, next } = &mut self.controller else { return None };
+        let number = recorded.input.tick;
+        if number != *next {
+            let reason = format!("tick {number} comes where tick {next} should");
+            self.give_up(reason);
+            return None;
+        }
+        *next += 1;
+        match controller.run_again(recorded) {
+            Ok(again) => {
+                self.compare(number, again.encode_to_vec() == recorded.encode_to_vec());
+                Some(again)
+            }
+            Err(error) => {
+                self.give_up(error.to_string());
+                None
+            }
+        }
+    }
+
+    /// Runs a frame of a flight computer again; `record` is its record's number within its channel.
+    pub(crate) fn frame(&mut self, recorded: &PilotTick, record: u32) -> Option<FrameAgain> {
+        let Controller::Pilot { pilot, plans, order } = &mut self.controller else { return None };
+        let number = recorded.input.frame;
+        if let Some(Gap { after, before }) = order.note(number, record) {
+            self.give_up(format!("the frames between {after} and {before} are lost"));
+            return None;
+        }
+        match pilot.run_again(recorded) {
+            Ok(tick) => {
+                let flying = pilot.pilot();
+                let plan = plans.made(flying, tick.output.level).map(|(states, step_s)| {
+                    let path_m = path_in_world_m(flying, states, step_s);
+                    let narrowed = path_m.into_iter().map(|place| place.map(|value| value as f32)).collect();
+                    (narrowed, flying.report().iterations)
+                });
+                self.compare(number, tick.encode_to_vec() == recorded.encode_to_vec());
+                Some(FrameAgain { tick, plan })
+            }
+            Err(error) => {
+                self.give_up(error.to_string());
+                None
+            }
+        }
+    }
+
+    /// What came of it, in words; `None` if there was nothing to run again.
+    pub(crate) fn words(&self) -> Option<String> {
+        let Self { ticks, identical, obstacle, .. } = self;
+        let ended =
+            obstacle.as_ref().map(|reason| format!("; not run to the end: {reason}")).unwrap_or_default();
+        (*ticks > 0 || obstacle.is_some()).then(|| {
+            format!("run again by this build, {identical} of {ticks} ticks are identical bit for bit{ended}")
+        })
+    }
+
+    fn compare(&mut self, tick: u64, identical: bool) {
+        self.ticks += 1;
+        self.identical += u64::from(identical);
+        if !identical {
+            self.first_different.get_or_insert(tick);
+        }
+    }
+
+    fn give_up(&mut self, reason: String) {
+        self.controller = Controller::None;
+        self.obstacle.get_or_insert(reason);
+    }
+}

@@ -1,0 +1,33 @@
+//! Which recording it is among those that the viewer holds.
+
+use std::path::Path;
+
+use re_sdk::RecordingStreamBuilder;
+
+use crate::survey::Survey;
+
+/// Recordings of one application share a layout in the viewer: a flight and the same flight flown again stand side by
+/// side.
+pub(crate) const APPLICATION: &str = "touchdown";
+
+/// The recording's identity: a log gives the same one every time, and two runs never share one.
+pub(crate) fn builder(log_name: &str, survey: &Survey) -> RecordingStreamBuilder {
+    let stem = Path::new(log_name).file_stem().map_or(log_name.into(), |stem| stem.to_string_lossy());
+    let start_ns = survey.start_unix_ns();
+    let (kind, kind_in_words) = if survey.run.contains_key("reflown_from") {
+        ("reflown", "flown again")
+    } else {
+        ("recorded", "recorded")
+    };
+    let id =
+        start_ns.map_or_else(|| format!("{kind}-{stem}"), |start_ns| format!("{kind}-{start_ns}-{stem}"));
+    let builder = RecordingStreamBuilder::new(APPLICATION)
+        .enabled(true)
+        .recording_id(id)
+        .recording_name(format!("{stem} ({kind_in_words})"))
+        .send_properties(true);
+    match start_ns.and_then(|start_ns| i64::try_from(start_ns).ok()) {
+        Some(start_ns) => builder.recording_started(start_ns),
+        None => builder,
+    }
+}

@@ -1,0 +1,130 @@
+//! Which plots there are, and the limits their numbers are held against.
+
+use flight::dynamics::PlanarState as FlightState;
+use flight::verdict::{LandingVerdict, TouchdownLimits};
+use protocol::log::v1::LandingVerdict as RecordedVerdict;
+
+use crate::survey::Survey;
+
+/// A plot: its name with its unit, as in its entity path, and its title.
+pub(crate) struct Plot {
+    pub(crate) name: &'static str,
+    pub(crate) title: &'static str,
+    /// A legend covers much of a plot; the colours mean the same in all of them.
+    pub(crate) legend: bool,
+}
+
+/// Every plot of a planar landing, in the order of the layout.
+pub(crate) const PLANAR: [Plot; 10] = [
+    Plot { name: "altitude_m", title: "Altitude, m", legend: true },
+    Plot { name: "x_m", title: "Horizontal position, m", legend: false },
+    Plot { name: "u_m_s", title: "Axial velocity u, m/s", legend: false },
+    Plot { name: "w_m_s", title: "Lateral velocity w, m/s", legend: false },
+    Plot { name: "pitch_error_deg", title: "Pitch from upright, deg", legend: false },
+    Plot { name: "q_deg_s", title: "Pitch rate q, deg/s", legend: false },
+    Plot { name: "gimbal_deg", title: "Gimbal, deg", legend: true },
+    Plot { name: "solve_time_ms", title: "Solve time, ms", legend: false },
+    Plot { name: "iterations", title: "Newton iterations", legend: false },
+    Plot { name: "level", title: "Control level (0 idle, 2 converged, 5 stabiliser)", legend: false },
+];
+
+/// Every plot of a flight from apogee, in the order of the layout.
+pub(crate) const FROM_APOGEE: [Plot; 12] = [
+    Plot { name: "altitude_m", title: "Height of the feet, m", legend: false },
+    Plot { name: "vertical_m_s", title: "Vertical speed, m/s", legend: false },
+    Plot { name: "x_m", title: "Position x, m", legend: false },
+    Plot { name: "y_m", title: "Position y, m", legend: false },
+    Plot { name: "lateral_m_s", title: "Lateral speed, m/s", legend: false },
+    Plot { name: "tilt_deg", title: "Tilt, deg", legend: false },
+    Plot { name: "gimbal_pitch_deg", title: "Gimbal in pitch, deg", legend: true },
+    Plot { name: "gimbal_yaw_deg", title: "Gimbal in yaw, deg", legend: false },
+    Plot { name: "fins_mean_deg", title: "Fins, mean opening, deg", legend: false },
+    Plot { name: "thrust_n", title: "Thrust, N", legend: false },
+    Plot { name: "solve_time_ms", title: "Time of a frame that plans, ms", legend: false },
+    Plot { name: "iterations", title: "Newton iterations, run again", legend: false },
+];
+
+/// The plots of a gimbal with two axes.
+pub(crate) const GIMBAL_IN_SPACE: [&str; 2] = ["gimbal_pitch_deg", "gimbal_yaw_deg"];
+
+/// A range that a plot's number should stay in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlotLimit {
+    /// The plot's name.
+    pub(crate) plot: &'static str,
+    /// Lowest value, in the plot's unit.
+    pub(crate) lowest: f64,
+    /// Highest value, in the plot's unit.
+    pub(crate) highest: f64,
+}
+
+/// The plot of a number that the landing verdict judges, by the verdict's name for it.
+pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "x" => "x_m",
+        "altitude" => "altitude_m",
+        "pitch error" => "pitch_error_deg",
+        "u" => "u_m_s",
+        "w" => "w_m_s",
+        "pitch rate" => "q_deg_s",
+        "vertical speed" => "vertical_m_s",
+        "lateral speed" => "lateral_m_s",
+        "tilt" => "tilt_deg",
+        _ => return None,
+    })
+}
+
+/// The limits a landing is judged by, as recorded with the verdict or else by the profile, and the gimbal's.
+pub(crate) fn limits_of(survey: &Survey, verdict: Option<&RecordedVerdict>) -> Vec<PlotLimit> {
+    let profile = survey.profile.as_ref();
+    let limit =
+        |name: &str, lowest, highest| plot_of_verdict(name).map(|plot| PlotLimit { plot, lowest, highest });
+    let mut limits: Vec<PlotLimit> = match (verdict, profile) {
+        (Some(verdict), _) => verdict
+            .limits
+            .iter()
+            .filter_map(|judged| limit(&judged.name, judged.minimum, judged.maximum))
+            .collect(),
+        (None, Some(profile)) => {
+            let judged =
+                LandingVerdict::judge(&TouchdownLimits::from_profile(profile), &FlightState::default());
+            judged
+                .results
+                .iter()
+                .filter_map(|judged| limit(judged.name, judged.lowest, judged.highest))
+                .collect()
+        }
+        (None, None) => Vec::new(),
+    };
+    if let Some(mission) = &survey.mission {
+        let limit_deg = mission.airframe.gimbal.limit_rad().to_degrees();
+        for plot in GIMBAL_IN_SPACE {
+            limits.push(PlotLimit { plot, lowest: -limit_deg, highest: limit_deg });
+        }
+    }
+    if let Some(profile) = profile {
+        let limit_deg = profile.gimbal.limit_deg;
+        limits.push(PlotLimit { plot: "gimbal_deg", lowest: -limit_deg, highest: limit_deg });
+    }
+    limits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flight::profile::Profile;
+
+    #[test]
+    fn every_number_of_the_verdict_has_a_plot() {
+        let limits = TouchdownLimits::from_profile(&Profile::builtin("paper-calibrated").unwrap());
+        for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
+            let plot = plot_of_verdict(result.name).unwrap();
+            assert!(PLANAR.iter().any(|known| known.name == plot), "{plot}");
+        }
+        for judged in ["vertical speed", "lateral speed", "tilt"] {
+            let plot = plot_of_verdict(judged).unwrap();
+            assert!(FROM_APOGEE.iter().any(|known| known.name == plot), "{plot}");
+        }
+        assert_eq!(plot_of_verdict("colour"), None);
+    }
+}

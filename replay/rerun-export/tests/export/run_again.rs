@@ -1,0 +1,86 @@
+//! What running the controller again adds: paths that are not in the log, and what is decided beside what was.
+
+use std::path::Path;
+
+use flight::phase::Phase;
+use protocol::log::record::Record;
+use protocol::log::writer::{LogHeader, LogWriter};
+use re_sdk::log::Chunk;
+use replay::log::Recording as Log;
+use replay_rerun::{Overwrite, entity, export_file};
+
+use crate::flown::{MK2, NOMINAL};
+use crate::read_back::Recording;
+
+fn exported(log: &Path, rrd: &Path) -> Recording {
+    export_file(log, rrd, Overwrite::Always).unwrap();
+    Recording::read(rrd)
+}
+
+#[test]
+fn a_flight_from_apogee_has_its_planned_paths() {
+    let recording = exported(&MK2.log, &MK2.beside("paths.rrd"));
+    let log = MK2.recording();
+    let burning = log.frames.iter().filter(|tick| tick.output.phase == u32::from(Phase::Powered.index()));
+    let most = burning.filter(|tick| tick.input.frame.is_multiple_of(10)).count();
+    let paths = recording.rows(entity::PREDICTED);
+    assert!(20 < paths && paths <= most + 2, "{paths} of {most}");
+    assert_eq!(recording.rows(entity::PREDICTED_TOUCHDOWN), paths);
+    assert!(recording.is_static(entity::FIRST_PLAN));
+    // All but the one that clears the last when the plan is flown out.
+    let ticks = recording.times(entity::PREDICTED, entity::TIMELINE_TICK);
+    assert!(ticks.iter().rev().skip(1).all(|tick| tick % 10 == 0), "{ticks:?}");
+    assert!(recording.rows("plots/solve_time_ms/controller") == log.timings.len());
+}
+
+#[test]
+fn what_is_decided_again_stands_beside_what_was_recorded() {
+    let recording = exported(&MK2.log, &MK2.beside("again.rrd"));
+    let frames = MK2.recording().frames.len();
+    for path in
+        ["plots/gimbal_pitch_deg/replayed", "plots/gimbal_yaw_deg/replayed", "plots/fins_mean_deg/replayed"]
+    {
+        assert_eq!(recording.rows(path), frames, "{path}");
+    }
+    assert_eq!(recording.rows(entity::LEVEL_REPLAYED), recording.rows(entity::LEVEL));
+    assert!(recording.rows(entity::LEVEL) > 0);
+    assert_eq!(recording.rows(entity::REPLAY), 0, "nothing differs");
+
+    let recording = exported(&NOMINAL.log, &NOMINAL.beside("again.rrd"));
+    let ticks = NOMINAL.recording().ticks.len();
+    for path in ["plots/gimbal_deg/replayed", "plots/iterations/replayed", entity::PREDICTED_REPLAYED] {
+        assert_eq!(recording.rows(path), ticks, "{path}");
+    }
+    assert_eq!(recording.of(entity::REPLAY).map(Chunk::num_rows).sum::<usize>(), 0);
+}
+
+/// A record that was not what the controller decided, and behind it frames that are lost.
+#[test]
+fn where_it_differs_and_where_it_ends_is_in_the_text() {
+    let log = Log::open(&MK2.log).unwrap();
+    let path = MK2.beside("forged.mcap");
+    let header = LogHeader {
+        profile_toml: Some(log.profile_toml().unwrap().to_owned()),
+        run: log.head.run.clone(),
+        ..LogHeader::default()
+    };
+    let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
+    writer.write(&Record::PilotStart(Box::new(log.pilot_start.unwrap())), 0).unwrap();
+    for tick in &log.frames[..40] {
+        let mut tick = tick.clone();
+        if tick.input.frame == 20 {
+            tick.output.fins_rad[0] += 0.1;
+        }
+        if tick.input.frame == 30 {
+            // There already.
+            tick.input.frame = 29;
+        }
+        let time_ns = (tick.input.time_s * 1e9).round() as u64;
+        writer.write(&Record::PilotTick(Box::new(tick)), time_ns).unwrap();
+    }
+    writer.finish().unwrap();
+    let recording = exported(&path, &MK2.beside("forged.rrd"));
+    assert_eq!(recording.rows(entity::REPLAY), 2);
+    assert_eq!(recording.times(entity::REPLAY, entity::TIMELINE_TICK), [20, 29]);
+    assert_eq!(recording.rows("plots/fins_mean_deg/replayed"), 29);
+}

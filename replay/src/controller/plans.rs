@@ -1,0 +1,42 @@
+//! The landings that a flight computer plans. They are not in its log; run again, it makes them again.
+
+use flight::controller::ControlLevel;
+use flight::dynamics::PlanarState;
+use flight::pilot::Pilot;
+use flight::powered::Plane;
+use nalgebra::Vector3;
+
+/// Tells the plans made in a frame from those that are flown on; frames must come in order.
+#[derive(Debug, Clone, Default)]
+pub struct NewPlans {
+    flown: Vec<PlanarState>,
+}
+
+impl NewPlans {
+    /// The plan that a flight computer made in the frame it has just run, at whose end `level` decided: states through
+    /// the air in the plane of the landing, and the time from one to the next, s. `None` if it flies on by an earlier
+    /// plan or by none.
+    pub fn made<'p>(&mut self, pilot: &'p Pilot, level: u32) -> Option<(&'p [PlanarState], f64)> {
+        let planned = level != u32::from(ControlLevel::Idle.index());
+        let (states, step_s) =
+            pilot.planned().filter(|(states, _)| planned && *states != self.flown.as_slice())?;
+        self.flown = states.to_vec();
+        Some((states, step_s))
+    }
+}
+
+/// The places of the centre of gravity, m, that a plan just made leads through: x, y, z of the world. They begin where the
+/// flight computer believes to be; across the plane of the landing nothing is planned.
+pub fn path_in_world_m(pilot: &Pilot, states: &[PlanarState], step_s: f64) -> Vec<[f64; 3]> {
+    let (Some(plane), Some(estimate), Some(first)) = (pilot.plane(), pilot.estimate(), states.first()) else {
+        return Vec::new();
+    };
+    let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
+    let place = |(node, state): (usize, &PlanarState)| {
+        let over_ground = Plane::over_ground(state, wind_m_s, node as f64 * step_s);
+        let moved =
+            plane.along * (over_ground.x_m - first.x_m) + Vector3::z() * (over_ground.z_m - first.z_m);
+        (estimate.state.position_m + moved).into()
+    };
+    states.iter().enumerate().map(place).collect()
+}

@@ -1,0 +1,123 @@
+//! The frames of a flight computer, counted, and what can be done with them.
+
+use protocol::log::flight_v1::PilotTiming;
+use serde::Serialize;
+
+use super::solve_times::SolveTimeCounter;
+use super::{Grade, GradeLevel, ProfileFacts, SolveTimes};
+use crate::log::{FrameOrder, Gap, TickRanges};
+
+/// The frames of the flight computer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FrameFacts {
+    /// The lowest number.
+    pub first: u64,
+    /// The highest number.
+    pub last: u64,
+    /// Numbers left out by a computer that was dead meanwhile, as stretches.
+    pub restarts: usize,
+    /// Stretches that the log has lost.
+    pub lost: usize,
+    /// The first of them: nothing behind it can be re-executed.
+    pub first_lost: Option<Gap>,
+    /// How often a number came that was there already.
+    pub repeated: u64,
+    /// There is a record of how the computer was let go.
+    pub start: bool,
+    /// How long those took that plan; `None` of a flight that was simulated without a clock.
+    pub solve_time: Option<SolveTimes>,
+}
+
+/// Counts frames.
+#[derive(Debug, Default)]
+pub(super) struct FrameCounter {
+    frames: TickRanges,
+    order: FrameOrder,
+    lost: usize,
+    first_lost: Option<Gap>,
+    solve_times: SolveTimeCounter,
+    /// The flight computer was let go on record.
+    start: bool,
+}
+
+impl FrameCounter {
+    pub(super) fn let_go(&mut self) {
+        self.start = true;
+    }
+
+    /// Counts a frame; `record` is its record's number within its channel.
+    pub(super) fn count(&mut self, frame: u64, record: u32) {
+        self.frames.insert(frame);
+        if let Some(gap) = self.order.note(frame, record) {
+            self.lost += 1;
+            self.first_lost.get_or_insert(gap);
+        }
+    }
+
+    pub(super) fn time(&mut self, timing: &PilotTiming) {
+        self.solve_times.count(timing.solve_time_s, timing.deadline_s);
+    }
+
+    pub(super) fn into_facts(self) -> Option<FrameFacts> {
+        let (first, last) = self.frames.bounds()?;
+        // What is lost before the first frame is no gap between frames.
+        let lost_between = self.lost - usize::from(self.first_lost.is_some_and(|gap| gap.after == 0));
+        Some(FrameFacts {
+            first,
+            last,
+            restarts: self.frames.gaps().count().saturating_sub(lost_between),
+            lost: self.lost,
+            first_lost: self.first_lost,
+            repeated: self.frames.repeated(),
+            start: self.start,
+            solve_time: self.solve_times.into_facts(),
+        })
+    }
+}
+
+impl Grade {
+    pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
+        let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
+        match profile {
+            _ if !frames.start => numeric("no record of how the flight computer was let go"),
+            None => numeric("no attachment profile.toml to build the flight computer from"),
+            Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
+            Some(ProfileFacts { name, .. }) => {
+                Self::of_replayable_frames(frames, name.as_deref().unwrap_or_default())
+            }
+        }
+    }
+
+    /// Of frames with all that it takes to run them again, up to the first that are lost.
+    fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
+        let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
+        let level = GradeLevel::BitExact;
+        let reason = match first_lost {
+            Some(Gap { after: 0, before }) => {
+                let reason =
+                    format!("frames, but they begin with frame {before}, and those before it are lost");
+                return Self { level: GradeLevel::Numeric, reason };
+            }
+            Some(Gap { after, before }) => {
+                let more = if *lost > 1 { format!(", the first of {lost} gaps") } else { String::new() };
+                format!(
+                    "up to frame {after} of {last}: those up to frame {before} are lost{more}, and nothing behind them can be run again; mission {mission}"
+                )
+            }
+            None if *repeated > 0 => format!(
+                "frames {first} to {last} of the flight computer up to the first that is there twice; mission {mission}"
+            ),
+            None => {
+                let restarted = match restarts {
+                    0 => String::new(),
+                    1 => ", restarted once".to_owned(),
+                    times => format!(", restarted {times} times"),
+                };
+                format!(
+                    "frames {first} to {last} of the flight computer{restarted}, its start and its mission {mission}"
+                )
+            }
+        };
+        Self { level, reason }
+    }
+}

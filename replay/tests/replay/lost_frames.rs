@@ -1,0 +1,107 @@
+//! Frames that a damaged log has lost: no restart of the flight computer, for any question.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use replay::evaluate::evaluate;
+use replay::info::{GradeLevel, info};
+use replay::log::Recording;
+use replay::recover::recover;
+use replay::refly::{ReflyOptions, refly};
+use replay::report::report;
+use replay::tick::{TickError, tick};
+use replay::verify::{Obstacle, Outcome, verify};
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
+
+/// The landed flight's log, with a bit turned in a chunk in its middle, recovered.
+static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
+    let (damaged, recovered) = (LANDED.beside("damaged.mcap"), LANDED.beside("recovered.mcap"));
+    let mut bytes = std::fs::read(&LANDED.log).unwrap();
+    let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let chunk = &chunks[chunks.len() / 2];
+    let within = usize::try_from(chunk.chunk_start_offset + chunk.chunk_length / 2).unwrap();
+    bytes[within] ^= 1;
+    std::fs::write(&damaged, bytes).unwrap();
+    recover(&damaged, &recovered).unwrap();
+    recovered
+});
+
+/// The last frame before the loss, the first behind it, and the last of all.
+fn around_the_loss(recording: &Recording) -> (u64, u64, u64) {
+    let gap = recording.gap().unwrap();
+    let last = recording.frames.last().unwrap().input.frame;
+    assert!(1 < gap.after && gap.missing() > 0 && gap.before < last, "{gap:?}, {last}");
+    (gap.after, gap.before, last)
+}
+
+#[test]
+fn verify_ends_at_the_loss() {
+    let recording = Recording::open(&RECOVERED).unwrap();
+    let (after, before, _) = around_the_loss(&recording);
+    let report = verify(&RECOVERED).unwrap();
+    assert_eq!(report.outcome, Outcome::NotReplayable, "{report:?}");
+    assert_eq!(report.obstacle, Some(Obstacle::Gap { after, before }));
+    assert_eq!((report.first_divergence, report.ticks_identical), (None, after));
+}
+
+#[test]
+fn what_is_evaluated_ends_at_the_loss_and_that_is_said() {
+    let recording = Recording::open(&RECOVERED).unwrap();
+    let (after, before, _) = around_the_loss(&recording);
+    let evaluated = evaluate(&recording, &[]).unwrap();
+    assert_eq!(evaluated.ticks.last().unwrap().tick, after);
+    assert!(evaluated.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
+    let (code, _, stderr) = run(&mut replay("evaluate", &RECOVERED));
+    let warning = format!("after tick {after} comes tick {before}; nothing behind the gap was run again");
+    assert!(code == 0 && stderr.contains(&warning), "{stderr}");
+}
+
+#[test]
+fn a_tick_behind_the_loss_is_refused() {
+    let recording = Recording::open(&RECOVERED).unwrap();
+    let (after, before, _) = around_the_loss(&recording);
+    assert!(tick(&recording, after).unwrap().identical);
+    let refusal = tick(&recording, before).unwrap_err();
+    assert!(matches!(refusal, TickError::NoTick { last, .. } if last == after), "{refusal}");
+}
+
+#[test]
+fn the_grade_says_how_far_it_goes() {
+    let (after, before, last) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
+    let grade = info(&RECOVERED).unwrap().grade;
+    assert_eq!(grade.level, GradeLevel::BitExact);
+    let reason = format!("up to frame {after} of {last}: those up to frame {before} are lost");
+    assert!(grade.reason.starts_with(&reason), "{}", grade.reason);
+    let whole = info(&LANDED.log).unwrap();
+    let frames = whole.frames.unwrap();
+    assert_eq!((frames.restarts, frames.lost, frames.first_lost), (0, 0, None));
+}
+
+/// The flight is flown again from what it was drawn from; frames on both sides of the loss are held against it.
+#[test]
+fn a_flight_is_flown_again_over_the_loss() {
+    let recording = Recording::open(&RECOVERED).unwrap();
+    let flown = refly(&recording, &ReflyOptions::default()).unwrap();
+    let reached = flown.reached.unwrap();
+    assert_eq!((reached.identical, reached.first_different), (reached.frames, None));
+    assert_eq!(reached.frames + flown.commands_identical, recording.frames.len());
+}
+
+#[test]
+fn the_report_says_how_far_it_goes() {
+    let (after, ..) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
+    let page = report(&RECOVERED).unwrap();
+    assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");
+}
+
+/// Where the very first frames are lost, nothing can be run again.
+#[test]
+fn without_its_first_frames_nothing_is_run_again() {
+    let mut recording = Recording::open(&LANDED.log).unwrap();
+    recording.frames.drain(..100);
+    recording.frames_unbroken = 0;
+    let refusal = evaluate(&recording, &[]).unwrap_err().to_string();
+    assert!(refusal.contains("begins with frame 101"), "{refusal}");
+}

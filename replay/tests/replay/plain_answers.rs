@@ -1,0 +1,89 @@
+//! Answers that could be taken for more than they are: of two kinds of flight, of telemetry alone, of a cut log.
+
+use std::path::PathBuf;
+
+use replay::import::import_tlog;
+use replay::log::{FlightLog, Recording};
+use replay::refly::{ReflyOptions, refly};
+
+use crate::asked::with_plant;
+use crate::command_line::{replay, run};
+use crate::foreign::foreign_mcap;
+use crate::from_apogee::LANDED;
+use crate::simulated::{NOMINAL, WITH_FRAMES};
+
+#[test]
+fn a_planar_landing_has_no_wind_and_says_so() {
+    let recording = NOMINAL.recording();
+    for given in ["truth.wind_m_s=4", "plant.wind_m_s=4", "wind=4"] {
+        let refusal = refly(&recording, &with_plant(&[given])).unwrap_err().to_string();
+        assert!(refusal.starts_with(given), "{refusal}");
+        assert!(refusal.contains("of a flight from apogee") && refusal.contains("still air"), "{refusal}");
+    }
+}
+
+/// A planar landing and a flight from apogee have not one signal in common: that is no agreement.
+#[test]
+fn flights_with_nothing_in_common_are_not_within_tolerance() {
+    let (code, stdout, _) = run(replay("compare", &NOMINAL.log).arg(&LANDED.log));
+    assert_eq!(code, 1, "{stdout}");
+    assert!(stdout.contains("- the logs have no signal in common: nothing was compared"), "{stdout}");
+    // The verdicts stand side by side all the same, each with its own limits.
+    for name in ["| pitch error | ", "| vertical speed | - | "] {
+        assert!(stdout.contains(name), "{name} is not in\n{stdout}");
+    }
+}
+
+/// What is no flight log leaves nothing behind.
+#[test]
+fn a_foreign_file_exports_to_no_folder() {
+    let (foreign, tables) = (NOMINAL.beside("foreign.mcap"), NOMINAL.beside("no-tables"));
+    std::fs::write(&foreign, foreign_mcap("/pose")).unwrap();
+    let (code, _, stderr) = run(replay("export", &foreign).args(["--to", "csv", "--output"]).arg(&tables));
+    assert!(code == 2 && stderr.contains("none of /controller/tick, /pilot/tick"), "{stderr}");
+    assert!(!tables.exists());
+}
+
+fn telemetry_only() -> PathBuf {
+    let (tlog, log) = (WITH_FRAMES.beside("only.tlog"), WITH_FRAMES.beside("only.mcap"));
+    replay::export::export_tlog(&|| FlightLog::open(&WITH_FRAMES.log), None, &tlog).unwrap();
+    import_tlog(&tlog, &log).unwrap();
+    log
+}
+
+#[test]
+fn telemetry_alone_is_refused_for_want_of_ticks() {
+    let log = telemetry_only();
+    let mut tick = replay("tick", &log);
+    tick.arg("3");
+    let mut sweep = replay("sweep", &log);
+    sweep.args(["--vary", "nmpc.weights.w=1,2"]);
+    let mut bisect = replay("bisect", &log);
+    bisect.args(["nmpc.weights.w", "--lowest", "1", "--highest", "2"]);
+    for mut command in [replay("evaluate", &log), replay("refly", &log), tick, sweep, bisect] {
+        let (code, stdout, stderr) = run(&mut command);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
+        assert!(stderr.contains("has no controller ticks"), "{stderr}");
+    }
+}
+
+/// Of a log that ends early only what it holds can be the same.
+#[test]
+fn a_cut_log_is_held_against_what_it_holds() {
+    let mut recording = Recording::open(&LANDED.log).unwrap();
+    let whole = refly(&recording, &ReflyOptions::default()).unwrap();
+    assert_eq!((whole.commands_recorded, whole.commands_identical), (whole.ticks, whole.ticks));
+    recording.frames.truncate(recording.frames.len() - 700);
+    let cut = refly(&recording, &ReflyOptions::default()).unwrap();
+    assert_eq!((cut.commands_recorded, cut.commands_identical), (whole.ticks - 700, whole.ticks - 700));
+    assert_eq!(cut.ticks, whole.ticks);
+}
+
+#[test]
+fn a_tick_that_solves_nothing_names_one_that_does() {
+    let (code, stdout, _) = run(replay("tick", &NOMINAL.log).arg("0"));
+    assert!(
+        code == 0 && stdout.contains("this tick solves no landing; the nearest that does is "),
+        "{stdout}"
+    );
+}

@@ -1,0 +1,61 @@
+//! How long the flight computer of a flown rocket took: measured beside it, and no part of what is compared.
+
+use replay::info::info;
+use replay::log::Recording;
+use replay::report::report;
+use replay::verify::{Outcome, verify};
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
+use crate::simulated::MK2;
+
+#[test]
+fn a_flown_rockets_solve_times_are_those_of_its_log() {
+    let recording = MK2.recording();
+    let mut times_s: Vec<f64> = recording.timings.iter().map(|timing| timing.solve_time_s).collect();
+    assert!(times_s.len() > 50 && times_s.iter().all(|time_s| *time_s > 0.0), "{times_s:?}");
+    // Each belongs to a recorded frame that plans.
+    for timing in &recording.timings {
+        let place = recording.frames.binary_search_by_key(&timing.frame, |tick| tick.input.frame).unwrap();
+        let input = &recording.frames[place].input;
+        assert_eq!(input.time_s.to_bits(), timing.time_s.to_bits());
+        assert!(timing.frame.is_multiple_of(10) && timing.deadline_s.to_bits() == 0.005_f64.to_bits());
+    }
+    let found = info(&MK2.log).unwrap().frames.unwrap().solve_time.unwrap();
+    times_s.sort_by(f64::total_cmp);
+    let rank = |percent: usize| times_s[(percent * times_s.len()).div_ceil(100) - 1];
+    for (found_s, percent) in [(found.median_s, 50), (found.p99_s, 99), (found.max_s, 100)] {
+        assert_eq!(found_s.to_bits(), rank(percent).to_bits(), "{percent} %");
+    }
+    let late = times_s.iter().filter(|time_s| **time_s > 0.005).count();
+    assert_eq!((found.count, found.over_deadline), (times_s.len() as u64, late as u64));
+}
+
+#[test]
+fn they_are_no_part_of_what_is_verified() {
+    let report = verify(&MK2.log).unwrap();
+    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+    assert_eq!(report.ticks_compared as usize, MK2.recording().frames.len());
+}
+
+#[test]
+fn they_are_said_where_they_were_measured_and_nowhere_else() {
+    let (code, stdout, _) = run(&mut replay("info", &MK2.log));
+    let count = MK2.recording().timings.len();
+    assert!(code == 0 && stdout.contains("deadline 5 ms"), "{stdout}");
+    assert!(stdout.contains(&format!("of {count} frames that planned")), "{stdout}");
+    let page = report(&MK2.log).unwrap();
+    for part in [
+        "solve time, 99 of 100 within",
+        "frames over their deadline",
+        "Time that each frame with a plan took",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("without a clock"));
+
+    let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
+    assert!(stdout.contains("solve time  not recorded: simulated without a clock"), "{stdout}");
+    assert!(report(&LANDED.log).unwrap().contains("without a clock"));
+    assert_eq!(Recording::open(&LANDED.log).unwrap().timings, []);
+}
