@@ -1,7 +1,8 @@
-//! What the end-to-end tests share: the built programs, running processes, serial lines, a bare ground station.
+//! What the end-to-end tests share: the built programs, running processes, terminals, serial lines, bad air, a bare ground station.
 //!
 //! Waiting is always for something that happens, with a limit; nothing here sleeps and hopes.
 
+mod air;
 mod bare_ground;
 mod clients;
 mod log_file;
@@ -9,7 +10,9 @@ mod process;
 mod programs;
 mod serial_line;
 mod terminal;
+mod window;
 
+pub use air::{Air, Weather};
 pub use bare_ground::{BareGround, command_frame};
 pub use clients::{Clients, install};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
@@ -18,6 +21,7 @@ pub use process::{Ended, Running};
 pub use programs::{Program, program};
 pub use serial_line::SerialLine;
 pub use terminal::Terminal;
+pub use window::Window;
 
 use std::time::Duration;
 

@@ -1,16 +1,20 @@
-//! A program on a real terminal: a pseudo-terminal whose far end types, reads and answers like a terminal's window.
+//! A program on a real terminal: a pseudo-terminal whose far end types, shows and answers like a terminal's window.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::pty::{Winsize, openpty};
+use nix::sys::signal::{Signal, kill};
+use nix::sys::termios::{Termios, tcgetattr};
+use nix::unistd::Pid;
 
-use crate::process::processor_time_of;
+use crate::PATIENCE;
+use crate::process::{left, now, processor_time_of};
+use crate::window::Window;
 
 /// Asks whether the terminal tells a held key's repeats from presses (kitty's keyboard protocol).
 const QUESTION: &[u8] = b"\x1b[?u";
@@ -23,12 +27,27 @@ const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 pub struct Terminal {
     child: Child,
     keyboard: File,
-    written: Arc<AtomicU64>,
+    window: Arc<Shown>,
+    /// The terminal's modes before the program had it.
+    modes: Termios,
+}
+
+/// The window, and the news that it has changed.
+struct Shown {
+    window: Mutex<Window>,
+    changed: Condvar,
+}
+
+impl Shown {
+    /// A test that has failed while it looked has failed already.
+    fn look(&self) -> MutexGuard<'_, Window> {
+        self.window.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Terminal {
-    /// Starts a program on a terminal of this size, which tells key repeats from presses or does not. `setsid`
-    /// (util-linux) makes it the program's controlling terminal.
+    /// Starts a program on a terminal of this size (columns, rows), which tells key repeats from presses or does not.
+    /// `setsid` (util-linux) makes it the program's controlling terminal.
     ///
     /// # Panics
     /// The system has no pseudo-terminals, or the program cannot be started.
@@ -36,29 +55,38 @@ impl Terminal {
         let size = Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
         let pair = openpty(Some(&size), None).expect("a pseudo-terminal");
         fcntl(&pair.master, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC)).expect("a descriptor");
+        let modes = tcgetattr(&pair.slave).expect("a terminal's modes");
         let end = || Stdio::from(pair.slave.try_clone().expect("a descriptor"));
         let mut on_terminal = Command::new("setsid");
         on_terminal.arg("--ctty").arg(command.get_program()).args(command.get_args());
         if let Some(folder) = command.get_current_dir() {
             on_terminal.current_dir(folder);
         }
-        let environment = command.get_envs().filter_map(|(name, value)| Some((name, value?)));
+        on_terminal.env("TERM", "xterm-256color").env("LANG", "C.UTF-8");
+        for name in ["NO_COLOR", "LC_ALL", "LC_CTYPE"] {
+            on_terminal.env_remove(name);
+        }
+        for (name, value) in command.get_envs() {
+            match value {
+                Some(value) => on_terminal.env(name, value),
+                None => on_terminal.env_remove(name),
+            };
+        }
         let child = on_terminal
-            .env("TERM", "xterm-256color")
-            .envs(environment)
             .stdin(end())
             .stdout(end())
             .stderr(end())
             .spawn()
             .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-        let written = Arc::new(AtomicU64::new(0));
+        let window =
+            Arc::new(Shown { window: Mutex::new(Window::new((columns, rows))), changed: Condvar::new() });
         let keyboard = File::from(pair.master);
-        let (window, count) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&written));
+        let (pipe, shown) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&window));
         std::thread::Builder::new()
             .name("terminal window".to_owned())
-            .spawn(move || read_window(window, &count, tells_repeats))
+            .spawn(move || fill_window(pipe, &shown, tells_repeats))
             .expect("a thread");
-        Self { child, keyboard, written }
+        Self { child, keyboard, window, modes }
     }
 
     /// Types these bytes.
@@ -69,9 +97,89 @@ impl Terminal {
         self.keyboard.write_all(bytes).expect("a terminal that takes keys");
     }
 
+    /// What its window shows now. The program's output waits while the answer is held.
+    pub fn look(&self) -> impl std::ops::Deref<Target = Window> + '_ {
+        self.window.look()
+    }
+
+    /// Waits until the window shows what is wanted; returns what `wanted` found.
+    ///
+    /// # Panics
+    /// It never does.
+    pub fn wait_until<T>(&self, what: &str, wanted: impl FnMut(&Window) -> Option<T>) -> T {
+        self.wait_within(PATIENCE, wanted).unwrap_or_else(|| {
+            panic!("waited in vain for {what} on:\n{}", self.look().rows().join("\n"));
+        })
+    }
+
+    /// The same for a shorter time; `None` if it does not come.
+    pub fn wait_within<T>(&self, limit: Duration, mut wanted: impl FnMut(&Window) -> Option<T>) -> Option<T> {
+        let deadline = now() + limit;
+        let mut window = self.window.look();
+        loop {
+            if let Some(found) = wanted(&window) {
+                return Some(found);
+            }
+            let wait = left(deadline);
+            if wait.is_zero() {
+                return None;
+            }
+            let waited = self.window.changed.wait_timeout(window, wait);
+            window = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Waits for these words in some row; returns the row.
+    ///
+    /// # Panics
+    /// They do not come.
+    pub fn wait_for(&self, words: &str) -> String {
+        self.wait_until(words, |window| window.row_with(words))
+    }
+
+    /// Another size (columns, rows), as when a person pulls at the window.
+    ///
+    /// # Panics
+    /// The terminal is gone.
+    pub fn resize(&self, (columns, rows): (u16, u16)) {
+        // Nothing is written between the window's new size and the program's news of it.
+        let mut window = self.window.look();
+        window.resize((columns, rows));
+        let size = rustix::termios::Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
+        rustix::termios::tcsetwinsize(&self.keyboard, size).expect("a terminal with a size");
+    }
+
+    /// Whether the terminal is as it was: its modes, its screen, its cursor, its keyboard.
+    pub fn is_restored(&self) -> bool {
+        let modes = tcgetattr(&self.keyboard).expect("a terminal's modes");
+        let window = self.look();
+        let count = |what: &[u8]| window.bytes().windows(what.len()).filter(|bytes| *bytes == what).count();
+        // Key flags pushed and popped (kitty's keyboard protocol).
+        modes == self.modes && !window.is_taken() && count(b"\x1b[>") == count(b"\x1b[<1u")
+    }
+
+    /// Sends the program a signal.
+    ///
+    /// # Panics
+    /// It cannot be sent.
+    pub fn signal(&self, signal: Signal) {
+        let pid = i32::try_from(self.child.id()).expect("a process id");
+        kill(Pid::from_raw(pid), signal).expect("the process runs");
+    }
+
+    /// Waits for the program's end; returns its exit code, `None` if a signal ended it.
+    ///
+    /// # Panics
+    /// It does not end.
+    pub fn wait_for_end(&mut self) -> Option<i32> {
+        // The terminal closes when its last program ends.
+        self.wait_until("the end of the program", |window| window.is_closed().then_some(()));
+        self.child.wait().expect("it ended").code()
+    }
+
     /// Bytes that the program has written to its terminal.
     pub fn written(&self) -> u64 {
-        self.written.load(Ordering::Relaxed)
+        self.look().bytes().len() as u64
     }
 
     /// Processor time that the program has used.
@@ -91,17 +199,20 @@ impl Drop for Terminal {
     }
 }
 
-/// Reads what the program writes, until its end; answers what a terminal answers.
-fn read_window(mut window: File, count: &AtomicU64, tells_repeats: bool) {
+/// Shows what the program writes, until its end; answers what a terminal answers.
+fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
     let mut buffer = [0; 16 * 1024];
     // The question comes in one piece with the first frame at most.
-    while let Ok(length @ 1..) = window.read(&mut buffer) {
-        count.fetch_add(length as u64, Ordering::Relaxed);
+    while let Ok(length @ 1..) = pipe.read(&mut buffer) {
+        shown.look().take(&buffer[..length]);
+        shown.changed.notify_all();
         if buffer[..length].windows(QUESTION.len()).any(|bytes| bytes == QUESTION) {
             let known = if tells_repeats { ANSWER } else { &[] };
-            if window.write_all(&[known, DEVICE_ATTRIBUTES].concat()).is_err() {
-                return;
+            if pipe.write_all(&[known, DEVICE_ATTRIBUTES].concat()).is_err() {
+                break;
             }
         }
     }
+    shown.look().close();
+    shown.changed.notify_all();
 }
