@@ -6,11 +6,11 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use nix::fcntl::{FcntlArg, FdFlag, fcntl};
-use nix::pty::{Winsize, openpty};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::{Termios, tcgetattr};
 use nix::unistd::Pid;
+use rustix::pty::{OpenptFlags, ioctl_tiocgptpeer, openpt, unlockpt};
+use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::PATIENCE;
 use crate::process::{left, now, processor_time_of};
@@ -52,11 +52,14 @@ impl Terminal {
     /// # Panics
     /// The system has no pseudo-terminals, or the program cannot be started.
     pub fn start(command: &Command, (columns, rows): (u16, u16), tells_repeats: bool) -> Self {
-        let size = Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
-        let pair = openpty(Some(&size), None).expect("a pseudo-terminal");
-        fcntl(&pair.master, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC)).expect("a descriptor");
-        let modes = tcgetattr(&pair.slave).expect("a terminal's modes");
-        let end = || Stdio::from(pair.slave.try_clone().expect("a descriptor"));
+        // Closed in every program but this one: a copy in another test's program would hold the terminal open.
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+        let keyboard = openpt(flags).expect("a pseudo-terminal");
+        unlockpt(&keyboard).expect("a pseudo-terminal");
+        let screen = ioctl_tiocgptpeer(&keyboard, flags).expect("the program's end of it");
+        tcsetwinsize(&keyboard, window_size((columns, rows))).expect("a terminal with a size");
+        let modes = tcgetattr(&screen).expect("a terminal's modes");
+        let end = || Stdio::from(screen.try_clone().expect("a descriptor"));
         let mut on_terminal = Command::new("setsid");
         on_terminal.arg("--ctty").arg(command.get_program()).args(command.get_args());
         if let Some(folder) = command.get_current_dir() {
@@ -80,7 +83,7 @@ impl Terminal {
             .unwrap_or_else(|error| panic!("{command:?}: {error}"));
         let window =
             Arc::new(Shown { window: Mutex::new(Window::new((columns, rows))), changed: Condvar::new() });
-        let keyboard = File::from(pair.master);
+        let keyboard = File::from(keyboard);
         let (pipe, shown) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&window));
         std::thread::Builder::new()
             .name("terminal window".to_owned())
@@ -145,8 +148,7 @@ impl Terminal {
         // Nothing is written between the window's new size and the program's news of it.
         let mut window = self.window.look();
         window.resize((columns, rows));
-        let size = rustix::termios::Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
-        rustix::termios::tcsetwinsize(&self.keyboard, size).expect("a terminal with a size");
+        tcsetwinsize(&self.keyboard, window_size((columns, rows))).expect("a terminal with a size");
     }
 
     /// Whether the terminal is as it was: its modes, its screen, its cursor, its keyboard.
@@ -197,6 +199,10 @@ impl Drop for Terminal {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+fn window_size((columns, rows): (u16, u16)) -> Winsize {
+    Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }
 }
 
 /// Shows what the program writes, until its end; answers what a terminal answers.

@@ -6,8 +6,15 @@ use std::num::NonZeroU16;
 pub struct Window {
     parser: vt100::Parser<Asked>,
     bytes: Vec<u8>,
+    /// So many of the bytes have become cells.
+    shown: usize,
     closed: bool,
 }
+
+/// U+FFFD, for what is no character. The parser drops it; every terminal shows it in a cell of its own.
+const NO_CHARACTER: &[u8] = "\u{fffd}".as_bytes();
+/// Shown in its place.
+const SHOWN_FOR_IT: &[u8] = b"?";
 
 /// What a program can ask of a terminal besides cells.
 #[derive(Debug, Default)]
@@ -48,12 +55,22 @@ impl Window {
     pub(crate) fn new((columns, rows): (u16, u16)) -> Self {
         let (rows, columns) = cells((columns, rows));
         let parser = vt100::Parser::new_with_callbacks(rows, columns, 0, Asked::default());
-        Self { parser, bytes: Vec::new(), closed: false }
+        Self { parser, bytes: Vec::new(), shown: 0, closed: false }
     }
 
     pub(crate) fn take(&mut self, bytes: &[u8]) {
-        self.parser.process(bytes);
         self.bytes.extend_from_slice(bytes);
+        let mut rest = &self.bytes[self.shown..];
+        while let Some(at) = rest.windows(NO_CHARACTER.len()).position(|found| found == NO_CHARACTER) {
+            self.parser.process(&rest[..at]);
+            self.parser.process(SHOWN_FOR_IT);
+            rest = &rest[at + NO_CHARACTER.len()..];
+        }
+        // Its last bytes may be yet to come.
+        let begun = (1..NO_CHARACTER.len()).rev().find(|length| rest.ends_with(&NO_CHARACTER[..*length]));
+        let (now, later) = rest.split_at(rest.len() - begun.unwrap_or(0));
+        self.parser.process(now);
+        self.shown = self.bytes.len() - later.len();
     }
 
     pub(crate) fn resize(&mut self, size: (u16, u16)) {

@@ -38,7 +38,10 @@ const IDLE_FRAME: Duration = Duration::from_secs(1);
 /// Why a screen ends without a signal.
 pub const GONE: &str = "the terminal is gone";
 
-/// What was pushed must be popped, by whichever way the screen ends.
+/// Given back once, by whichever way the screen ends: leaving the alternate screen a second time puts the cursor back to
+/// where it was, and whatever is printed next over a panic's message.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+/// What was pushed must be popped.
 static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
@@ -51,6 +54,8 @@ pub struct Screen {
     bell: bool,
     wait: Duration,
     drawn_at: Option<Duration>,
+    /// The next frame is written whole.
+    whole: bool,
     input_ended: bool,
 }
 
@@ -69,6 +74,7 @@ impl Screen {
             bell: config.bell.unwrap_or(true),
             wait: Duration::ZERO,
             drawn_at: None,
+            whole: false,
             input_ended: false,
         })
     }
@@ -118,6 +124,12 @@ impl Screen {
         if now < self.redraw_at() {
             return Ok(());
         }
+        if std::mem::take(&mut self.whole) {
+            // Not `Terminal::clear`: it asks the terminal where its cursor is and waits two seconds, link and all, for
+            // an answer that our own reader of keys takes away.
+            let size = self.terminal.size()?;
+            self.terminal.resize(size.into())?;
+        }
         self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
         self.wait = IDLE_FRAME;
         self.drawn_at = Some(now);
@@ -126,8 +138,7 @@ impl Screen {
 
     /// Forgets what the terminal shows, so that the next frame is written whole.
     pub fn clear(&mut self) {
-        // If the terminal cannot be cleared, drawing fails next and says why.
-        let _ = self.terminal.clear();
+        self.whole = true;
         self.mark_changed();
     }
 
@@ -158,7 +169,8 @@ impl Screen {
                         return Msg::Key(key);
                     }
                 }
-                Some(Ok(Event::Resize(..))) => self.mark_changed(),
+                // Also when it is back at its old size before anything was drawn: the terminal has cut what it showed.
+                Some(Ok(Event::Resize(..))) => self.clear(),
                 Some(Ok(_)) => {}
                 Some(Err(_)) | None => {
                     self.input_ended = true;
@@ -192,6 +204,7 @@ fn theme(config: &Config) -> Theme {
 }
 
 fn take_terminal() -> io::Result<DefaultTerminal> {
+    TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     execute!(io::stdout(), EnterAlternateScreen)?;
     tell_repeats()?;
@@ -214,6 +227,9 @@ fn tell_repeats() -> io::Result<()> {
 /// Gives the terminal back. It may be gone (a dropped session): then there is nothing to restore, and
 /// nobody to tell; printing about it would panic and cost the log its end.
 fn restore() {
+    if !TAKEN.swap(false, Ordering::Relaxed) {
+        return;
+    }
     let _ = disable_raw_mode();
     let mut out = io::stdout();
     // Before the alternate screen is left: each screen has its own.
