@@ -4,11 +4,13 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::transport::Endpoint;
 
 use crate::attach::place;
+use crate::config::{Characters, Colour};
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::words;
@@ -85,6 +87,22 @@ pub struct Cli {
     /// Socket between a station and its screens; by default this user's own.
     #[arg(long, value_name = "PATH", global = true)]
     pub socket: Option<PathBuf>,
+
+    /// Ring the terminal's bell on an alarm. Default: true.
+    #[arg(long, value_name = "true|false", global = true)]
+    pub bell: Option<bool>,
+
+    /// Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub alarm_command: Option<String>,
+
+    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub characters: Option<Characters>,
+
+    /// Whether to use colours. Default: auto, by NO_COLOR and TERM.
+    #[arg(long, value_name = "WHEN", visible_alias = "color", global = true)]
+    pub colour: Option<Colour>,
 
     /// Arm and start without a hand. The demonstration without a screen always does.
     #[arg(long, global = true)]

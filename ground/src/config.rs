@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use protocol::transport::Endpoint;
 use serde::Deserialize;
 
@@ -29,7 +30,7 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Ring the terminal's bell on an alarm.
 #bell = true
 
-# Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM. Default: nothing.
+# Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM; or "none", the default.
 #alarm_command = "notify-send \"$TOUCHDOWN_ALARM\""
 
 # Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
@@ -54,20 +55,20 @@ pub struct Config {
     pub tlog: Option<String>,
     /// As `--socket`.
     pub socket: Option<PathBuf>,
-    /// Ring the terminal's bell.
+    /// As `--bell`.
     pub bell: Option<bool>,
-    /// Run when an alarm is raised.
+    /// As `--alarm-command`.
     pub alarm_command: Option<String>,
-    /// What the terminal can show.
+    /// As `--characters`.
     #[serde(default)]
     pub characters: Characters,
-    /// Whether colours may be used.
+    /// As `--colour`.
     #[serde(default)]
     pub colour: Colour,
 }
 
 /// What the terminal can show.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Characters {
     /// By the environment.
@@ -80,7 +81,7 @@ pub enum Characters {
 }
 
 /// Whether colours may be used.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Colour {
     /// By the environment.
@@ -144,7 +145,7 @@ impl Config {
             }
         }
         if config.alarm_command.as_ref().is_some_and(|command| command.trim().is_empty()) {
-            return Err("alarm_command: is empty; leave the key out for none".to_owned());
+            return Err("alarm_command: is empty; give a command or \"none\"".to_owned());
         }
         Ok(config)
     }
@@ -171,6 +172,18 @@ impl Config {
             cli.socket.clone_from(&self.socket);
         }
     }
+
+    /// What the command line says about the screen and its alarms stands above the file.
+    pub fn overridden_by(self, cli: &Cli) -> Self {
+        let alarm_command = cli.alarm_command.clone().or(self.alarm_command);
+        Self {
+            bell: cli.bell.or(self.bell),
+            alarm_command: alarm_command.filter(|command| command != "none"),
+            characters: cli.characters.unwrap_or(self.characters),
+            colour: cli.colour.unwrap_or(self.colour),
+            ..self
+        }
+    }
 }
 
 /// Where settings usually are.
@@ -185,47 +198,4 @@ pub fn usual_path() -> Option<PathBuf> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::Parser as _;
-
-    /// Every key of the example, uncommented, is understood; the example names every key.
-    #[test]
-    fn the_example_holds_every_key() {
-        let keys =
-            EXAMPLE.lines().filter_map(|line| line.strip_prefix('#')).filter(|line| !line.starts_with(' '));
-        let uncommented = keys.collect::<Vec<_>>().join("\n");
-        let config = Config::parse(&uncommented).unwrap();
-        assert!(
-            !config.connect.is_empty()
-                && config.key.is_some()
-                && config.log.is_some()
-                && config.tlog.is_some()
-        );
-        assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-        assert_eq!(uncommented.lines().count(), 9, "one line a key: {uncommented}");
-        assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
-    }
-
-    #[test]
-    fn what_is_wrong_is_named() {
-        let wrong = |text: &str| Config::parse(text).unwrap_err();
-        assert!(wrong("belll = true").contains("belll"));
-        assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
-        assert!(wrong("colour = \"blue\"").contains("always"));
-        assert!(wrong("log = \"\"").contains("log: "));
-        assert!(wrong("alarm_command = \" \"").contains("empty"));
-    }
-
-    #[test]
-    fn a_flag_overrides_its_key() {
-        let config = Config::parse("connect = [\"udpin:0.0.0.0:14550\"]\nlog = \"a.mcap\"").unwrap();
-        let mut cli = Cli::try_parse_from(["ground", "--log", "b.mcap"]).unwrap();
-        config.fill(&mut cli);
-        assert_eq!(cli.log, Some(LogChoice::File("b.mcap".into())));
-        assert_eq!(cli.connect, [Endpoint::UdpIn("0.0.0.0:14550".to_owned())]);
-        let mut cli = Cli::try_parse_from(["ground", "--demo"]).unwrap();
-        config.fill(&mut cli);
-        assert_eq!(cli.connect, []);
-    }
-}
+mod tests;

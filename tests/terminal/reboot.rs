@@ -1,8 +1,8 @@
 //! A vehicle that loses its power in flight.
 
-use e2e::Signal;
+use e2e::{Program, Running, Signal, Terminal, free_port, program};
 
-use crate::stage::{ARM, START, Stage};
+use crate::stage::{ARM, SIZE, START, Stage, ground};
 
 #[test]
 fn a_vehicle_that_reboots_in_its_descent_is_said_to_and_nothing_is_armed_by_itself() {
@@ -30,4 +30,45 @@ fn a_vehicle_that_reboots_in_its_descent_is_said_to_and_nothing_is_armed_by_itse
     stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     stage.terminal.signal(Signal::SIGTERM);
     assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
+}
+
+/// The vehicle listens; it is killed as it falls and started again on the very port.
+#[test]
+fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_new_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = free_port();
+    let vehicle = || {
+        let mut command = program(Program::OnboardSim);
+        command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:127.0.0.1:{port}")]);
+        Running::start(&mut command)
+    };
+    let link = format!("udpout:127.0.0.1:{port}");
+    let mut station =
+        Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
+    let fly = |station: &mut Terminal, flying: &mut Running| {
+        station.wait_for("GO: every arming check passes");
+        station.type_bytes(b"AARM\r");
+        flying.wait_for_line("PAD_ARMED");
+        station.wait_for("[x] armed, says HEARTBEAT");
+        station.type_bytes(b"S\r");
+        flying.wait_for_line("AERO_DESCENT");
+        station.wait_for("AERO_DESCENT");
+    };
+    let mut first = vehicle();
+    fly(&mut station, &mut first);
+    first.signal(Signal::SIGKILL);
+    first.wait();
+    station.wait_for("LINK LOST");
+    let mut second = vehicle();
+    station.wait_for("the vehicle has REBOOTED");
+    station.wait_until("a disarmed pad", |window| {
+        let top = window.rows().swap_remove(0);
+        (top.starts_with(" PAD_IDLE ") && top.contains(" disarmed ")).then_some(())
+    });
+    fly(&mut station, &mut second);
+    second.signal(Signal::SIGTERM);
+    let ended = second.wait();
+    // It was armed and started by the second ladder alone.
+    assert_eq!(ended.output.matches("to PAD_ARMED").count(), 1, "{}", ended.output);
+    assert_eq!(ended.output.matches("countdown started").count(), 1, "{}", ended.output);
 }

@@ -51,7 +51,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         Some(Command::Man) => return print::manual(),
         _ => {}
     }
-    let config = Config::load(cli.config.as_deref())?;
+    let config = Config::load(cli.config.as_deref())?.overridden_by(cli);
     // Who names a link means that link, not the station that may run already.
     let may_attach = cli.connect.is_empty() && !cli.demo;
     let mut cli = cli.clone();

@@ -1,0 +1,102 @@
+//! The settings file, its example and the flags.
+
+use super::*;
+use clap::{CommandFactory as _, Parser as _};
+
+/// Every key of the example, uncommented, is understood; the example names every key.
+#[test]
+fn the_example_holds_every_key() {
+    let keys =
+        EXAMPLE.lines().filter_map(|line| line.strip_prefix('#')).filter(|line| !line.starts_with(' '));
+    let uncommented = keys.collect::<Vec<_>>().join("\n");
+    let config = Config::parse(&uncommented).unwrap();
+    assert!(
+        !config.connect.is_empty() && config.key.is_some() && config.log.is_some() && config.tlog.is_some()
+    );
+    assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
+    assert_eq!(uncommented.lines().count(), 9, "one line a key: {uncommented}");
+    assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let wrong = |text: &str| Config::parse(text).unwrap_err();
+    assert!(wrong("belll = true").contains("belll"));
+    assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
+    assert!(wrong("colour = \"blue\"").contains("always"));
+    assert!(wrong("log = \"\"").contains("log: "));
+    assert!(wrong("alarm_command = \" \"").contains("empty"));
+}
+
+/// Key, its text in a file, its flags, and whether settings and command line together then say what the flag says.
+type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
+
+const OVERRIDES: [Override; 9] = [
+    ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
+        cli.connect == [Endpoint::UdpIn("0.0.0.0:2".to_owned())]
+    }),
+    ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |cli, _| cli.key == Some("b".into())),
+    ("log", "\"a.mcap\"", &["--log", "b.mcap"], |cli, _| cli.log == Some(LogChoice::File("b.mcap".into()))),
+    ("tlog", "\"a.tlog\"", &["--tlog", "none"], |cli, _| cli.tlog == Some(LogChoice::None)),
+    ("socket", "\"/a\"", &["--socket", "/b"], |cli, _| cli.socket == Some("/b".into())),
+    ("bell", "true", &["--bell", "false"], |_, config| config.bell == Some(false)),
+    ("alarm_command", "\"a\"", &["--alarm-command", "b"], |_, config| {
+        config.alarm_command.as_deref() == Some("b")
+    }),
+    ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
+        config.characters == Characters::Ascii
+    }),
+    ("colour", "\"always\"", &["--colour", "never"], |_, config| config.colour == Colour::Never),
+];
+
+/// The settings and the command line, as a run takes them.
+fn together(file: &str, flags: &[&str]) -> (Cli, Config) {
+    let config = Config::parse(file).unwrap();
+    let mut cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
+    config.fill(&mut cli);
+    let config = config.overridden_by(&cli);
+    (cli, config)
+}
+
+#[test]
+fn every_key_has_a_flag_that_overrides_it() {
+    let keys: Vec<&str> = EXAMPLE
+        .lines()
+        .filter_map(|line| line.strip_prefix('#')?.split_once(" = "))
+        .map(|(key, _)| key)
+        .filter(|key| !key.contains(' '))
+        .collect();
+    assert_eq!(OVERRIDES.map(|(key, ..)| key).as_slice(), keys);
+    for (key, in_file, flags, holds) in OVERRIDES {
+        let file = format!("{key} = {in_file}");
+        assert!(flags.contains(&format!("--{}", key.replace('_', "-")).as_str()), "{key}: its own name");
+        let (cli, config) = together(&file, flags);
+        assert!(holds(&cli, &config), "{key}: the flag counts");
+        let (cli, config) = together(&file, &[]);
+        assert!(!holds(&cli, &config), "{key}: without the flag the file counts");
+    }
+}
+
+#[test]
+fn completions_and_manual_page_have_the_flag_of_every_key() {
+    let (mut script, mut page) = (Vec::new(), Vec::new());
+    clap_complete::generate(clap_complete::Shell::Bash, &mut Cli::command(), "ground", &mut script);
+    clap_mangen::Man::new(Cli::command()).render(&mut page).unwrap();
+    let (script, page) = (String::from_utf8(script).unwrap(), String::from_utf8(page).unwrap());
+    for (key, ..) in OVERRIDES {
+        let flag = format!("--{}", key.replace('_', "-"));
+        assert!(script.contains(&flag), "{flag}");
+        // A hyphen is escaped in roff.
+        assert!(page.contains(&flag.replace('-', "\\-")), "{flag}");
+    }
+}
+
+#[test]
+fn what_stands_in_the_file_is_left_alone_unless_it_is_asked_away() {
+    let (cli, _) = together("connect = [\"udpin:0.0.0.0:14550\"]", &["--demo"]);
+    assert_eq!(cli.connect, []);
+    let (_, config) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
+    assert_eq!(config.alarm_command, None);
+    let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);
+    assert!(empty.unwrap_err().to_string().contains("--alarm-command"));
+}
