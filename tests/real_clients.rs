@@ -1,6 +1,7 @@
 //! Other people's MAVLink clients against the real vehicle process: they decide what MAVLink is, not we.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
+use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
@@ -173,56 +174,67 @@ fn val_mavproxy_shows_arms_and_terminates() {
     assert_eq!(ended.code, Some(4), "{}", ended.output);
 }
 
-/// A dissector generated from our XML by pymavlink's generator reads every frame of a whole flight.
+/// A dissector generated from our XML by pymavlink's generator reads every frame of whole flights, and between the two
+/// vehicles every message of ours is among them.
 #[test]
 fn val_wireshark_finds_no_malformed_frame() {
     let Some(clients) = Clients::installed() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let flown = Running::to_end(
-        program(Program::OnboardSim)
-            .args(["fly", "--speed", "max", "--mavlink", &format!("udpout:127.0.0.1:{}", free_port())])
-            .args(["--auto-start", "--log", "flight.mcap"])
-            .current_dir(folder.path()),
-    );
-    assert_eq!(flown.code, Some(0), "{}", flown.output);
-    let frames = raw_frames_of(&folder.path().join("flight.mcap"), "tx");
-    assert!(frames.len() > 500, "{} frames", frames.len());
-    std::fs::write(folder.path().join("flight.pcap"), capture_of(&frames)).unwrap();
     // Wireshark is run by nobody when the test is run by root.
     let open = std::os::unix::fs::PermissionsExt::from_mode(0o755);
     std::fs::set_permissions(folder.path(), open).unwrap();
-
     let xml = Path::new(env!("CARGO_MANIFEST_DIR")).join("../protocol/dialect/touchdown.xml");
     let mut generator = clients.program("pymavlink", "mavgen.py");
-    generator.args(["--lang", "WLua", "--wire-protocol", "2.0", "-o", "touchdown"]).arg(xml);
+    generator.args(["--lang", "WLua", "--wire-protocol", "2.0", "-o", "touchdown"]).arg(&xml);
     let generated = Running::to_end(generator.current_dir(folder.path()));
     assert_eq!(generated.code, Some(0), "{}", generated.output);
 
+    // HEARTBEAT, SYS_STATUS, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, VFR_HUD, EXTENDED_SYS_STATE, STATUSTEXT.
+    let both = [0, 1, 31, 32, 74, 245, 253];
+    let planar = dissected(clients, folder.path(), "paper-calibrated");
+    // Besides: ESTIMATOR_STATUS, TD_DESCENT.
+    let spatial = dissected(clients, folder.path(), "mk2");
+    for (ids, more) in [(&planar, &[][..]), (&spatial, &[230, 54_008])] {
+        for id in both.iter().chain(more) {
+            assert!(ids.contains(id), "message {id} is in the flight: {ids:?}");
+        }
+    }
+    let text = std::fs::read_to_string(&xml).unwrap();
+    let ours = text.split("<message id=\"").skip(1).filter_map(|rest| rest.split('"').next()?.parse().ok());
+    let ours: BTreeSet<u32> = ours.collect();
+    let seen: BTreeSet<u32> = planar.union(&spatial).copied().collect();
+    assert!(!ours.is_empty() && ours.is_subset(&seen), "{ours:?} of ours, {seen:?} seen");
+}
+
+/// Flies this profile and has Wireshark read every frame of the vehicle; the messages' numbers.
+fn dissected(clients: Clients, folder: &Path, profile: &str) -> BTreeSet<u32> {
+    let (log, capture) = (format!("{profile}.mcap"), format!("{profile}.pcap"));
+    let flown = Running::to_end(
+        program(Program::OnboardSim)
+            .args(["fly", "--profile", profile, "--speed", "max", "--auto-start", "--log", &log])
+            .args(["--mavlink", &format!("udpout:127.0.0.1:{}", free_port())])
+            .current_dir(folder),
+    );
+    assert_eq!(flown.code, Some(0), "{}", flown.output);
+    let frames = raw_frames_of(&folder.join(&log), "tx");
+    assert!(frames.len() > 500, "{} frames", frames.len());
+    std::fs::write(folder.join(&capture), capture_of(&frames)).unwrap();
     let read = |filter: &[&str]| {
         let mut command = clients.tshark();
         command
-            .args([
-                "-r",
-                "flight.pcap",
-                "-X",
-                "lua_script:touchdown.lua",
-                "-d",
-                "udp.port==14550,mavlink_proto",
-            ])
+            .args(["-r", &capture, "-X", "lua_script:touchdown.lua", "-d", "udp.port==14550,mavlink_proto"])
             .args(filter)
-            .current_dir(folder.path());
+            .current_dir(folder);
         Running::to_end(&mut command).output
     };
-    let dissected = read(&["-Y", "mavlink_proto", "-T", "fields", "-e", "mavlink_proto.msgid"]);
-    let ids: Vec<u32> = dissected.lines().filter_map(|line| line.parse().ok()).collect();
+    let found = read(&["-Y", "mavlink_proto", "-T", "fields", "-e", "mavlink_proto.msgid"]);
+    let ids: Vec<u32> = found.lines().filter_map(|line| line.parse().ok()).collect();
     assert_eq!(ids.len(), frames.len(), "every frame is read");
-    for id in [0, 1, 30, 31, 32, 74, 245, 253].into_iter().filter(|id| *id != 30).chain(54_000..=54_007) {
-        assert!(ids.contains(&id), "message {id} is in the flight");
-    }
-    let malformed = read(&["-Y", "_ws.malformed || _ws.lua.error || _ws.expert.severity >= error"]);
+    let malformed = read(&["-V", "-Y", "_ws.malformed || _ws.lua.error || _ws.expert.severity >= error"]);
     let lines: Vec<&str> = malformed.lines().filter(|line| !line.starts_with("Running as user")).collect();
-    assert_eq!(lines, Vec::<&str>::new());
-    println!("Wireshark read {} frames, none malformed", ids.len());
+    assert!(lines.is_empty(), "{}", lines.join("\n"));
+    println!("{profile}: Wireshark read {} frames, none malformed", ids.len());
+    ids.into_iter().collect()
 }
 
 /// A libpcap file with one UDP datagram to port 14550 for each frame.
