@@ -233,7 +233,6 @@ fn dissected(clients: Clients, folder: &Path, profile: &str) -> BTreeSet<u32> {
     let malformed = read(&["-V", "-Y", "_ws.malformed || _ws.lua.error || _ws.expert.severity >= error"]);
     let lines: Vec<&str> = malformed.lines().filter(|line| !line.starts_with("Running as user")).collect();
     assert!(lines.is_empty(), "{}", lines.join("\n"));
-    println!("{profile}: Wireshark read {} frames, none malformed", ids.len());
     ids.into_iter().collect()
 }
 

@@ -174,6 +174,7 @@ impl Config {
     }
 
     /// What the command line says about the screen and its alarms stands above the file.
+    #[must_use]
     pub fn overridden_by(self, cli: &Cli) -> Self {
         let alarm_command = cli.alarm_command.clone().or(self.alarm_command);
         Self {

@@ -152,6 +152,9 @@ impl Terminal {
     }
 
     /// Whether the terminal is as it was: its modes, its screen, its cursor, its keyboard.
+    ///
+    /// # Panics
+    /// The terminal is gone.
     pub fn is_restored(&self) -> bool {
         let modes = tcgetattr(&self.keyboard).expect("a terminal's modes");
         let window = self.look();

@@ -8,4 +8,5 @@ mod endings;
 mod reboot;
 mod resize;
 mod stage;
+mod station;
 mod weather;

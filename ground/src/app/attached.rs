@@ -11,7 +11,7 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::Clock;
-use super::screen::Screen;
+use super::output::Output;
 use super::server::read_one;
 use super::signals::Signals;
 use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_asked};
@@ -30,12 +30,12 @@ const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Messages waiting to be taken into the model.
 const WAITING_MAX: usize = 4_096;
 
-/// Shows the station until the person at the screen quits; the station goes on.
+/// Shows the station until the person at the screen quits; the station goes on. Without a terminal for a screen it tells
+/// the events in lines, and commands nothing.
 ///
 /// # Errors
 /// No station runs there, or the terminal failed.
 pub async fn session(path: &Path, watch: bool, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
-    anyhow::ensure!(interactive, "a screen needs a terminal; `ground daemon` runs without one");
     let mut link = Link::open(path, watch).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
     })?;
@@ -50,15 +50,15 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
         live = told == Told::Live;
         take(&mut model, told, at, watch)?;
     }
-    let mut screen = Screen::open(config)?;
-    model.repeats_told = screen.tells_repeats();
+    let mut output = Output::open(interactive, config)?;
+    model.repeats_told = output.tells_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
     // An abort that no station took.
     let mut abort_unsent = false;
     loop {
-        let (redraw_at, chord_at) = (screen.redraw_at(), model.abort_chord.acts_at());
+        let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
         let actions = tokio::select! {
             biased;
@@ -66,8 +66,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                 model.warn(times.theirs(clock.now()), format!("{signal}: the screen ends, the station goes on"));
                 break;
             }
-            msg = screen.input() => {
-                screen.mark_changed();
+            msg = output.input() => {
+                output.mark_changed();
                 if matches!(msg, Msg::Terminate(_)) {
                     break;
                 }
@@ -76,8 +76,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
                 match &told {
-                    Some((Told::Msg(msg), _)) => screen.mark_message(msg, &model),
-                    _ => screen.mark_changed(),
+                    Some((Told::Msg(msg), _)) => output.mark_message(msg, &model),
+                    _ => output.mark_changed(),
                 }
                 if let Some((told, at)) = told {
                     times.heard(at, clock.now());
@@ -97,16 +97,19 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                         abort_unsent = !found.ask(&Asked::Command(CommandKind::Abort)).await;
                     }
                     link = found;
+                    // Another station: another clock, another history.
+                    times = Times::default();
                     let pages = model.pages;
                     model = Model::new(settings(&Hello::default(), watch));
                     model.pages = pages;
-                    model.repeats_told = screen.tells_repeats();
+                    model.repeats_told = output.tells_repeats();
+                    output.begin_anew();
                     look_again_at = None;
                 }
                 Vec::new()
             }
             _ = ticks.tick() => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
-            () = clock.sleep_until(Some(redraw_at)) => Vec::new(),
+            () = clock.sleep_until(redraw_at) => Vec::new(),
         };
         let mut quit = false;
         for action in actions {
@@ -120,19 +123,20 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                 Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
                     link.ask(&Asked::Key(action.detail)).await;
                 }
-                Action::Redraw => screen.clear(),
-                Action::Bell => screen.bell(),
+                Action::Redraw => output.clear(),
+                Action::Bell => output.bell(),
                 Action::Quit => quit = true,
                 // The station itself sends, records and tells.
                 Action::Send(_) | Action::Record(_) | Action::SyncLog | Action::Alarm(_) => {}
             }
         }
-        screen.show_at(&model, clock.now(), times.theirs(clock.now())).context("drawing on the terminal")?;
+        let now = clock.now();
+        output.show(&model, now, times.theirs(now))?;
         if quit {
             break;
         }
     }
-    drop(screen);
+    drop(output);
     Ok(exit::decide(&model.outcome, true))
 }
 
@@ -140,6 +144,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
 fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
     let text = match asked {
         Asked::Command(CommandKind::Abort) => {
+            // Stands in the alarm line of every screen till there is a station.
+            model.link.trouble = Some("ABORT NOT SENT, no station; asked again".to_owned());
             "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
         }
         Asked::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),

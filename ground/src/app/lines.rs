@@ -30,6 +30,11 @@ impl Lines {
         Self { seen: 0, closed: true }
     }
 
+    /// The next model's events are counted from its first.
+    pub fn begin_anew(&mut self) {
+        self.seen = 0;
+    }
+
     /// Prints the events that were not printed yet. A reader that has gone away ends the lines, not the flight.
     pub fn show(&mut self, model: &Model) {
         if self.closed || self.seen == model.events.total() {

@@ -30,10 +30,8 @@ use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::{Model, Role, Settings};
 use clock::{Clock, LogTime};
-use lines::Lines;
 use log::LogGuard;
 use output::Output;
-use screen::Screen;
 use server::{Server, hello};
 use station::Station;
 use wire::Wire;
@@ -133,13 +131,8 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
     });
-    let output = if interactive {
-        let screen = Screen::open(config)?;
-        model.repeats_told = screen.tells_repeats();
-        Output::Screen(screen)
-    } else {
-        Output::Lines(Lines::new())
-    };
+    let output = Output::open(interactive, config)?;
+    model.repeats_told = output.tells_repeats();
     let socket = cli.socket_path();
     let server = match is_daemon {
         true => Some(Server::open(&socket, hello(&model)).await?),

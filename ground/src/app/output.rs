@@ -6,6 +6,7 @@ use anyhow::Context as _;
 
 use super::lines::Lines;
 use super::screen::Screen;
+use crate::config::Config;
 use crate::model::Model;
 use crate::update::Msg;
 
@@ -16,6 +17,19 @@ pub(super) enum Output {
 }
 
 impl Output {
+    /// A full screen where a person sits at one, else lines.
+    ///
+    /// # Errors
+    /// The terminal refuses.
+    pub(super) fn open(interactive: bool, config: &Config) -> anyhow::Result<Self> {
+        if interactive { Screen::open(config).map(Self::Screen) } else { Ok(Self::Lines(Lines::new())) }
+    }
+
+    /// Whether the terminal tells a held key's repeats from presses.
+    pub(super) fn tells_repeats(&self) -> bool {
+        matches!(self, Self::Screen(screen) if screen.tells_repeats())
+    }
+
     pub(super) fn redraw_at(&self) -> Option<Duration> {
         match self {
             Self::Screen(screen) => Some(screen.redraw_at()),
@@ -55,9 +69,18 @@ impl Output {
         }
     }
 
-    pub(super) fn show(&mut self, model: &Model, now: Duration) -> anyhow::Result<()> {
+    /// What tells of one model tells of another from its beginning.
+    pub(super) fn begin_anew(&mut self) {
         match self {
-            Self::Screen(screen) => screen.show(model, now).context("drawing on the terminal"),
+            Self::Screen(screen) => screen.mark_changed(),
+            Self::Lines(lines) => lines.begin_anew(),
+        }
+    }
+
+    /// As it is now; `model_now` is the same moment by the model's clock.
+    pub(super) fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> anyhow::Result<()> {
+        match self {
+            Self::Screen(screen) => screen.show(model, now, model_now).context("drawing on the terminal"),
             Self::Lines(lines) => {
                 lines.show(model);
                 Ok(())

@@ -95,6 +95,6 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             }
             () = clock.sleep_until(Some(redraw_at)) => {}
         }
-        screen.show_at(&player.model, clock.now(), player.position()).context("drawing on the terminal")?;
+        screen.show(&player.model, clock.now(), player.position()).context("drawing on the terminal")?;
     }
 }

@@ -108,19 +108,11 @@ impl Screen {
         self.drawn_at.map_or(Duration::ZERO, |at| at + self.wait)
     }
 
-    /// Draws if a frame is due.
+    /// Draws if a frame is due. Ages count to `model_now`, the same moment by the model's clock.
     ///
     /// # Errors
     /// The terminal cannot be written.
-    pub fn show(&mut self, model: &Model, now: Duration) -> io::Result<()> {
-        self.show_at(model, now, now)
-    }
-
-    /// Draws if a frame is due, as it was at another time: ages count from there.
-    ///
-    /// # Errors
-    /// The terminal cannot be written.
-    pub fn show_at(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
+    pub fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
         if now < self.redraw_at() {
             return Ok(());
         }

@@ -80,7 +80,8 @@ impl Station {
                 self.output.mark_message(&msg, model);
                 quit |= self.step(model, wire, msg);
             }
-            if let Err(gone) = self.output.show(model, self.clock.now()) {
+            let now = self.clock.now();
+            if let Err(gone) = self.output.show(model, now, now) {
                 if !self.outlives_its_screen() {
                     return Err(gone);
                 }
