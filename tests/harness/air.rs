@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use protocol::command::CommandRequest;
 use protocol::frame::Framer;
 
-use crate::process::now;
+use crate::PATIENCE;
+use crate::process::{left, now};
 
 /// The number of COMMAND_ACK.
 const COMMAND_ACK_ID: u32 = 77;
@@ -45,6 +46,8 @@ struct State {
     weather: Weather,
     vehicle: Option<SocketAddr>,
     commands: Vec<CommandRequest>,
+    /// Datagrams.
+    from_ground: u64,
 }
 
 impl Air {
@@ -60,7 +63,8 @@ impl Air {
         };
         let (to_vehicle, to_ground) = (bind(), bind());
         let ground = SocketAddr::from(([127, 0, 0, 1], port));
-        let state = State { weather: Weather::default(), vehicle: None, commands: Vec::new() };
+        let state =
+            State { weather: Weather::default(), vehicle: None, commands: Vec::new(), from_ground: 0 };
         let (state, over) = (Arc::new(Mutex::new(state)), Arc::new(AtomicBool::new(false)));
         let clone = |socket: &UdpSocket| socket.try_clone().expect("a descriptor");
         let (from, to) = (clone(&to_vehicle), clone(&to_ground));
@@ -96,6 +100,19 @@ impl Air {
         self.to_ground.send_to(datagram, self.ground).expect("sent");
     }
 
+    /// Waits until the ground says something more: at least its heartbeat, from the loop that does everything.
+    ///
+    /// # Panics
+    /// It does not.
+    pub fn wait_for_ground(&self) {
+        let before = look(&self.state).from_ground;
+        let deadline = now() + PATIENCE;
+        while look(&self.state).from_ground == before {
+            assert!(!left(deadline).is_zero(), "the ground has fallen silent");
+            std::thread::sleep(LOOKS_UP_EVERY);
+        }
+    }
+
     /// Every command that the ground has sent, whatever became of it.
     pub fn commands(&self) -> Vec<CommandRequest> {
         look(&self.state).commands.clone()
@@ -121,6 +138,7 @@ fn note_vehicle(state: &mut State, from: SocketAddr, _datagram: &[u8]) {
 }
 
 fn note_commands(state: &mut State, _from: SocketAddr, datagram: &[u8]) {
+    state.from_ground += 1;
     let mut framer = Framer::new();
     framer.push_datagram(datagram);
     while let Some(frame) = framer.next_frame() {

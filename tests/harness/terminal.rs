@@ -36,6 +36,8 @@ pub struct Terminal {
 struct Shown {
     window: Mutex<Window>,
     changed: Condvar,
+    /// Held while nothing is read.
+    reading: Mutex<()>,
 }
 
 impl Shown {
@@ -81,8 +83,11 @@ impl Terminal {
             .stderr(end())
             .spawn()
             .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-        let window =
-            Arc::new(Shown { window: Mutex::new(Window::new((columns, rows))), changed: Condvar::new() });
+        let window = Arc::new(Shown {
+            window: Mutex::new(Window::new((columns, rows))),
+            changed: Condvar::new(),
+            reading: Mutex::new(()),
+        });
         let keyboard = File::from(keyboard);
         let (pipe, shown) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&window));
         std::thread::Builder::new()
@@ -163,6 +168,11 @@ impl Terminal {
         modes == self.modes && !window.is_taken() && count(b"\x1b[>") == count(b"\x1b[<1u")
     }
 
+    /// Takes nothing of what the program writes while the answer is held: a stopped scroll, a session that hangs.
+    pub fn stall(&self) -> impl Sized + '_ {
+        self.window.reading.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Sends the program a signal.
     ///
     /// # Panics
@@ -213,6 +223,7 @@ fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
     let mut buffer = [0; 16 * 1024];
     // The question comes in one piece with the first frame at most.
     while let Ok(length @ 1..) = pipe.read(&mut buffer) {
+        drop(shown.reading.lock());
         shown.look().take(&buffer[..length]);
         shown.changed.notify_all();
         if buffer[..length].windows(QUESTION.len()).any(|bytes| bytes == QUESTION) {

@@ -98,6 +98,36 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
     assert!(said.iter().any(|said| said.contains("ABORT observed")), "{said:?}");
 }
 
+/// A stopped scroll, a session that hangs: nobody reads what the program writes.
+#[test]
+fn a_terminal_that_takes_nothing_stops_neither_link_nor_abort_nor_log() {
+    let mut stage = Stage::set("paper-calibrated");
+    stage.arm();
+    let stalled = stage.terminal.stall();
+    // Whole frames of the largest size: several times what a terminal holds for its reader.
+    for step in 0..10 {
+        let size = if step == 9 { SIZE } else { (300 - step % 2, 90) };
+        stage.terminal.resize(size);
+        stage.air.wait_for_ground();
+    }
+    let attach = ground(stage.folder.path(), &["attach"]);
+    let mut second = Terminal::start(&attach, SIZE, false);
+    second.wait_for(" ARMED ");
+    second.type_bytes(b"\x18\r");
+    second.wait_for("acknowledged accepted  observed yes");
+    drop(stalled);
+    // Read again, it shows what is, not what was.
+    stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    stage.terminal.wait_until("everything in its place", |window| {
+        let rows = window.rows();
+        (rows[0].contains(" disarmed ") && rows[23].starts_with("[1Pad] 2Descent")).then_some(())
+    });
+    stage.terminal.signal(Signal::SIGTERM);
+    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
+    assert!(stage.terminal.is_restored());
+    whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
+}
+
 /// Set for the program of the test below, which is this test program again.
 const PANICS_HERE: &str = "TOUCHDOWN_TEST_PANICS_WITH_LOG";
 

@@ -6,6 +6,7 @@ pub mod clock;
 pub mod lines;
 pub mod log;
 mod output;
+mod paper;
 pub mod print;
 pub mod replaying;
 pub mod screen;

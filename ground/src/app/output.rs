@@ -57,7 +57,7 @@ impl Output {
         }
     }
 
-    pub(super) fn bell(&self) {
+    pub(super) fn bell(&mut self) {
         if let Self::Screen(screen) = self {
             screen.bell();
         }

@@ -17,10 +17,10 @@ use crossterm::terminal::{
 };
 use crossterm::{execute, queue};
 use futures_util::StreamExt as _;
-use ratatui::DefaultTerminal;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 
+use super::paper::{self, Page, Paper};
 use crate::config::{Characters, Colour, Config};
 use crate::key::Key;
 use crate::model::Model;
@@ -48,7 +48,8 @@ static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 pub struct Screen {
     /// Never dropped: its own clean-up prints when the terminal is gone, and printing to a terminal that is
     /// gone panics. [`restore`] does what it would do.
-    terminal: ManuallyDrop<DefaultTerminal>,
+    terminal: ManuallyDrop<Terminal<CrosstermBackend<Page>>>,
+    paper: Paper,
     events: EventStream,
     theme: Theme,
     bell: bool,
@@ -66,9 +67,11 @@ impl Screen {
     /// It is none, or refuses.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         restore_before_panic_message();
-        let terminal = take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
+        let (terminal, paper) =
+            take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
             terminal: ManuallyDrop::new(terminal),
+            paper,
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
@@ -116,6 +119,11 @@ impl Screen {
         if now < self.redraw_at() {
             return Ok(());
         }
+        if self.paper.is_busy()? {
+            // Looks again soon; what is drawn then is as it is then.
+            (self.drawn_at, self.wait) = (Some(now), FRAME);
+            return Ok(());
+        }
         if std::mem::take(&mut self.whole) {
             // Not `Terminal::clear`: it asks the terminal where its cursor is and waits two seconds, link and all, for
             // an answer that our own reader of keys takes away.
@@ -123,6 +131,7 @@ impl Screen {
             self.terminal.resize(size.into())?;
         }
         self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
+        self.paper.send();
         self.wait = IDLE_FRAME;
         self.drawn_at = Some(now);
         Ok(())
@@ -140,13 +149,12 @@ impl Screen {
     }
 
     /// Rings the terminal's bell.
-    pub fn bell(&self) {
-        if !self.bell {
-            return;
+    pub fn bell(&mut self) {
+        if self.bell {
+            // A page takes everything.
+            let _ = io::Write::write_all(self.terminal.backend_mut(), b"\x07");
+            self.paper.send();
         }
-        let mut out = io::stdout();
-        // A terminal that is gone shows by the next frame.
-        let _ = io::Write::write_all(&mut out, b"\x07").and_then(|()| io::Write::flush(&mut out));
     }
 
     /// The next thing done at the terminal.
@@ -195,12 +203,13 @@ fn theme(config: &Config) -> Theme {
     Theme { colour, ascii }
 }
 
-fn take_terminal() -> io::Result<DefaultTerminal> {
+fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<Page>>, Paper)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     execute!(io::stdout(), EnterAlternateScreen)?;
     tell_repeats()?;
-    Terminal::new(CrosstermBackend::new(io::stdout()))
+    let (paper, page) = Paper::new()?;
+    Ok((Terminal::new(CrosstermBackend::new(page))?, paper))
 }
 
 /// Asks the terminal to tell a held key's repeats from presses, where it can. Where it cannot say whether
@@ -223,6 +232,10 @@ fn restore() {
         return;
     }
     let _ = disable_raw_mode();
+    // Half a frame before it would swallow what is said here; a terminal that takes nothing is not talked to.
+    if !paper::wait_for_end() {
+        return;
+    }
     let mut out = io::stdout();
     // Before the alternate screen is left: each screen has its own.
     if KEYBOARD_ENHANCED.swap(false, Ordering::Relaxed) {
