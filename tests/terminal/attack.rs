@@ -79,14 +79,16 @@ fn what_a_vehicle_says_never_commands_the_terminal() {
         for (attack, index) in ATTACKS.iter().zip(0..) {
             stage.air.forge(encoder.encode(&status_text(attack)).as_bytes());
             stage.air.forge(encoder.encode(&parameter(index, attack)).as_bytes());
-            let words = word_of(attack);
-            // The newest message stands on the last line but one; it arrived, and it is all that did.
-            stage.terminal.wait_until(&format!("{words} on {page}"), |window| {
-                let rows = window.rows();
-                let said = rows[rows.len() - 2].contains(words);
-                (said && rows[rows.len() - 1].contains(page) && rows[0].starts_with(" PAD_IDLE"))
-                    .then_some(())
-            });
+            if page == "[1Pad]" {
+                wait_for_newest(&stage, page, word_of(attack));
+            }
+        }
+        wait_for_newest(&stage, page, word_of(ATTACKS[ATTACKS.len() - 1]));
+        if page == "[6Messages]" {
+            let window = stage.terminal.look();
+            let missing: Vec<&str> =
+                ATTACKS.iter().map(|attack| word_of(attack)).filter(|word| !window.shows(word)).collect();
+            assert!(missing.is_empty(), "{missing:?} of {:#?}", window.rows());
         }
     }
     // The parameters' names are shown here.
@@ -104,6 +106,15 @@ fn what_a_vehicle_says_never_commands_the_terminal() {
     let rows = stage.terminal.look().rows();
     stage.terminal.type_bytes(b"\x0c");
     stage.terminal.wait_until("the same screen", |window| (window.rows() == rows).then_some(()));
+}
+
+/// The newest message stands on the last line but one; around it everything is in its place.
+fn wait_for_newest(stage: &Stage, page: &str, word: &str) {
+    stage.terminal.wait_until(&format!("{word} on {page}"), |window| {
+        let rows = window.rows();
+        let said = rows[rows.len() - 2].contains(word);
+        (said && rows[rows.len() - 1].contains(page) && rows[0].starts_with(" PAD_IDLE")).then_some(())
+    });
 }
 
 /// The letters and digits at the end.

@@ -12,7 +12,7 @@ use crate::update::Msg;
 
 /// Where a run is shown.
 pub(super) enum Output {
-    Screen(Screen),
+    Screen(Box<Screen>),
     Lines(Lines),
 }
 
@@ -22,7 +22,11 @@ impl Output {
     /// # Errors
     /// The terminal refuses.
     pub(super) fn open(interactive: bool, config: &Config) -> anyhow::Result<Self> {
-        if interactive { Screen::open(config).map(Self::Screen) } else { Ok(Self::Lines(Lines::new())) }
+        if interactive {
+            Screen::open(config).map(|screen| Self::Screen(Box::new(screen)))
+        } else {
+            Ok(Self::Lines(Lines::new()))
+        }
     }
 
     /// Whether the terminal tells a held key's repeats from presses.
