@@ -63,7 +63,6 @@ fn after_a_storm_of_sizes_the_screen_is_right_at_every_size() {
         stage.terminal.resize(SIZES[usize::from(step % 8)]);
     }
     stage.terminal.resize(SIZE);
-    stage.terminal.wait_for(" POWERED");
     stage.terminal.wait_until("a flight's end, and nothing left over", |window| {
         let shown = window.rows();
         let top = shown[0].starts_with(" SAFED ") && shown[0].contains(" disarmed ");
