@@ -93,19 +93,37 @@ fn what_a_vehicle_says_never_commands_the_terminal() {
     }
     // The parameters' names are shown here.
     stage.terminal.wait_for("TITLED02 ");
-    {
-        let window = stage.terminal.look();
-        assert_eq!(window.liberties(), 0, "no title, no clipboard, no other size");
-        for never in NEVER_WRITTEN {
-            let found = window.bytes().windows(never.len()).any(|bytes| bytes == never);
-            assert!(!found, "{never:?} reached the terminal");
-        }
-        assert!(std::str::from_utf8(window.bytes()).is_ok(), "no byte that is no text reached the terminal");
-    }
+    assert_harmless(&stage);
     // Drawn anew, it is what it was: nothing had moved a cell.
     let rows = stage.terminal.look().rows();
     stage.terminal.type_bytes(b"\x0c");
     stage.terminal.wait_until("the same screen", |window| (window.rows() == rows).then_some(()));
+}
+
+/// A screen leaves out what has no cell; lines are written as they are.
+#[test]
+fn what_a_vehicle_says_never_commands_a_terminal_that_is_told_in_lines() {
+    let stage = Stage::set_on("paper-calibrated", false, "dumb");
+    stage.terminal.wait_for("PAD_IDLE");
+    let mut encoder = Encoder::new(VEHICLE);
+    for attack in ATTACKS {
+        stage.air.forge(encoder.encode(&status_text(attack)).as_bytes());
+        stage.terminal.wait_for(word_of(attack));
+    }
+    assert_harmless(&stage);
+    let window = stage.terminal.look();
+    let control = |byte: &u8| *byte < b' ' && !matches!(byte, b'\r' | b'\n');
+    assert!(!window.bytes().iter().any(control), "a control character reached the terminal");
+}
+
+fn assert_harmless(stage: &Stage) {
+    let window = stage.terminal.look();
+    assert_eq!(window.liberties(), 0, "no title, no clipboard, no other size");
+    for never in NEVER_WRITTEN {
+        let found = window.bytes().windows(never.len()).any(|bytes| bytes == never);
+        assert!(!found, "{never:?} reached the terminal");
+    }
+    assert!(std::str::from_utf8(window.bytes()).is_ok(), "no byte that is no text reached the terminal");
 }
 
 /// The newest message stands on the last line but one; around it everything is in its place.

@@ -40,7 +40,7 @@ fn quit_and_terminated_it_gives_the_terminal_back_and_ends_its_log() {
         (|terminal| terminal.signal(Signal::SIGINT), false),
     ];
     for (end, tells_repeats) in endings {
-        let mut stage = Stage::set_on("paper-calibrated", tells_repeats);
+        let mut stage = Stage::set_on("paper-calibrated", tells_repeats, "xterm-256color");
         stage.terminal.wait_for("GO: every arming check passes");
         assert!(!stage.terminal.is_restored(), "it has taken the terminal");
         stage.terminal.type_bytes(b"5");

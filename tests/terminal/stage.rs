@@ -34,17 +34,17 @@ pub(crate) struct Stage {
 impl Stage {
     /// A vehicle of this profile on its pad, and its ground station on a terminal.
     pub(crate) fn set(profile: &'static str) -> Self {
-        Self::set_on(profile, false)
+        Self::set_on(profile, false, "xterm-256color")
     }
 
-    /// The same; the terminal tells key repeats from presses, or does not.
-    pub(crate) fn set_on(profile: &'static str, tells_repeats: bool) -> Self {
+    /// The same; the terminal tells key repeats from presses, or does not, and is of this kind.
+    pub(crate) fn set_on(profile: &'static str, tells_repeats: bool, kind: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let port = free_port();
         let air = Air::to_ground_at(port);
         let link = format!("udpin:127.0.0.1:{port}");
-        let command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
-        let terminal = Terminal::start(&command, SIZE, tells_repeats);
+        let mut command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
+        let terminal = Terminal::start(command.env("TERM", kind), SIZE, tells_repeats);
         let vehicle = vehicle(profile, &air);
         Self { terminal, air, vehicle, profile, folder }
     }
