@@ -32,10 +32,10 @@ pub struct Weather {
     pub silent: bool,
 }
 
-/// A proxy between one vehicle and one ground station. A vehicle that starts again takes the place of the one before it.
+/// A proxy between one vehicle and one ground station, which both speak to it first. One that starts again takes the
+/// place of the one before it.
 pub struct Air {
-    port: u16,
-    ground: SocketAddr,
+    to_vehicle: UdpSocket,
     to_ground: UdpSocket,
     state: Arc<Mutex<State>>,
     over: Arc<AtomicBool>,
@@ -45,26 +45,28 @@ pub struct Air {
 struct State {
     weather: Weather,
     vehicle: Option<SocketAddr>,
+    ground: Option<SocketAddr>,
     commands: Vec<CommandRequest>,
     /// Datagrams.
     from_ground: u64,
 }
 
+impl Default for Air {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Air {
-    /// To a ground station that listens on this loopback port.
+    /// Clear air.
     ///
     /// # Panics
     /// There is no free port.
-    pub fn to_ground_at(port: u16) -> Self {
-        let bind = || {
-            let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-            socket.set_read_timeout(Some(LOOKS_UP_EVERY)).expect("a time limit");
-            socket
-        };
+    pub fn new() -> Self {
+        let bind = || UdpSocket::bind("127.0.0.1:0").expect("a free port");
         let (to_vehicle, to_ground) = (bind(), bind());
-        let ground = SocketAddr::from(([127, 0, 0, 1], port));
-        let state =
-            State { weather: Weather::default(), vehicle: None, commands: Vec::new(), from_ground: 0 };
+        let weather = Weather::default();
+        let state = State { weather, vehicle: None, ground: None, commands: Vec::new(), from_ground: 0 };
         let (state, over) = (Arc::new(Mutex::new(state)), Arc::new(AtomicBool::new(false)));
         let clone = |socket: &UdpSocket| socket.try_clone().expect("a descriptor");
         let (from, to) = (clone(&to_vehicle), clone(&to_ground));
@@ -75,16 +77,26 @@ impl Air {
             std::thread::Builder::new().name(name.to_owned()).spawn(run).expect("a thread")
         };
         let ways = vec![
-            spawn("air down", Box::new(move || down.carry(|_| Some(ground), note_vehicle))),
-            spawn("air up", Box::new(move || up.carry(|state| state.vehicle, note_commands))),
+            spawn("air down", Box::new(move || down.carry(|state| state.ground, note_vehicle))),
+            spawn("air up", Box::new(move || up.carry(|state| state.vehicle, note_ground))),
         ];
-        let port = to_vehicle.local_addr().expect("bound").port();
-        Self { port, ground, to_ground, state, over, ways }
+        Self { to_vehicle, to_ground, state, over, ways }
     }
 
     /// What the vehicle is to be given for `--mavlink`.
+    ///
+    /// # Panics
+    /// The socket has no address.
     pub fn vehicle_link(&self) -> String {
-        format!("udpout:127.0.0.1:{}", self.port)
+        format!("udpout:{}", self.to_vehicle.local_addr().expect("bound"))
+    }
+
+    /// What the ground station is to be given for `--connect`.
+    ///
+    /// # Panics
+    /// The socket has no address.
+    pub fn ground_link(&self) -> String {
+        format!("udpout:{}", self.to_ground.local_addr().expect("bound"))
     }
 
     /// From now on.
@@ -95,9 +107,10 @@ impl Air {
     /// Says something to the ground in the vehicle's place.
     ///
     /// # Panics
-    /// The system refuses.
+    /// The ground has not been heard yet, or the system refuses.
     pub fn forge(&self, datagram: &[u8]) {
-        self.to_ground.send_to(datagram, self.ground).expect("sent");
+        let ground = look(&self.state).ground.expect("a ground that has been heard");
+        self.to_ground.send_to(datagram, ground).expect("sent");
     }
 
     /// Waits until the ground says something more: at least its heartbeat, from the loop that does everything.
@@ -137,7 +150,8 @@ fn note_vehicle(state: &mut State, from: SocketAddr, _datagram: &[u8]) {
     state.vehicle = Some(from);
 }
 
-fn note_commands(state: &mut State, _from: SocketAddr, datagram: &[u8]) {
+fn note_ground(state: &mut State, from: SocketAddr, datagram: &[u8]) {
+    state.ground = Some(from);
     state.from_ground += 1;
     let mut framer = Framer::new();
     framer.push_datagram(datagram);
@@ -183,7 +197,11 @@ impl Way {
                 };
                 self.launch(&datagram[..count], weather, &mut flying);
             }
-            let Some(to) = address(&look(&self.state)) else { continue };
+            let Some(to) = address(&look(&self.state)) else {
+                // Nobody has spoken there yet: nobody hears it.
+                flying.clear();
+                continue;
+            };
             for (_, arrived) in flying.extract_if(.., |(due, _)| *due <= now()) {
                 // A program that does not listen yet hears the next one.
                 let _ = self.to.send_to(&arrived, to);

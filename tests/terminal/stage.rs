@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use e2e::{Air, Program, Running, Signal, Terminal, free_port, program};
+use e2e::{Air, Program, Running, Signal, Terminal, program};
 use protocol::dialect::MavCmd;
 
 pub(crate) const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -40,9 +40,8 @@ impl Stage {
     /// The same; the terminal tells key repeats from presses, or does not, and is of this kind.
     pub(crate) fn set_on(profile: &'static str, tells_repeats: bool, kind: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let port = free_port();
-        let air = Air::to_ground_at(port);
-        let link = format!("udpin:127.0.0.1:{port}");
+        let air = Air::new();
+        let link = air.ground_link();
         let mut command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
         let terminal = Terminal::start(command.env("TERM", kind), SIZE, tells_repeats);
         let vehicle = vehicle(profile, &air);

@@ -1,6 +1,6 @@
 //! Screens whose station is another process, and what becomes of them when it dies.
 
-use e2e::{Air, Program, Running, Signal, Terminal, free_port, program};
+use e2e::{Air, Program, Running, Signal, Terminal, program};
 use protocol::dialect::MavCmd;
 
 use crate::stage::{ABORT, SIZE, ground};
@@ -8,23 +8,21 @@ use crate::stage::{ABORT, SIZE, ground};
 /// A vehicle on its pad beyond clear air, and the folder of everybody here.
 struct Field {
     folder: tempfile::TempDir,
-    port: u16,
     air: Air,
     _vehicle: Running,
 }
 
 impl Field {
     fn new() -> Self {
-        let port = free_port();
-        let air = Air::to_ground_at(port);
+        let air = Air::new();
         let mut vehicle = program(Program::OnboardSim);
         vehicle.args(["fly", "--stay", "--mavlink", &air.vehicle_link()]);
         let vehicle = Running::start(&mut vehicle);
-        Self { folder: tempfile::tempdir().unwrap(), port, air, _vehicle: vehicle }
+        Self { folder: tempfile::tempdir().unwrap(), air, _vehicle: vehicle }
     }
 
     fn daemon(&self, log: &str) -> Running {
-        let link = format!("udpin:127.0.0.1:{}", self.port);
+        let link = self.air.ground_link();
         let arguments = ["daemon", "--connect", &link, "--log", log];
         let mut daemon = Running::start(&mut ground(self.folder.path(), &arguments));
         daemon.wait_for_line("PAD_IDLE");
