@@ -27,6 +27,7 @@ remembers!(Pilot {
     aim_loop,
     fin_share,
     fins_rad,
+    fin_watch,
     gimbal_rad,
     gate_refusal,
     gate_shut_since_s,

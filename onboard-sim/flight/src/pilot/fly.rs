@@ -54,6 +54,7 @@ impl Pilot {
         if looking && self.mode.phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }
+        self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
         self.move_through_phases(input, &estimate);
 
         let burning_s = self.known.burning_s(time_s);
@@ -228,7 +229,7 @@ impl Pilot {
             height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
             landing_feasible: ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.outlook.touchdown_distance_m,
-            fins_confirmed: self.fins_there(&input.fins_rad),
+            fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
             parachute_stowed: self.mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
             estimator_healthy: estimate.health.is_good(),

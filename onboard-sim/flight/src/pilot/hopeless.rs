@@ -22,6 +22,7 @@ impl Pilot {
         let state = &estimate.state;
         let rate_rad_s = libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z);
         let shut = !self.fins_there(&input.fins_rad)
+            || self.fin_watch.any_stuck()
             || !estimate.health.is_good()
             || state.tilt_rad() > TUMBLING * limits.tilt_max_deg.to_radians()
             || rate_rad_s > TUMBLING * limits.pitch_rate_max_deg_s.to_radians()

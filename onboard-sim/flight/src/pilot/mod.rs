@@ -6,6 +6,7 @@
 
 mod assumed;
 mod digest;
+mod fin_watch;
 mod fly;
 mod hopeless;
 mod inspect;
@@ -15,6 +16,7 @@ mod restart;
 #[cfg(test)]
 mod sample;
 
+use fin_watch::FinWatch;
 use known::Known;
 pub use outlook::{Outlook, touchdown_m};
 
@@ -90,6 +92,7 @@ pub struct Pilot {
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
+    fin_watch: FinWatch,
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
     /// Since when something lasting has stood in the gate's way, s.
@@ -130,6 +133,7 @@ impl Pilot {
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
+            fin_watch: FinWatch::default(),
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
             gate_shut_since_s: None,
