@@ -19,6 +19,7 @@ mod pilot;
 mod plain_answers;
 mod planned_paths;
 mod recovery;
+mod reflown_logs;
 mod resumed_sweep;
 mod simulated;
 mod solve_times;
