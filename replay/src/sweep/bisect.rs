@@ -75,6 +75,8 @@ pub struct BisectReport {
     pub kind: &'static str,
     /// The flight.
     pub file: String,
+    /// Whether this build, with nothing changed, flies it as recorded.
+    pub reproduced: bool,
     /// The setting.
     pub path: String,
     /// Whether it is changed for the plant alone.
@@ -108,6 +110,7 @@ impl BisectReport {
 pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectReport, BisectError> {
     let path = &options.path;
     let prepared = Prepared::new(flight, &options.refly)?;
+    let reproduced = prepared.is_reproduced(&options.refly)?;
     let value = match options.value {
         Some(value) => value,
         None => prepared.number_of(path).ok_or_else(|| BisectError::NoValue { path: path.clone() })?,
@@ -124,6 +127,7 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
     Ok(BisectReport {
         kind: "closed loop: flown again in simulation",
         file: flight.name.clone(),
+        reproduced,
         path: path.clone(),
         plant_alone: options.plant_alone,
         value,

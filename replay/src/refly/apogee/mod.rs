@@ -113,6 +113,11 @@ impl<'a> AtStart<'a> {
         &self.truth
     }
 
+    /// How far the recorded frames before the start were the same.
+    pub(super) fn reached(&self) -> Reached {
+        self.reached
+    }
+
     /// Flies on; what happens is kept if there is a place for it.
     pub(super) fn fly(
         &self,
