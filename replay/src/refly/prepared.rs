@@ -2,7 +2,7 @@
 
 use super::{From, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
 use crate::log::Recording;
-use crate::settings::{mission_value_of, value_of};
+use crate::settings::{is_whole, is_whole_in_mission, mission_value_of, value_of};
 
 /// A recorded flight at the moment it is flown again from.
 #[derive(Debug)]
@@ -69,6 +69,15 @@ impl<'a> Prepared<'a> {
         let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
         let report = self.fly(&unchanged)?;
         Ok(report.commands_identical == report.commands_recorded)
+    }
+
+    /// Whether a setting takes whole numbers only.
+    ///
+    /// # Errors
+    /// The flight has no setting of this name.
+    pub fn is_whole(&self, path: &str) -> Result<bool, ReflyError> {
+        let toml = self.recording.profile_toml()?;
+        Ok(if self.at_start.is_some() { is_whole_in_mission(toml, path)? } else { is_whole(toml, path)? })
     }
 
     /// The number that a setting has in the recorded flight.

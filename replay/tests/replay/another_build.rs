@@ -59,7 +59,10 @@ fn a_sweep_names_the_flights_that_are_not_reproduced() {
     let report = swept(&[NOMINAL.recording(), other]);
     assert_eq!(report.not_reproduced, ["other.mcap"]);
     let text = words(|output| print_sweep(&report, 1, output));
-    assert!(text.contains("other.mcap: with nothing changed this build does not fly it as recorded"), "{text}");
+    assert!(
+        text.contains("other.mcap: with nothing changed this build does not fly it as recorded"),
+        "{text}"
+    );
 }
 
 #[test]

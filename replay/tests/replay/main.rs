@@ -26,3 +26,4 @@ mod simulated;
 mod solve_times;
 mod tables;
 mod what_if;
+mod whole_numbers;

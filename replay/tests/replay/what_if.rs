@@ -234,8 +234,14 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
     assert!(landed(flip.same_at) && !landed(flip.other_at));
     let outside = BisectOptions { value: Some(2.0), ..options.clone() };
     assert!(bisect(&recording, &outside).unwrap_err().to_string().contains("does not lie between"));
-    let unknown = BisectOptions { value: None, path: "plant.nothing".to_owned(), ..options };
-    assert!(bisect(&recording, &unknown).unwrap_err().to_string().contains("--value"));
+    let refused = |path: &str| {
+        let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
+        bisect(&recording, &options).unwrap_err().to_string()
+    };
+    // A name that the profile leaves out, and one that no profile has.
+    assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));
+    let unknown = refused("nmpc.wieghts.w");
+    assert!(unknown.contains("did you mean `nmpc.weights.w`?"), "{unknown}");
 }
 
 #[test]
