@@ -138,8 +138,11 @@ fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, Evalu
     let profile = recording.profile()?;
     let recorded_s = profile.nmpc.sample_time_s;
     refuse(settings, &NOT_THE_CONTROLLERS, ("nmpc.sample_time_s", recorded_s))?;
-    let schedule = Schedule::new(recording.profile_toml()?, settings)?;
-    let then = LoggedController::new(&profile);
+    let toml = recording.profile_toml()?;
+    let then = LoggedController::recorded(&profile, toml, &recording.head.run)?;
+    let in_flight = settings_in_flight(&recording.head.run)?;
+    let all: Vec<Setting> = in_flight.iter().chain(settings).cloned().collect();
+    let schedule = Schedule::new(toml, &all)?;
     let now = LoggedController::scheduled(&schedule).judged_by(TouchdownLimits::from_profile(&profile));
     side_by_side(then, now, recorded)
 }

@@ -121,6 +121,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
     for (name, options) in [
         ("same.mcap", ReflyOptions::default()),
         ("weights.mcap", with(&["nmpc.weights.w=120", "nmpc.weights.q=60"])),
+        ("timed.mcap", with(&["nmpc.weights.w=120@8.0", "nmpc.weights.q=60"])),
         ("late.mcap", ReflyOptions { start: StartAt::Tick(30), ..ReflyOptions::default() }),
     ] {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
@@ -131,6 +132,12 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         assert_eq!(verified.ticks_identical as usize, flown.before.len() + flown.ticks.len());
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict);
+        assert_eq!(evaluate(&again, &[]).unwrap().unchanged_different, 0, "{name}");
+        assert!(tick(&again, 40).unwrap().identical, "{name}");
+        // Flown again as it is, it is the same once more, with what was changed on its way.
+        let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
+        let once_more = refly_flight(&again, &unchanged).unwrap().1;
+        assert_eq!(once_more.verdict, flown.verdict, "{name}");
         assert!(write_log(&path, &recording, &options, &report, &flown).is_err(), "never overwritten");
     }
 }
