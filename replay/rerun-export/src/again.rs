@@ -1,6 +1,5 @@
 //! The log's own controller, run again on its inputs beside the record.
 
-use flight::profile::Profile;
 use prost::Message as _;
 use protocol::log::flight_v1::{PilotStart, PilotTick};
 use protocol::log::v1::ControllerTick;
@@ -48,10 +47,17 @@ pub(crate) struct FrameAgain {
 
 impl Again {
     /// The controller of a planar landing, if the log has its profile.
-    pub(crate) fn of(profile: Option<&Profile>) -> Self {
-        let planar =
-            |profile| Controller::Planar { controller: Box::new(LoggedController::new(profile)), next: 0 };
-        Self { controller: profile.map_or(Controller::None, planar), ..Self::default() }
+    pub(crate) fn of(survey: &Survey) -> Self {
+        let mut again = Self::default();
+        if let (Some(profile), Some(toml)) = (&survey.profile, &survey.profile_toml) {
+            match LoggedController::recorded(profile, toml, &survey.run) {
+                Ok(controller) => {
+                    again.controller = Controller::Planar { controller: Box::new(controller), next: 0 };
+                }
+                Err(error) => again.give_up(error.to_string()),
+            }
+        }
+        again
     }
 
     /// The flight computer, let go.

@@ -84,7 +84,7 @@ impl<'a> Export<'a> {
             times: Times::default(),
             scene: Scene::new(recording, survey)?,
             plots: Plots::new(recording),
-            again: Again::of(survey.profile.as_ref()),
+            again: Again::of(survey),
             planning: false,
             verdict: None,
             done: Exported {

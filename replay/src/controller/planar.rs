@@ -1,5 +1,7 @@
 //! The controller of the planar landing.
 
+use std::collections::BTreeMap;
+
 use flight::controller::{
     ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, step,
 };
@@ -10,9 +12,9 @@ use prost_reflect::MessageDescriptor;
 use protocol::log::v1;
 use tick_log::{TickLogError, input_from_log, state_from_log, tick_to_log};
 
-use super::{Decided, Moment, Replayed, phase_name};
+use super::{Decided, Moment, Replayed, phase_name, settings_in_flight};
 use crate::log::tick_descriptor;
-use crate::settings::Schedule;
+use crate::settings::{Schedule, SettingError};
 
 /// A controller being fed from a log; ticks must come in order, from the first one on.
 #[derive(Debug, Clone)]
@@ -35,6 +37,23 @@ impl LoggedController {
     /// A controller whose settings change in flight, before its first tick.
     pub fn scheduled(schedule: &Schedule<Profile>) -> Self {
         Self { schedule: Some(schedule.clone()), ..Self::new(schedule.base()) }
+    }
+
+    /// The controller that a log's ticks came from, before its first tick: of its profile, and of the settings that its run
+    /// facts say were changed in flight.
+    ///
+    /// # Errors
+    /// The run facts name settings that this build does not have.
+    pub fn recorded(
+        profile: &Profile,
+        profile_toml: &str,
+        run: &BTreeMap<String, String>,
+    ) -> Result<Self, SettingError> {
+        let in_flight = settings_in_flight(run)?;
+        if in_flight.is_empty() {
+            return Ok(Self::new(profile));
+        }
+        Ok(Self::scheduled(&Schedule::new(profile_toml, &in_flight)?))
     }
 
     /// The same, judging its plans by other limits than its own.

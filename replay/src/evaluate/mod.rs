@@ -98,6 +98,9 @@ pub struct EvaluateReport {
     pub file: String,
     /// What was changed.
     pub settings: Vec<String>,
+    /// Ticks that this build decides otherwise than recorded with nothing changed: what differs on them may be the
+    /// build's doing and not the settings'.
+    pub unchanged_different: usize,
     /// Ticks whose gimbal command differs in some bit.
     pub commands_different: usize,
     /// Root mean square of the differences of the gimbal commands in the landing, rad.
@@ -116,6 +119,9 @@ pub struct EvaluateReport {
     pub ticks: Vec<EvaluatedTick>,
 }
 
+/// Every tick, and how many of them are decided otherwise with nothing changed.
+type Evaluated = (Vec<EvaluatedTick>, usize);
+
 /// Evaluates a recorded flight under other settings.
 ///
 /// # Errors
@@ -127,19 +133,22 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
 }
 
 /// The planar landing's ticks.
-fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Vec<EvaluatedTick>, EvaluateError> {
+fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
     let recorded = recording.replayable_ticks()?;
     let profile = recording.profile()?;
     let recorded_s = profile.nmpc.sample_time_s;
     refuse(settings, &NOT_THE_CONTROLLERS, ("nmpc.sample_time_s", recorded_s))?;
-    let schedule = Schedule::new(recording.profile_toml()?, settings)?;
-    let then = LoggedController::new(&profile);
+    let toml = recording.profile_toml()?;
+    let then = LoggedController::recorded(&profile, toml, &recording.head.run)?;
+    let in_flight = settings_in_flight(&recording.head.run)?;
+    let all: Vec<Setting> = in_flight.iter().chain(settings).cloned().collect();
+    let schedule = Schedule::new(toml, &all)?;
     let now = LoggedController::scheduled(&schedule).judged_by(TouchdownLimits::from_profile(&profile));
     side_by_side(then, now, recorded)
 }
 
 /// The frames of a flight computer.
-fn frames(recording: &Recording, settings: &[Setting]) -> Result<Vec<EvaluatedTick>, EvaluateError> {
+fn frames(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
     let (start, frames) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let in_flight = settings_in_flight(&recording.head.run)?;
@@ -172,28 +181,27 @@ fn refuse(
 
 /// Runs both on every tick. The recorded decision is the record's; what a record leaves out (cost and iterations of a
 /// flight computer's plan) is that of `then`, which decides it again.
-fn side_by_side<C: Replayed>(
-    mut then: C,
-    mut now: C,
-    ticks: &[C::Tick],
-) -> Result<Vec<EvaluatedTick>, EvaluateError>
+fn side_by_side<C: Replayed>(mut then: C, mut now: C, ticks: &[C::Tick]) -> Result<Evaluated, EvaluateError>
 where
     EvaluateError: From<C::Error>,
 {
     let mut evaluated = Vec::with_capacity(ticks.len());
+    let mut unchanged_different = 0;
     for tick in ticks {
-        then.run_again(tick)?;
+        let unchanged = then.run_again(tick)?;
         let again = now.run_again(tick)?;
         let moment = C::moment(tick);
+        let recorded = then.decided(tick);
+        unchanged_different += usize::from(then.decided(&unchanged) != recorded);
         evaluated.push(EvaluatedTick {
             tick: moment.tick,
             time_s: moment.time_s,
             phase: moment.phase,
-            recorded: then.decided(tick),
+            recorded,
             evaluated: now.decided(&again),
         });
     }
-    Ok(evaluated)
+    Ok((evaluated, unchanged_different))
 }
 
 /// The largest difference of two commands' angles, rad.
@@ -201,7 +209,11 @@ fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-fn summarise(recording: &Recording, settings: &[Setting], ticks: Vec<EvaluatedTick>) -> EvaluateReport {
+fn summarise(
+    recording: &Recording,
+    settings: &[Setting],
+    (ticks, unchanged_different): Evaluated,
+) -> EvaluateReport {
     let difference_rad =
         |tick: &EvaluatedTick| apart_rad(&tick.recorded.gimbal_rad, &tick.evaluated.gimbal_rad);
     let landing: Vec<&EvaluatedTick> = ticks
@@ -217,6 +229,7 @@ fn summarise(recording: &Recording, settings: &[Setting], ticks: Vec<EvaluatedTi
         kind: "open loop: the controller alone on recorded inputs",
         file: recording.name.clone(),
         settings: settings.iter().map(ToString::to_string).collect(),
+        unchanged_different,
         commands_different: count(&|tick| {
             bits(&tick.recorded.gimbal_rad) != bits(&tick.evaluated.gimbal_rad)
         }),

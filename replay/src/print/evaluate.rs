@@ -17,6 +17,14 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     if !report.settings.is_empty() {
         writeln!(output, "with {}", shown(&report.settings.join(" ")))?;
     }
+    if report.unchanged_different > 0 {
+        writeln!(
+            output,
+            "with nothing changed this build decides {} of {} ticks otherwise than recorded",
+            report.unchanged_different,
+            report.ticks.len()
+        )?;
+    }
     let largest =
         report.gimbal_difference_max_tick.map(|tick| format!(" at tick {tick}")).unwrap_or_default();
     writeln!(

@@ -18,6 +18,9 @@ pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) ->
         counted(report.points.len() as u64, "point"),
         counted(flights as u64, "flight")
     )?;
+    for name in &report.not_reproduced {
+        not_reproduced(name, output)?;
+    }
     writeln!(output, "{:>4} {:>9} {:>9}  settings; worst flight", "rank", "margin", "landed")?;
     for (rank, point) in report.points.iter().enumerate().take(top) {
         let PointOutcome { settings, landed, worst_flight, .. } = point;
@@ -69,6 +72,9 @@ pub fn print_sweep_csv(report: &SweepReport, output: &mut impl Write) -> io::Res
 pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Result<()> {
     let who = if report.plant_alone { " (of the plant alone)" } else { "" };
     writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
+    if !report.reproduced {
+        not_reproduced(&report.file, output)?;
+    }
     writeln!(
         output,
         "{}{who} = {}: {}, margin {}",
@@ -103,6 +109,10 @@ pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Resul
             report.flown
         ),
     }
+}
+
+fn not_reproduced(name: &str, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "{}: with nothing changed this build does not fly it as recorded", shown(name))
 }
 
 /// Two numbers with as many decimals as it takes to tell them apart.

@@ -1,5 +1,7 @@
 //! A planar landing, flown again from a recorded state.
 
+use std::collections::BTreeMap;
+
 use flight::profile::Profile;
 use flight::verdict::TouchdownLimits;
 use onboard_sim::scatter::draw;
@@ -10,7 +12,7 @@ use super::{
     Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report,
     start,
 };
-use crate::controller::{LoggedController, Replayed as _};
+use crate::controller::{LoggedController, Replayed as _, SETTINGS_IN_FLIGHT, settings_in_flight};
 use crate::info::VerdictFacts;
 use crate::log::Recording;
 use crate::settings::{Schedule, Setting, SettingError, profile_with};
@@ -32,7 +34,10 @@ pub(super) fn fly(
     let toml = recording.profile_toml()?;
     refuse_wind_and_chance(recording, options)?;
     let plant_profile = plant_profile(recording, options)?;
-    let schedule = Schedule::new(toml, &options.settings)?;
+    // What the recorded flight changed on its way, this one changes too.
+    let recorded = settings_in_flight(&recording.head.run)?;
+    let all: Vec<Setting> = recorded.iter().chain(&options.settings).cloned().collect();
+    let schedule = Schedule::new(toml, &all)?;
     let start = start::find(recording, ticks, options)?;
 
     let believed = schedule.base();
@@ -44,7 +49,7 @@ pub(super) fn fly(
     let limits = TouchdownLimits::from_profile(believed);
     let mut simulation =
         Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
-    let flown = ReflownFlight { before, ..simulation.fly(&limits) };
+    let flown = ReflownFlight { before, run: run_facts(&all), ..simulation.fly(&limits) };
 
     let (commands_recorded, commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
     let recorded = recording.verdict.as_ref().map(VerdictFacts::of);
@@ -58,6 +63,14 @@ pub(super) fn fly(
         ..report(recording, options, start.state, recorded, reflown)
     };
     Ok((report, flown))
+}
+
+/// What a log of this flight says beside what the recorded one says: the settings with a time. The others are in its
+/// profile.
+fn run_facts(settings: &[Setting]) -> BTreeMap<String, String> {
+    let timed = settings.iter().filter(|setting| setting.at_s.is_some());
+    let lines: Vec<String> = timed.map(ToString::to_string).collect();
+    BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))])
 }
 
 /// What is true: the flown profile, what a flight flown again before had its plant changed by, and the settings.

@@ -1,8 +1,8 @@
 //! A recorded flight made ready to be flown again many times from the same moment.
 
-use super::{ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
+use super::{From, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
 use crate::log::Recording;
-use crate::settings::{mission_value_of, value_of};
+use crate::settings::{is_whole, is_whole_in_mission, mission_value_of, value_of};
 
 /// A recorded flight at the moment it is flown again from.
 #[derive(Debug)]
@@ -52,6 +52,32 @@ impl<'a> Prepared<'a> {
             Some(at_start) => at_start.fly_kept(options),
             None => planar::fly(self.recording, options),
         }
+    }
+
+    /// Whether this build, with nothing changed, flies it as recorded: up to the start, and from there on wherever the
+    /// start is what was true. Costs a flight; the start must be the one it was made ready for.
+    ///
+    /// # Errors
+    /// See [`ReflyError`].
+    pub fn is_reproduced(&self, options: &ReflyOptions) -> Result<bool, ReflyError> {
+        if self.at_start.as_ref().is_some_and(|at_start| at_start.reached().first_different.is_some()) {
+            return Ok(false);
+        }
+        if options.from == From::Estimate {
+            return Ok(true);
+        }
+        let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
+        let report = self.fly(&unchanged)?;
+        Ok(report.commands_identical == report.commands_recorded)
+    }
+
+    /// Whether a setting takes whole numbers only.
+    ///
+    /// # Errors
+    /// The flight has no setting of this name.
+    pub fn is_whole(&self, path: &str) -> Result<bool, ReflyError> {
+        let toml = self.recording.profile_toml()?;
+        Ok(if self.at_start.is_some() { is_whole_in_mission(toml, path)? } else { is_whole(toml, path)? })
     }
 
     /// The number that a setting has in the recorded flight.

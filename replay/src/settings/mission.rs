@@ -8,7 +8,7 @@ use flight::airframe::Airframe;
 use flight::mission::Mission;
 use world::Truth;
 
-use super::names::{self, paths_of};
+use super::names::Names;
 use super::{Setting, SettingError, insert, listed, parsed_table, set, text_of, value_in};
 
 /// The section of the airframe.
@@ -18,9 +18,28 @@ const TRUTH: &str = "truth.";
 
 /// Every key that a mission may have, as in `powered.weights.theta` and `airframe.mass.loaded_kg`.
 pub fn known_mission_paths() -> BTreeSet<String> {
-    let mut known = paths_of::<Mission>("");
-    known.extend(paths_of::<Airframe>(AIRFRAME));
-    known
+    names().paths
+}
+
+/// The keys that a mission and its airframe may have.
+fn names() -> Names {
+    Names::of::<Mission>("").and(Names::of::<Airframe>(AIRFRAME))
+}
+
+/// Whether a key of a mission, of its airframe or of the truth takes whole numbers only.
+///
+/// # Errors
+/// The name is unknown, or the text is not TOML.
+pub fn is_whole_in_mission(mission_toml: &str, path: &str) -> Result<bool, SettingError> {
+    let names = if path.starts_with(TRUTH) {
+        Names::of::<Truth>("truth")
+    } else {
+        let mut table = parsed_table(mission_toml, "profile.toml")?;
+        expand_airframe(&mut table)?;
+        names().with_those_in(&table)
+    };
+    names.check(path)?;
+    Ok(names.is_whole(path))
 }
 
 /// The mission of this text with other settings, whenever they begin to hold.
@@ -51,7 +70,7 @@ pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<Str
     if settings.iter().any(|setting| setting.path.starts_with("airframe.")) {
         expand_airframe(&mut table)?;
     }
-    set(&mut table, settings, known_mission_paths())?;
+    set(&mut table, settings, names())?;
     text_of(&table)
 }
 
@@ -62,10 +81,10 @@ pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<Str
 pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingError> {
     let wrong = |reason: String| SettingError::Mission { settings: listed(settings), reason };
     let mut table = toml::Table::try_from(truth).map_err(|error| wrong(error.to_string()))?;
-    let known = paths_of::<Truth>("truth");
+    let known = Names::of::<Truth>("truth");
     for setting in settings {
         let Some(key) = setting.path.strip_prefix(TRUTH) else { continue };
-        names::check(&setting.path, &known)?;
+        known.check(&setting.path)?;
         insert(&mut table, key, as_number(&setting.value));
     }
     table.try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))

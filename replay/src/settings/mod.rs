@@ -8,15 +8,18 @@ mod mission;
 mod names;
 mod schedule;
 
-pub use mission::{known_mission_paths, mission_toml_with, mission_value_of, mission_with, truth_with};
-pub use names::known_paths;
+pub use mission::{
+    is_whole_in_mission, known_mission_paths, mission_toml_with, mission_value_of, mission_with, truth_with,
+};
+pub use names::{is_whole, known_paths};
 pub use schedule::Schedule;
 
-use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
 use flight::profile::{Profile, ProfileError};
+
+use self::names::Names;
 
 /// A value for one key of the profile.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +56,12 @@ pub enum SettingError {
         given: String,
         /// The keys in it.
         keys: Vec<String>,
+    },
+    /// A fraction where a whole number is asked for.
+    #[error("setting `{given}`: must be a whole number")]
+    NotWhole {
+        /// What was given.
+        given: String,
     },
     /// The log's profile or a settings file is not TOML.
     #[error("{origin}: {reason}")]
@@ -150,22 +159,16 @@ pub fn profile_toml_with(profile_toml: &str, settings: &[Setting]) -> Result<Str
         return Ok(profile_toml.to_owned());
     }
     let mut table = parsed_table(profile_toml, "profile.toml")?;
-    set(&mut table, settings, known_paths())?;
+    set(&mut table, settings, Names::of::<Profile>(""))?;
     text_of(&table)
 }
 
 /// Puts settings into a table, if each is a known name or in it already.
-fn set(
-    table: &mut toml::Table,
-    settings: &[Setting],
-    mut known: BTreeSet<String>,
-) -> Result<(), SettingError> {
-    collect_leaves("", table, &mut |path, _| {
-        known.insert(path);
-    });
+fn set(table: &mut toml::Table, settings: &[Setting], names: Names) -> Result<(), SettingError> {
+    let names = names.with_those_in(table);
     for setting in settings {
-        names::check(&setting.path, &known)?;
-        insert(table, &setting.path, setting.value.clone());
+        names.check(&setting.path)?;
+        insert(table, &setting.path, names.value_of(setting)?);
     }
     Ok(())
 }

@@ -11,26 +11,88 @@ use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
 
-use super::SettingError;
+use super::{Setting, SettingError, collect_leaves, parsed_table};
 
 /// The placeholder for what may be a name or a table: a mission's airframe.
 const NAME_OR_TABLE: &str = "mk2";
 
 /// Every key that a profile may have, as in `nmpc.weights.w`.
 pub fn known_paths() -> BTreeSet<String> {
-    paths_of::<Profile>("")
+    Names::of::<Profile>("").paths
 }
 
-/// Every key that a type may have, behind a prefix.
-pub(super) fn paths_of<'de, T: Deserialize<'de>>(prefix: &str) -> BTreeSet<String> {
-    let paths = RefCell::default();
-    // Placeholders may not make a value of every type; what was noted until then stays.
-    let _ = T::deserialize(Walker { path: prefix.to_owned(), paths: &paths });
-    paths.into_inner()
+/// Whether a key of a profile takes whole numbers only.
+///
+/// # Errors
+/// The name is unknown, or the text is not TOML.
+pub fn is_whole(profile_toml: &str, path: &str) -> Result<bool, SettingError> {
+    let table = parsed_table(profile_toml, "profile.toml")?;
+    let names = Names::of::<Profile>("").with_those_in(&table);
+    names.check(path)?;
+    Ok(names.is_whole(path))
+}
+
+/// The keys that a type may have.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Names {
+    /// All of them.
+    pub(super) paths: BTreeSet<String>,
+    /// Those that take whole numbers.
+    whole: BTreeSet<String>,
+}
+
+impl Names {
+    /// The keys that a type may have, behind a prefix.
+    pub(super) fn of<'de, T: Deserialize<'de>>(prefix: &str) -> Self {
+        let names = RefCell::default();
+        // Placeholders may not make a value of every type; what was noted until then stays.
+        let _ = T::deserialize(Walker { path: prefix.to_owned(), names: &names });
+        names.into_inner()
+    }
+
+    /// Those of another type too.
+    pub(super) fn and(mut self, other: Self) -> Self {
+        self.paths.extend(other.paths);
+        self.whole.extend(other.whole);
+        self
+    }
+
+    /// With those that a table has already.
+    pub(super) fn with_those_in(mut self, table: &toml::Table) -> Self {
+        collect_leaves("", table, &mut |path, _| {
+            self.paths.insert(path);
+        });
+        self
+    }
+
+    /// Refuses a name that is none of them, with the nearest.
+    pub(super) fn check(&self, given: &str) -> Result<(), SettingError> {
+        check(given, &self.paths)
+    }
+
+    /// Whether a key takes whole numbers.
+    pub(super) fn is_whole(&self, path: &str) -> bool {
+        self.whole.contains(path)
+    }
+
+    /// The value of a setting as its key takes it: a range's `10.0` is meant as `10` where a whole number is asked for.
+    pub(super) fn value_of(&self, setting: &Setting) -> Result<toml::Value, SettingError> {
+        match setting.value {
+            toml::Value::Float(number) if self.is_whole(&setting.path) => {
+                let whole = libm::trunc(number) as i64;
+                if (whole as f64).to_bits() == number.to_bits() {
+                    Ok(toml::Value::Integer(whole))
+                } else {
+                    Err(SettingError::NotWhole { given: setting.to_string() })
+                }
+            }
+            _ => Ok(setting.value.clone()),
+        }
+    }
 }
 
 /// Refuses a name that is none of the known, with the nearest.
-pub(super) fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
+fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
     if known.contains(given) {
         return Ok(());
     }
@@ -48,20 +110,25 @@ pub(super) fn check(given: &str, known: &BTreeSet<String>) -> Result<(), Setting
 /// Answers every request with a placeholder and notes where it was asked.
 struct Walker<'a> {
     path: String,
-    paths: &'a RefCell<BTreeSet<String>>,
+    names: &'a RefCell<Names>,
 }
 
 impl Walker<'_> {
     fn note(&self) {
-        self.paths.borrow_mut().insert(self.path.clone());
+        self.names.borrow_mut().paths.insert(self.path.clone());
+    }
+
+    fn note_whole(&self) {
+        self.note();
+        self.names.borrow_mut().whole.insert(self.path.clone());
     }
 }
 
 /// Number methods: note the place, give nought.
 macro_rules! numbers {
-    ($($method:ident $visit:ident $nought:expr),* $(,)?) => {
+    ($note:ident: $($method:ident $visit:ident $nought:expr),* $(,)?) => {
         $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-            self.note();
+            self.$note();
             visitor.$visit($nought)
         })*
     };
@@ -70,8 +137,7 @@ macro_rules! numbers {
 impl<'de> Deserializer<'de> for Walker<'_> {
     type Error = Error;
 
-    numbers! {
-        deserialize_bool visit_bool false,
+    numbers! { note_whole:
         deserialize_i8 visit_i8 0,
         deserialize_i16 visit_i16 0,
         deserialize_i32 visit_i32 0,
@@ -80,6 +146,10 @@ impl<'de> Deserializer<'de> for Walker<'_> {
         deserialize_u16 visit_u16 0,
         deserialize_u32 visit_u32 0,
         deserialize_u64 visit_u64 0,
+    }
+
+    numbers! { note:
+        deserialize_bool visit_bool false,
         deserialize_f32 visit_f32 0.0,
         deserialize_f64 visit_f64 0.0,
         deserialize_char visit_char ' ',
@@ -195,7 +265,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
         let name = self.next.unwrap_or_default();
         let above = &self.walker.path;
         let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
-        seed.deserialize(Walker { path, paths: self.walker.paths })
+        seed.deserialize(Walker { path, names: self.walker.names })
     }
 }
 
@@ -209,7 +279,7 @@ mod tests {
         let known = known_paths();
         for (name, text) in flight::profile::BUILTIN {
             let table = text.parse::<toml::Table>().unwrap();
-            super::super::collect_leaves("", &table, &mut |path, _| {
+            collect_leaves("", &table, &mut |path, _| {
                 assert!(known.contains(&path), "{name}: {path}");
             });
         }
@@ -218,5 +288,17 @@ mod tests {
             assert!(known.contains(optional), "{optional}");
         }
         assert!(!known.contains("nmpc.weights"), "a section is no key");
+    }
+
+    #[test]
+    fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
+        let text = Profile::builtin_toml("paper-calibrated").unwrap();
+        let with = |given: &str| super::super::profile_with(text, &[given.parse().unwrap()]);
+        assert_eq!(with("nmpc.horizon_steps=12.0").unwrap().nmpc.horizon_steps, 12);
+        let refusal = with("nmpc.horizon_steps=12.5").unwrap_err().to_string();
+        assert_eq!(refusal, "setting `nmpc.horizon_steps=12.5`: must be a whole number");
+        assert!(is_whole(text, "nmpc.horizon_steps").unwrap());
+        assert!(!is_whole(text, "nmpc.weights.w").unwrap());
+        assert!(is_whole(text, "nmpc.horizon_step").is_err());
     }
 }

@@ -75,6 +75,8 @@ pub struct BisectReport {
     pub kind: &'static str,
     /// The flight.
     pub file: String,
+    /// Whether this build, with nothing changed, flies it as recorded.
+    pub reproduced: bool,
     /// The setting.
     pub path: String,
     /// Whether it is changed for the plant alone.
@@ -108,6 +110,8 @@ impl BisectReport {
 pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectReport, BisectError> {
     let path = &options.path;
     let prepared = Prepared::new(flight, &options.refly)?;
+    let is_whole = prepared.is_whole(path)?;
+    let reproduced = prepared.is_reproduced(&options.refly)?;
     let value = match options.value {
         Some(value) => value,
         None => prepared.number_of(path).ok_or_else(|| BisectError::NoValue { path: path.clone() })?,
@@ -116,14 +120,16 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
     if !(from..=to).contains(&value) {
         return Err(BisectError::Outside { path: path.clone(), value, from, to });
     }
-    let mut search = Search { flight: prepared, options, flown: 0 };
+    let mut search = Search { flight: prepared, options, is_whole, flown: 0 };
     let outcome = search.fly(value)?;
     let below = search.first_flip(value, from, outcome)?;
     let above = search.first_flip(value, to, outcome)?;
-    let step = |end: f64| (end - value).abs() / f64::from(options.steps.max(1));
+    let finest = if is_whole { 1.0 } else { 0.0 };
+    let step = |end: f64| f64::max((end - value).abs() / f64::from(options.steps.max(1)), finest);
     Ok(BisectReport {
         kind: "closed loop: flown again in simulation",
         file: flight.name.clone(),
+        reproduced,
         path: path.clone(),
         plant_alone: options.plant_alone,
         value,
@@ -138,6 +144,7 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
 struct Search<'a> {
     flight: Prepared<'a>,
     options: &'a BisectOptions,
+    is_whole: bool,
     flown: usize,
 }
 
@@ -160,6 +167,11 @@ impl Search<'_> {
         })
     }
 
+    /// So far on from `value`; of whole numbers the one before it.
+    fn onward(&self, value: f64, by: f64) -> f64 {
+        value + if self.is_whole { libm::trunc(by) } else { by }
+    }
+
     /// Steps from `value` towards `end` until the verdict is another, then halves the last step.
     fn first_flip(
         &mut self,
@@ -170,9 +182,9 @@ impl Search<'_> {
         let steps = self.options.steps.max(1);
         let mut same_at = value;
         for step in 1..=steps {
-            let tried = value + (end - value) * f64::from(step) / f64::from(steps);
-            if tried.to_bits() == value.to_bits() {
-                return Ok(None);
+            let tried = self.onward(value, (end - value) * f64::from(step) / f64::from(steps));
+            if tried.to_bits() == same_at.to_bits() {
+                continue;
             }
             let found = self.fly(tried)?;
             if found.landed == outcome.landed {
@@ -181,7 +193,7 @@ impl Search<'_> {
             }
             let (mut other_at, mut other) = (tried, found);
             for _ in 0..HALVINGS {
-                let middle = 0.5 * (same_at + other_at);
+                let middle = self.onward(same_at, 0.5 * (other_at - same_at));
                 if middle.to_bits() == same_at.to_bits() || middle.to_bits() == other_at.to_bits() {
                     break;
                 }

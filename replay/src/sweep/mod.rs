@@ -68,17 +68,19 @@ pub struct SweepReport {
     pub kind: &'static str,
     /// The flights.
     pub flights: Vec<String>,
+    /// Of the flights that this run flew: those that this build, with nothing changed, does not fly as recorded.
+    pub not_reproduced: Vec<String>,
     /// The points, the best first.
     pub points: Vec<PointOutcome>,
 }
 
 impl SweepReport {
     /// Ranks the points: the largest worst-case margin first, then the more landings, then the order given.
-    fn ranked(flights: Vec<String>, mut points: Vec<PointOutcome>) -> Self {
+    fn ranked(flights: Vec<String>, not_reproduced: Vec<String>, mut points: Vec<PointOutcome>) -> Self {
         let margin = |point: &PointOutcome| point.worst_margin.unwrap_or(f64::NEG_INFINITY);
         points.sort_by(|a, b| {
             margin(b).total_cmp(&margin(a)).then(b.landed.cmp(&a.landed)).then(a.point.cmp(&b.point))
         });
-        Self { kind: "closed loop: flown again in simulation", flights, points }
+        Self { kind: "closed loop: flown again in simulation", flights, not_reproduced, points }
     }
 }

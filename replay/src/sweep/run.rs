@@ -52,7 +52,7 @@ pub fn sweep(
                     && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
                 {
                     // Whatever is missing was made ready.
-                    let Some(flight) = prepared.get(&(job % flights.len())) else { return };
+                    let Some(Ready { flight, .. }) = prepared.get(&(job % flights.len())) else { return };
                     let outcome = fly(flight, points, options, job / flights.len());
                     if results.send((job, outcome)).is_err() {
                         return;
@@ -88,7 +88,23 @@ pub fn sweep(
         return Err(error);
     }
     let outcomes = (0..points.len()).map(|point| point_outcome(flights, points, state, point));
-    Ok(SweepReport::ranked(flights.iter().map(|flight| flight.name.clone()).collect(), outcomes.collect()))
+    let otherwise = prepared.values().filter(|ready| !ready.is_reproduced);
+    let not_reproduced = otherwise.map(|ready| ready.flight.recording().name.clone()).collect();
+    let names = flights.iter().map(|flight| flight.name.clone()).collect();
+    Ok(SweepReport::ranked(names, not_reproduced, outcomes.collect()))
+}
+
+/// A flight made ready.
+struct Ready<'a> {
+    flight: Prepared<'a>,
+    is_reproduced: bool,
+}
+
+impl<'a> Ready<'a> {
+    fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
+        let flight = Prepared::new(recording, options)?;
+        Ok(Self { is_reproduced: flight.is_reproduced(options)?, flight })
+    }
 }
 
 /// Every flight that a missing job needs, made ready, `jobs` at a time: to fly one up to its start may take as long as the
@@ -98,18 +114,18 @@ fn prepare<'a>(
     missing: &[usize],
     options: &ReflyOptions,
     jobs: NonZeroUsize,
-) -> Result<BTreeMap<usize, Prepared<'a>>, SweepError> {
+) -> Result<BTreeMap<usize, Ready<'a>>, SweepError> {
     let needed: BTreeSet<usize> = missing.iter().map(|job| job % flights.len()).collect();
     let needed: Vec<usize> = needed.into_iter().collect();
     let next = AtomicUsize::new(0);
     let work = || {
         let mut prepared = Vec::new();
         while let Some(place) = needed.get(next.fetch_add(1, Ordering::Relaxed)) {
-            prepared.push((*place, Prepared::new(&flights[*place], options)));
+            prepared.push((*place, Ready::new(&flights[*place], options)));
         }
         prepared
     };
-    let prepared: BTreeMap<usize, Result<Prepared, ReflyError>> = std::thread::scope(|scope| {
+    let prepared: BTreeMap<usize, Result<Ready, ReflyError>> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..jobs.get().min(needed.len())).map(|_| scope.spawn(work)).collect();
         let joined =
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));

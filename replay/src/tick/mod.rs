@@ -13,6 +13,7 @@ use tick_log::pilot::PilotLogError;
 
 use crate::controller::{FrameError, PilotStartError};
 use crate::log::{Recording, RecordingError};
+use crate::settings::SettingError;
 
 /// A condition or limit closer than this to being broken is active, in its own unit (m, rad, m/s or rad/s).
 const ACTIVE: f64 = 1e-4;
@@ -26,6 +27,9 @@ pub enum TickError {
     /// The log has not what it takes.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The log names settings that this build does not have.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A recorded input has no meaning in this build.
     #[error(transparent)]
     Input(#[from] TickLogError),

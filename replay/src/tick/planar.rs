@@ -20,7 +20,8 @@ pub(super) fn tick(recording: &Recording, number: u64) -> Result<TickReport, Tic
             last: ticks.len() as u64 - 1,
         }
     })?;
-    let mut controller = LoggedController::new(&profile);
+    let mut controller =
+        LoggedController::recorded(&profile, recording.profile_toml()?, &recording.head.run)?;
     for before in ticks.iter().take(place) {
         controller.run_again(before)?;
     }

@@ -79,8 +79,8 @@ pub fn verify_log<R: Read>(
                     continue;
                 }
                 if verifier.is_none() {
-                    match profile_of(log, &whole_head)? {
-                        Ok(profile) => verifier = Some(Verifier::new(LoggedController::new(&profile))),
+                    match controller_of(log, &whole_head)? {
+                        Ok(controller) => verifier = Some(Verifier::new(controller)),
                         Err(obstacle) => found.obstacle = Some(obstacle),
                     }
                 }
@@ -184,13 +184,16 @@ impl Found {
     }
 }
 
-fn profile_of<R: Read>(
+fn controller_of<R: Read>(
     log: &FlightLog<R>,
     whole_head: &impl Fn() -> Result<Head, LogError>,
-) -> Result<Result<Profile, Obstacle>, LogError> {
+) -> Result<Result<LoggedController, Obstacle>, LogError> {
     Ok(text_of(log, whole_head)?.and_then(|text| {
-        Profile::from_toml(&text, "profile.toml")
-            .map_err(|error| Obstacle::ProfileUnreadable { reason: error.to_string() })
+        let unreadable = |reason: String| Obstacle::ProfileUnreadable { reason };
+        let profile =
+            Profile::from_toml(&text, "profile.toml").map_err(|error| unreadable(error.to_string()))?;
+        LoggedController::recorded(&profile, &text, &log.head().run)
+            .map_err(|error| unreadable(error.to_string()))
     }))
 }
 

@@ -264,6 +264,9 @@ fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
     let report = bisect(&recording, &options).unwrap();
     let drawn = refly(&recording, &ReflyOptions::default()).unwrap().thrust_scale;
     assert_eq!((report.value.to_bits(), report.outcome.landed), (drawn.to_bits(), true));
+    let misnamed = BisectOptions { path: "truth.impulse_scales".to_owned(), ..options.clone() };
+    let refusal = bisect(&recording, &misnamed).unwrap_err().to_string();
+    assert!(refusal.contains("did you mean `truth.impulse_scale`?"), "{refusal}");
     let flip = report.below.unwrap();
     let prepared = Prepared::new(&recording, &ReflyOptions::default()).unwrap();
     let landed = |scale: f64| {

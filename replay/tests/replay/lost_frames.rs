@@ -16,7 +16,7 @@ use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
 
 /// The landed flight's log, with a bit turned in a chunk in its middle, recovered.
-static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
+pub(crate) static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
     let (damaged, recovered) = (LANDED.beside("damaged.mcap"), LANDED.beside("recovered.mcap"));
     let mut bytes = std::fs::read(&LANDED.log).unwrap();
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;

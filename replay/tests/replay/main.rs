@@ -1,6 +1,7 @@
 //! Logs of a flown landing, whole, changed, cut and broken, through the library and through the command.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+mod another_build;
 mod apogee;
 mod asked;
 mod command_line;
@@ -19,8 +20,10 @@ mod pilot;
 mod plain_answers;
 mod planned_paths;
 mod recovery;
+mod reflown_logs;
 mod resumed_sweep;
 mod simulated;
 mod solve_times;
 mod tables;
 mod what_if;
+mod whole_numbers;

@@ -121,6 +121,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
     for (name, options) in [
         ("same.mcap", ReflyOptions::default()),
         ("weights.mcap", with(&["nmpc.weights.w=120", "nmpc.weights.q=60"])),
+        ("timed.mcap", with(&["nmpc.weights.w=120@8.0", "nmpc.weights.q=60"])),
         ("late.mcap", ReflyOptions { start: StartAt::Tick(30), ..ReflyOptions::default() }),
     ] {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
@@ -131,6 +132,12 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         assert_eq!(verified.ticks_identical as usize, flown.before.len() + flown.ticks.len());
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict);
+        assert_eq!(evaluate(&again, &[]).unwrap().unchanged_different, 0, "{name}");
+        assert!(tick(&again, 40).unwrap().identical, "{name}");
+        // Flown again as it is, it is the same once more, with what was changed on its way.
+        let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
+        let once_more = refly_flight(&again, &unchanged).unwrap().1;
+        assert_eq!(once_more.verdict, flown.verdict, "{name}");
         assert!(write_log(&path, &recording, &options, &report, &flown).is_err(), "never overwritten");
     }
 }
@@ -234,8 +241,14 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
     assert!(landed(flip.same_at) && !landed(flip.other_at));
     let outside = BisectOptions { value: Some(2.0), ..options.clone() };
     assert!(bisect(&recording, &outside).unwrap_err().to_string().contains("does not lie between"));
-    let unknown = BisectOptions { value: None, path: "plant.nothing".to_owned(), ..options };
-    assert!(bisect(&recording, &unknown).unwrap_err().to_string().contains("--value"));
+    let refused = |path: &str| {
+        let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
+        bisect(&recording, &options).unwrap_err().to_string()
+    };
+    // A name that the profile leaves out, and one that no profile has.
+    assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));
+    let unknown = refused("nmpc.wieghts.w");
+    assert!(unknown.contains("did you mean `nmpc.weights.w`?"), "{unknown}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use onboard_sim::from_apogee;
 use prost::Message as _;
 use protocol::log::flight_v1;
 use protocol::log::record::Record;
-use tick_log::pilot::tick_to_log;
+use tick_log::pilot::{state_to_log, tick_to_log};
 use world::Truth;
 use world::sensors::FRAME_S;
 
@@ -113,6 +113,11 @@ impl<'a> AtStart<'a> {
         &self.truth
     }
 
+    /// How far the recorded frames before the start were the same.
+    pub(super) fn reached(&self) -> Reached {
+        self.reached
+    }
+
     /// Flies on; what happens is kept if there is a place for it.
     pub(super) fn fly(
         &self,
@@ -138,10 +143,9 @@ impl<'a> AtStart<'a> {
                 }
             }
             if let Some(kept) = &mut kept {
-                let time_s = flight.frame() as f64 * FRAME_S;
-                kept.extend(from_apogee::frame(flight, phase).into_iter().map(|record| (time_s, record)));
+                keep(kept, &rerun, phase);
             }
-            phase = flight.pilot().mode().phase;
+            phase = rerun.flight.pilot().mode().phase;
             if !goes_on {
                 break;
             }
@@ -160,14 +164,21 @@ impl<'a> AtStart<'a> {
         Ok((report, verdict))
     }
 
-    /// Flies on and keeps everything, behind what was recorded up to the start.
+    /// Flies on and keeps everything, from apogee on. What comes before the start is kept as it was flown again too: its
+    /// recorded frames may be of another build, or lost in part, and would not run on into these.
     pub(super) fn fly_kept(
         &self,
         options: &ReflyOptions,
     ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-        let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(*self.pilot_start)))];
-        let before = self.frames.iter().take_while(|tick| tick.input.frame < self.first_frame);
-        records.extend(before.map(|tick| (tick.input.time_s, Record::PilotTick(Box::new(tick.clone())))));
+        let Recipe { mut rerun, .. } = Recipe::of(self.recording)?;
+        let believed = state_to_log(rerun.flight.believed_at_apogee());
+        let start = flight_v1::PilotStart { believed, ..*self.pilot_start };
+        let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
+        let mut phase = rerun.flight.pilot().mode().phase;
+        while rerun.flight.frame() + 1 < self.first_frame && rerun.step()? {
+            keep(&mut records, &rerun, phase);
+            phase = rerun.flight.pilot().mode().phase;
+        }
         let (report, verdict) = self.fly(options, Some(&mut records))?;
         let run = self.run_facts(options)?;
         Ok((report, ReflownFlight { records, run, verdict, ..ReflownFlight::default() }))
@@ -179,12 +190,17 @@ impl<'a> AtStart<'a> {
         Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
     }
 
-    /// The settings as timed ones, those that hold from the start on half a frame before its first frame's end; with the
-    /// height that another controller of the landing burn lights at, if one is asked for.
+    /// The settings as timed ones: none holds before the start, half a frame before its first frame's end, since until
+    /// then the flight is the recorded one. With the height that another controller of the landing burn lights at, if one
+    /// is asked for.
     fn in_flight(&self, options: &ReflyOptions) -> Result<Vec<Setting>, ReflyError> {
         let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
-        let timed = |setting: &Setting| Setting { at_s: setting.at_s.or(Some(start_s)), ..setting.clone() };
-        let mut in_flight: Vec<Setting> = options.settings.iter().map(timed).collect();
+        let mut in_flight = options.settings.clone();
+        // Of two that begin to hold at the start the later one wins, as it would have on its way there.
+        in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
+        for setting in &mut in_flight {
+            setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
+        }
         if let Some(controller) = self.other_controller(options)? {
             let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
             let fixed_m = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
@@ -265,6 +281,12 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
         return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
     }
     Ok(())
+}
+
+/// Keeps the frame just flown; `phase` is that before it.
+fn keep(kept: &mut Kept, rerun: &Rerun, phase: Phase) {
+    let time_s = rerun.flight.frame() as f64 * FRAME_S;
+    kept.extend(from_apogee::frame(&rerun.flight, phase).into_iter().map(|record| (time_s, record)));
 }
 
 /// The settings without a time.

@@ -1,0 +1,93 @@
+//! Logs that this build does not give: every question says so, lest its answer be put down to the settings.
+
+use std::num::NonZeroUsize;
+
+use replay::evaluate::evaluate;
+use replay::log::Recording;
+use replay::print::{print_bisect, print_evaluate, print_sweep};
+use replay::refly::ReflyOptions;
+use replay::sweep::{BisectOptions, State, SweepReport, bisect, grid, sweep};
+
+use crate::asked::settings;
+use crate::from_apogee::LANDED;
+use crate::simulated::NOMINAL;
+
+/// What a report says in words.
+fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
+    let mut output = Vec::new();
+    print(&mut output).unwrap();
+    String::from_utf8(output).unwrap()
+}
+
+/// The landing with two commands that this build does not give.
+fn forged() -> Recording {
+    let mut recording = NOMINAL.recording();
+    for place in [20, 30] {
+        recording.ticks[place].output.gimbal_command_rad += 0.01;
+    }
+    recording
+}
+
+#[test]
+fn an_evaluation_counts_what_is_the_builds() {
+    let forged = forged();
+    let said = format!("with nothing changed this build decides 2 of {} ticks otherwise", forged.ticks.len());
+    for given in [&[][..], &["nmpc.weights.w=120"]] {
+        let report = evaluate(&forged, &settings(given)).unwrap();
+        assert_eq!(report.unchanged_different, 2, "{given:?}");
+        let text = words(|output| print_evaluate(&report, output));
+        assert!(text.contains(&said), "{text}");
+    }
+    let own = evaluate(&NOMINAL.recording(), &settings(&["nmpc.weights.w=120"])).unwrap();
+    assert!(own.unchanged_different == 0 && own.commands_different > 0);
+    assert!(!words(|output| print_evaluate(&own, output)).contains("with nothing changed"));
+    // The same of a flight computer.
+    let mut flight = Recording::open(&LANDED.log).unwrap();
+    flight.frames[50].output.fins_rad[0] += 0.01;
+    assert_eq!(evaluate(&flight, &[]).unwrap().unchanged_different, 1);
+}
+
+fn swept(flights: &[Recording]) -> SweepReport {
+    let points = grid(&["nmpc.weights.w=110".parse().unwrap()], &[]).unwrap();
+    let mut state = State::in_memory(flights.len());
+    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut state, &mut |_| {}).unwrap()
+}
+
+#[test]
+fn a_sweep_names_the_flights_that_are_not_reproduced() {
+    let other = Recording { name: "other.mcap".to_owned(), ..forged() };
+    let report = swept(&[NOMINAL.recording(), other]);
+    assert_eq!(report.not_reproduced, ["other.mcap"]);
+    let text = words(|output| print_sweep(&report, 1, output));
+    assert!(
+        text.contains("other.mcap: with nothing changed this build does not fly it as recorded"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_bisection_says_when_the_flight_is_not_reproduced() {
+    let options = BisectOptions {
+        path: "plant.thrust_scale".to_owned(),
+        plant_alone: true,
+        value: Some(1.0),
+        from: 0.99,
+        to: 1.01,
+        steps: 1,
+        refly: ReflyOptions::default(),
+    };
+    for (flight, is_own) in [(NOMINAL.recording(), true), (forged(), false)] {
+        let report = bisect(&flight, &options).unwrap();
+        assert_eq!(report.reproduced, is_own);
+        let text = words(|output| print_bisect(&report, output));
+        assert_eq!(text.contains("does not fly it as recorded"), !is_own, "{text}");
+    }
+    // Of a flight from apogee a frame before the start tells, and one behind it.
+    let options = BisectOptions { path: "truth.impulse_scale".to_owned(), ..options };
+    let whole = Recording::open(&LANDED.log).unwrap();
+    for place in [99, whole.frames.len() - 300] {
+        let mut flight = whole.clone();
+        flight.frames[place].output.gimbal_rad[0] += 0.01;
+        assert!(!bisect(&flight, &options).unwrap().reproduced, "{place}");
+    }
+}
