@@ -15,6 +15,10 @@ use crate::demo::Speed;
 use crate::exit;
 use crate::model::words;
 
+/// What is flown when no link is named and nothing else is said.
+const DEMO_PROFILE: &str = "paper-calibrated";
+const DEMO_SEED: u64 = 1;
+
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
 /// Without --connect it flies a demonstration: a simulated vehicle in this process, on real MAVLink over a
@@ -46,14 +50,14 @@ pub struct Cli {
     #[arg(
         long,
         value_name = "NAME|FILE",
-        default_value = "paper-calibrated",
+        default_value = DEMO_PROFILE,
         conflicts_with = "connect",
         global = true
     )]
     pub profile: String,
 
     /// Demonstration: seed of the profile's dispersions.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1, conflicts_with = "connect", global = true)]
+    #[arg(long, value_name = "NUMBER", default_value_t = DEMO_SEED, conflicts_with = "connect", global = true)]
     pub seed: u64,
 
     /// Demonstration: speed of simulated time, a factor or `max`.
@@ -221,6 +225,14 @@ impl Cli {
         self.socket.clone().unwrap_or_else(place::default_path)
     }
 
+    /// Whether a demonstration is described, which no link and no station that runs already can be meant by.
+    pub fn describes_demonstration(&self) -> bool {
+        let replayed = self.replay.is_some() || matches!(self.command, Some(Command::Attach { .. }));
+        let described =
+            self.profile != DEMO_PROFILE || self.seed != DEMO_SEED || self.speed != Speed::Factor(1.0);
+        described && !replayed
+    }
+
     /// Whether the flight is started without a hand.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
         self.auto || (self.connect.is_empty() && !interactive)
@@ -269,6 +281,11 @@ mod tests {
 
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself_and_an_attached_ground_only_watches() {
+        let describes =
+            |arguments: &[&str]| Cli::try_parse_from(arguments).unwrap().describes_demonstration();
+        assert!(!describes(&["ground"]) && !describes(&["ground", "attach"]));
+        assert!(describes(&["ground", "--profile", "mk2"]) && describes(&["ground", "--seed", "3"]));
+        assert!(!describes(&["ground", "--connect", "udpin:0.0.0.0:14550"]));
         let demo = Cli::try_parse_from(["ground"]).unwrap();
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
         let attached = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();

@@ -55,8 +55,6 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
-    // An abort that no station took.
-    let mut abort_unsent = false;
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -84,6 +82,8 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                     take_live(&mut model, told, at)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
+                    // An abort that waits for its answer must not die with the station that repeats it.
+                    model.link.abort_unsent |= !watch && model.commands.is_aborting();
                     // Cut off while it told the past, it tells no more of it.
                     model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
@@ -93,15 +93,15 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             () = clock.sleep_until(look_again_at) => {
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
                 if let Ok(mut found) = Link::open(path, watch).await {
-                    if abort_unsent {
-                        abort_unsent = !found.ask(&Asked::Command(CommandKind::Abort)).await;
-                    }
+                    let abort_unsent = model.link.abort_unsent
+                        && !found.ask(&Asked::Command(CommandKind::Abort)).await;
                     link = found;
                     // Another station: another clock, another history.
                     times = Times::default();
                     let pages = model.pages;
                     model = Model::new(settings(&Hello::default(), watch));
                     model.pages = pages;
+                    model.link.abort_unsent = abort_unsent;
                     model.repeats_told = output.tells_repeats();
                     output.begin_anew();
                     look_again_at = None;
@@ -116,7 +116,6 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             match action {
                 Action::Request(asked) => {
                     if !link.ask(&asked).await {
-                        abort_unsent |= asked == Asked::Command(CommandKind::Abort);
                         unsent(&mut model, &asked, times.theirs(clock.now()));
                     }
                 }
@@ -145,7 +144,7 @@ fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
     let text = match asked {
         Asked::Command(CommandKind::Abort) => {
             // Stands in the alarm line of every screen till there is a station.
-            model.link.trouble = Some("ABORT NOT SENT, no station; asked again".to_owned());
+            model.link.abort_unsent = true;
             "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
         }
         Asked::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),

@@ -53,6 +53,10 @@ impl Lines {
 
 /// The last words: the verdict limit by limit, and where the log is.
 pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBuf>, &RecorderError>) {
+    if interactive && !super::paper::wait_for_end() {
+        // A terminal that takes nothing would hold the program, its port and its line for ever.
+        return;
+    }
     let mut text = String::new();
     match model.vehicle.verdict {
         Some(verdict) => text.push_str(&verdict_table(&verdict.value, model.vehicle.limits.as_ref())),

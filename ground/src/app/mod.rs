@@ -52,8 +52,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     }
     let config = Config::load(cli.config.as_deref())?.overridden_by(cli);
     // Who names a link means that link, not the station that may run already.
-    let may_attach = cli.connect.is_empty() && !cli.demo;
     let mut cli = cli.clone();
+    cli.demo |= cli.describes_demonstration();
+    let may_attach = cli.connect.is_empty() && !cli.demo;
     config.fill(&mut cli);
     let (cli, config) = (&cli, &config);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");

@@ -18,9 +18,13 @@ pub fn config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
         ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
         ConfigCommand::Check => {
             let config = Config::load(cli.config.as_deref())?;
-            let usual = usual_path().map_or_else(|| "none".to_owned(), |path| path.display().to_string());
-            let from = cli.config.as_ref().map_or(usual, |path| path.display().to_string());
-            print(format!("{from}: understood\n{config:#?}\n").as_bytes())?;
+            let file = cli.config.clone().or_else(usual_path);
+            let said = match file {
+                Some(path) if path.exists() => format!("{}: understood", path.display()),
+                Some(path) => format!("{}: there is no such file; these are the defaults", path.display()),
+                None => "no settings file; these are the defaults".to_owned(),
+            };
+            print(format!("{said}\n{config:#?}\n").as_bytes())?;
         }
     }
     Ok(Exit::Landed)

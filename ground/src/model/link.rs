@@ -77,6 +77,8 @@ pub struct Link {
     pub send_drops: u64,
     /// Why the transport does not work, if it does not.
     pub trouble: Option<String>,
+    /// An abort was asked for, and no station has it: a screen without one asks the next.
+    pub abort_unsent: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
     /// The last heartbeat of the vehicle.

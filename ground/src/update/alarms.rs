@@ -37,6 +37,10 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
+    if model.link.abort_unsent {
+        let text = "ABORT NOT SENT, no station; asked again".to_owned();
+        found.push((AlarmKind::Unanswered(CommandKind::Abort), text));
+    }
     if model.log.failed {
         found.push((AlarmKind::Log, "LOG FAILED: nothing more is recorded".to_owned()));
     } else if model.log.dropped > 0 {

@@ -159,6 +159,7 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
             model.commands.abort_again_at = Some(now + ANSWER_TIMEOUT);
             if let Some(track) = model.commands.tracks.iter_mut().find(|track| track.kind == kind) {
                 track.acknowledged = Acknowledged::Waiting;
+                track.acknowledged_at = None;
             }
         }
         _ => {}

@@ -33,6 +33,8 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         return model.info(now, why);
     }
     if key == Key::CtrlX {
+        // An Enter that comes too late for the abort must not start or arm what was offered before.
+        model.dialog = Dialog::Closed;
         // Where the terminal tells repeats apart, a second Ctrl-X was pressed, however soon it came.
         if model.repeats_told && model.abort_chord.confirm(now) {
             abort(model, now);

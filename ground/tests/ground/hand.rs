@@ -98,6 +98,38 @@ fn opened(opening: &[Key]) -> Bench {
 }
 
 #[test]
+fn an_abort_that_is_confirmed_too_late_neither_starts_nor_arms() {
+    for opening in [vec![Key::Char('S')], typed("AARM"), vec![Key::Char('D')]] {
+        let mut bench = opened(&opening);
+        bench.key(Key::CtrlX);
+        bench.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.1);
+        bench.key(Key::Enter);
+        assert!(bench.take_commands().is_empty(), "{opening:?}");
+        assert_eq!(bench.model.dialog, Dialog::Closed);
+    }
+}
+
+#[test]
+fn in_every_phase_the_chord_sends_an_abort_and_the_ladder_arms_on_the_pad_alone() {
+    for phase in (0..).map_while(ground::model::telemetry::phase_from_number) {
+        let mut bench = Bench::crewed();
+        bench.phase = phase;
+        bench.run(1.0);
+        bench.take_commands();
+        bench.keys(&ladder());
+        let on_pad = ground::model::vehicle::is_on_pad(phase);
+        assert_eq!(bench.take_commands().iter().any(is_arm), on_pad, "{phase:?}");
+        let mut bench = Bench::crewed();
+        bench.phase = phase;
+        bench.run(1.0);
+        bench.take_commands();
+        bench.keys(&[Key::CtrlX, Key::Enter]);
+        let sent = bench.take_commands();
+        assert!(sent.len() == 1 && is_abort(&sent[0]), "{phase:?}: {sent:?}");
+    }
+}
+
+#[test]
 fn ctrl_x_and_enter_abort_at_once_from_every_dialog_and_close_it() {
     for opening in OPENINGS {
         let mut bench = opened(opening);

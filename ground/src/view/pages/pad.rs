@@ -79,10 +79,15 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             let name = words::lower_case(&NameOf(name), "TD_CHECK_");
             let failing = status.is_some_and(|status| status.value.checks_failed.contains(bit));
             let reason = if failing { why(bit) } else { "" };
+            let passing = status.is_some() && !failing;
+            let found = match found(&model.vehicle, bit) {
+                none if none.is_empty() && passing => holds(bit).to_owned(),
+                found => found,
+            };
             Line::from(vec![
                 Span::styled(word, theme.style(role)),
                 Span::styled(format!("{mark}{name:<19.19}"), theme.style(Role::Plain)),
-                Span::styled(format!("{:>10} ", found(&model.vehicle, bit)), theme.style(Role::Plain)),
+                Span::styled(format!("{found:>10} "), theme.style(Role::Plain)),
                 Span::styled(reason, theme.style(Role::Caution)),
             ])
         })
@@ -145,6 +150,18 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
             prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
         }),
         _ => String::new(),
+    }
+}
+
+/// What a passing check says that telemetry has no number for.
+fn holds(check: TdCheck) -> &'static str {
+    match check {
+        TdCheck::TD_CHECK_SELF_TEST => "passed",
+        TdCheck::TD_CHECK_ESTIMATOR => "settled",
+        TdCheck::TD_CHECK_IGNITER => "closed",
+        TdCheck::TD_CHECK_LOG => "running",
+        TdCheck::TD_CHECK_LOG_SPACE => "enough",
+        _ => "",
     }
 }
 
