@@ -6,9 +6,9 @@
 use crate::memory::remembers;
 
 /// A fin that has moved by this much lives, rad.
-const MOVED_RAD: f64 = 0.03;
-/// Farther than this from where it is, a fin that lives goes where it is told at once, rad.
-const FAR_RAD: f64 = 0.2;
+const MOVED_RAD: f64 = 0.015;
+/// Farther than this from where it is, a fin that lives goes where it is told at once, rad: as far as the gate allows.
+const FAR_RAD: f64 = super::fly::FIN_THERE_RAD;
 /// Told to be far away for so long altogether without having moved, it is stuck, s.
 const STUCK_AFTER_S: f64 = 0.25;
 

@@ -19,7 +19,7 @@ use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// A fin that is farther than this from its command is not there, rad.
-const FIN_THERE_RAD: f64 = 0.1;
+pub(super) const FIN_THERE_RAD: f64 = 0.1;
 /// Less thrust than this turns nothing, N.
 const STEERING_THRUST_N: f64 = 3.0;
 

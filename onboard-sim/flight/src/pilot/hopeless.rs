@@ -35,7 +35,8 @@ impl Pilot {
         let feet_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let sinking_m_s = (-state.velocity_m_s.z).max(0.0);
         let above_commit_m = feet_m - self.outlook.commit_height_m;
-        input.time_s - since_s >= LASTS_S
+        // A stuck fin has been watched for long enough already.
+        (self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S)
             && self.outlook.commit_height_m > 0.0
             && above_commit_m > 0.0
             && above_commit_m < BEFORE_COMMIT_S * sinking_m_s
