@@ -191,9 +191,9 @@ impl Mission {
     /// The landing motor's certified thrust curve.
     ///
     /// # Errors
-    /// No built-in motor has that name.
+    /// No built-in motor has that name, or the text given in its place is that of no motor.
     pub fn motor(&self) -> Result<ThrustCurve, MissionError> {
-        Ok(motors::builtin(&self.airframe.motor)?)
+        Ok(motors::named(&self.airframe.motor)?)
     }
 }
 

@@ -24,7 +24,7 @@ pub enum MotorError {
         /// The names there are.
         known: String,
     },
-    /// The built-in file does not parse.
+    /// The file does not parse.
     #[error("motor '{name}'")]
     Unusable {
         /// The motor's name.
@@ -51,6 +51,24 @@ pub fn builtin(name: &str) -> Result<ThrustCurve, MotorError> {
         return Err(MotorError::Unknown { name: name.to_owned(), known });
     };
     ThrustCurve::from_rasp(text).map_err(|source| MotorError::Unusable { name, source })
+}
+
+/// The motor that an airframe names: a built-in one, or the text of its own file, RASP (`.eng`) or RockSim (`.rse`).
+/// With the text a mission, and the log of its flight, stand by themselves.
+///
+/// # Errors
+///
+/// There is no motor of that name, or the text is that of no motor.
+pub fn named(motor: &str) -> Result<ThrustCurve, MotorError> {
+    if !motor.contains('\n') {
+        return builtin(motor);
+    }
+    let curve = if motor.trim_start().starts_with('<') {
+        ThrustCurve::from_rocksim(motor)
+    } else {
+        ThrustCurve::from_rasp(motor)
+    };
+    curve.map_err(|source| MotorError::Unusable { name: "of the airframe", source })
 }
 
 #[cfg(test)]
@@ -89,5 +107,19 @@ mod tests {
     fn an_unknown_name_is_answered_with_the_known_ones() {
         let error = builtin("Z99").unwrap_err().to_string();
         assert_eq!(error, "no motor is named 'Z99'; these are built in: F10, F30, G12, G33, H42, H45W, H53");
+    }
+
+    #[test]
+    fn an_airframe_may_bring_its_motors_own_file() {
+        let (_, rasp) = BUILTIN.iter().find(|(name, _)| *name == "H45W").expect("built in");
+        assert_eq!(named(rasp), builtin("H45W"));
+        let rocksim = r#"<engine-database><engine-list><engine mfg="M" code="X10" dia="24" len="70" initWt="50"
+            propWt="20"><data><eng-data t="0" f="0"/><eng-data t="0.1" f="10"/><eng-data t="2" f="10"/>
+            <eng-data t="2.1" f="0"/></data></engine></engine-list></engine-database>"#;
+        let curve = named(rocksim).expect("a motor");
+        assert!((curve.total_impulse_n_s() - 20.0).abs() < 1e-9, "{}", curve.total_impulse_n_s());
+        let refused = named("<engine-database>\n</engine-database>").expect_err("no motor in it");
+        assert!(refused.to_string().contains("of the airframe"), "{refused}");
+        assert!(named("H4").expect_err("no such motor").to_string().contains("H45W"));
     }
 }

@@ -19,7 +19,7 @@ use crate::fins::FinModel;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Airframe {
-    /// Name of the landing motor, or path of its file.
+    /// Name of a built-in landing motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
     /// Masses and where they are.
     pub mass: Mass,
