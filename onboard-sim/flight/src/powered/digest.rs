@@ -8,8 +8,8 @@ use crate::nmpc::free_time::FreeTimeSolution;
 use crate::nmpc::{Solution, SolveStatus};
 
 // The settings are the mission's. The workspace holds nothing that a search depends on, and the trial and what was set
-// aside for another are cleared before they are solved into: they only keep their room. (Of a problem that cannot be posed the trial keeps an older final time,
-// which is reported and decides nothing.)
+// aside for another are cleared before they are solved into: they only keep their room. (Of a problem that cannot be
+// posed the trial keeps an older final time, which is reported and decides nothing.)
 remembers!(PoweredGuidance { plane, flown, report } but { settings, workspace, trial, set_aside });
 
 remembers!(Plane { along, across });
