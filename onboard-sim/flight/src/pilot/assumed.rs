@@ -52,7 +52,9 @@ impl Known {
         let estimated = self.burn();
         let estimated_band = band(&estimated);
         let caution_sigmas = self.caution_sigmas(burning.burning_s);
-        let weaker = (0..CAUTION_STEPS).find_map(|step| {
+        // Without caution the motor as estimated is all there is to try.
+        let steps = if caution_sigmas > 0.0 { CAUTION_STEPS } else { 0 };
+        let weaker = (0..steps).find_map(|step| {
             let share = 1.0 - f64::from(step) / f64::from(CAUTION_STEPS);
             let burn = self.doubted_burn(burning.burning_s, -caution_sigmas * share);
             let found = band(&burn).filter(|band| band.place(height_m) >= 0.0)?;
