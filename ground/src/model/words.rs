@@ -36,6 +36,9 @@ pub fn abort_effect(effect: TdAbortEffect) -> &'static str {
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "inhibit motor, fins open, chute NOW",
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
         TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
+        TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE => "lands here: no cut-off exists",
+        TdAbortEffect::TD_ABORT_EFFECT_BURN => "too low for a chute: burns and lands here",
+        TdAbortEffect::TD_ABORT_EFFECT_IMPACT => "too low for a chute, gate shut: IMPACT",
     }
 }
 

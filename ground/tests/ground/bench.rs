@@ -166,6 +166,7 @@ impl Bench {
             pad_wait_s: self.pad_wait_s,
             phase: self.phase,
             abort_effect: self.abort_effect,
+            ..TD_FLIGHT_STATUS_DATA::default()
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
     }

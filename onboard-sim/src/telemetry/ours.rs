@@ -28,6 +28,7 @@ pub(super) fn flight_status(snapshot: &Snapshot) -> MavMessage {
             AbortEffect::BurnOrInhibit => TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT,
             AbortEffect::UprightOnly => TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY,
         },
+        ..TD_FLIGHT_STATUS_DATA::default()
     })
 }
 
