@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use e2e::{BareGround, Program, Running, Signal, command_frame, free_port, program};
+use e2e::{BareGround, Bound, Program, Running, Signal, command_frame, program};
 use protocol::dialect::{MavCmd, TdPhase};
 use protocol::frame::Encoder;
 use protocol::hostile::frame_of;
@@ -151,9 +151,9 @@ fn with_key() -> tempfile::TempDir {
 #[test]
 fn a_vehicle_stands_through_it() {
     let folder = with_key();
-    let port = free_port();
     let mut watch = BareGround::new();
-    let vehicle = fly(folder.path(), [&format!("udpin:127.0.0.1:{port}"), &watch.link()], &["--stay"]);
+    let mut vehicle = fly(folder.path(), ["udpin:127.0.0.1:0", &watch.link()], &["--stay"]);
+    let port = vehicle.bound_port(Bound::Udp);
     watch.wait_for_heartbeat();
     let thrower = Thrower::at(vec![([127, 0, 0, 1], port).into()]);
     // The first part fills every table there is.
@@ -182,18 +182,15 @@ fn a_vehicle_stands_through_it() {
 #[test]
 fn a_landing_is_flown_through_it() {
     let folder = with_key();
-    let (flooded, clean) = (free_port(), free_port());
-    let vehicle = fly(
-        folder.path(),
-        [&format!("udpin:127.0.0.1:{flooded}"), &format!("udpout:127.0.0.1:{clean}")],
-        &[],
-    );
     let mut station = program(Program::Ground);
     station
-        .args(["--connect", &format!("udpin:127.0.0.1:{clean}"), "--key", "flight.key"])
+        .args(["--connect", "udpin:127.0.0.1:0", "--key", "flight.key"])
         .args(["--headless", "--auto", "--log", "ground.mcap"])
         .current_dir(folder.path());
-    let station = Running::start(&mut station);
+    let mut station = Running::start(&mut station);
+    let clean = station.bound_port(Bound::Udp);
+    let mut vehicle = fly(folder.path(), ["udpin:127.0.0.1:0", &format!("udpout:127.0.0.1:{clean}")], &[]);
+    let flooded = vehicle.bound_port(Bound::Udp);
     let thrower = Thrower::at(vec![([127, 0, 0, 1], flooded).into(), ([127, 0, 0, 1], clean).into()]);
     let before = station.memory_bytes();
     let (station, vehicle) = (station.wait(), vehicle.wait());
@@ -213,13 +210,13 @@ fn a_landing_is_flown_through_it() {
 #[test]
 fn a_ground_stands_through_it() {
     let folder = with_key();
-    let port = free_port();
     let mut command = program(Program::Ground);
     command
-        .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--key", "flight.key"])
+        .args(["--connect", "udpin:127.0.0.1:0", "--key", "flight.key"])
         .args(["--headless", "--log", "ground.mcap"])
         .current_dir(folder.path());
     let mut station = Running::start(&mut command);
+    let port = station.bound_port(Bound::Udp);
     let thrower = Thrower::at(vec![([127, 0, 0, 1], port).into()]);
     station.wait_for_line("frames refused");
     let step = wanted() / 10;

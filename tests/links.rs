@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use e2e::{BareGround, Program, Running, SerialLine, free_port, program};
+use e2e::{BareGround, Bound, Program, Running, SerialLine, program};
 use protocol::dialect::{MavMessage, TdPhase};
 
 fn links<'a>(option: &'a str, links: &'a [String]) -> impl Iterator<Item = &'a str> {
@@ -23,11 +23,8 @@ fn ground(folder: &Path, to: &[String]) -> Running {
     Running::start(command.args(links("--connect", to)).current_dir(folder))
 }
 
-/// Flies over these links and expects a landing; returns the ground's lines.
-fn land_over(vehicle_links: &[String], ground_links: &[String]) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let flight = vehicle(folder.path(), vehicle_links);
-    let station = ground(folder.path(), ground_links);
+/// Waits for the end and expects a landing; returns the ground's lines.
+fn landed(flight: Running, station: Running) -> String {
     let (station, flight) = (station.wait(), flight.wait());
     assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
     station.output
@@ -35,36 +32,46 @@ fn land_over(vehicle_links: &[String], ground_links: &[String]) -> String {
 
 #[test]
 fn over_tcp_they_land_whoever_connects() {
-    let port = free_port();
-    let ends = [format!("tcpin:127.0.0.1:{port}"), format!("tcpout:127.0.0.1:{port}")];
-    land_over(&ends[..1], &ends[1..]);
-    let port = free_port();
-    let ends = [format!("tcpin:127.0.0.1:{port}"), format!("tcpout:127.0.0.1:{port}")];
-    land_over(&ends[1..], &ends[..1]);
+    let listen = ["tcpin:127.0.0.1:0".to_owned()];
+    let connect = |to: &mut Running| [format!("tcpout:127.0.0.1:{}", to.bound_port(Bound::Tcp))];
+    let folder = tempfile::tempdir().unwrap();
+    let mut flight = vehicle(folder.path(), &listen);
+    let station = ground(folder.path(), &connect(&mut flight));
+    landed(flight, station);
+    let folder = tempfile::tempdir().unwrap();
+    let mut station = ground(folder.path(), &listen);
+    let flight = vehicle(folder.path(), &connect(&mut station));
+    landed(flight, station);
 }
 
 #[test]
 fn over_ipv6_they_land() {
-    let port = free_port();
-    land_over(&[format!("udpout:[::1]:{port}")], &[format!("udpin:[::1]:{port}")]);
+    let folder = tempfile::tempdir().unwrap();
+    let mut station = ground(folder.path(), &["udpin:[::1]:0".to_owned()]);
+    let link = format!("udpout:[::1]:{}", station.bound_port(Bound::Udp));
+    landed(vehicle(folder.path(), &[link]), station);
 }
 
 #[test]
 fn at_115200_baud_they_land() {
     let line = SerialLine::new(115_200);
     let link = |device: &Path| format!("serial:{}:115200", device.display());
-    land_over(&[link(&line.near)], &[link(&line.far)]);
+    let folder = tempfile::tempdir().unwrap();
+    let flight = vehicle(folder.path(), &[link(&line.near)]);
+    landed(flight, ground(folder.path(), &[link(&line.far)]));
 }
 
 #[test]
 fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
     let line = SerialLine::new(57_600);
     let radio = |device: &Path| format!("serial:{}:57600", device.display());
-    let (udp, tcp) = (free_port(), free_port());
-    let output = land_over(
-        &[radio(&line.near), format!("udpout:127.0.0.1:{udp}"), format!("tcpin:127.0.0.1:{tcp}")],
-        &[radio(&line.far), format!("udpin:127.0.0.1:{udp}"), format!("tcpout:127.0.0.1:{tcp}")],
-    );
+    let folder = tempfile::tempdir().unwrap();
+    let listens = ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"].map(str::to_owned);
+    let mut flight = vehicle(folder.path(), &[&[radio(&line.near)], &listens[..]].concat());
+    let (udp, tcp) = (flight.bound_port(Bound::Udp), flight.bound_port(Bound::Tcp));
+    let calls = [format!("udpout:127.0.0.1:{udp}"), format!("tcpout:127.0.0.1:{tcp}")];
+    let station = ground(folder.path(), &[&[radio(&line.far)], &calls[..]].concat());
+    let output = landed(flight, station);
     for once in ["ARM acknowledged", "countdown started", "burn-out", "phase IGNITION -> POWERED"] {
         assert_eq!(output.matches(once).count(), 1, "{once} in:\n{output}");
     }
@@ -74,12 +81,13 @@ fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
 #[test]
 fn a_link_that_dies_in_flight_is_named_and_the_other_carries_on() {
     let folder = tempfile::tempdir().unwrap();
-    let (udp, tcp) = (free_port(), free_port());
-    let relay = Relay::between(free_port(), tcp);
-    let to_relay = format!("tcpout:127.0.0.1:{}", relay.port);
-    let flight =
-        vehicle(folder.path(), &[format!("udpout:127.0.0.1:{udp}"), format!("tcpin:127.0.0.1:{tcp}")]);
-    let mut station = ground(folder.path(), &[format!("udpin:127.0.0.1:{udp}"), to_relay]);
+    let mut flight = vehicle(folder.path(), &["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"].map(str::to_owned));
+    let relay = Relay::to(flight.bound_port(Bound::Tcp));
+    let calls = [
+        format!("udpout:127.0.0.1:{}", flight.bound_port(Bound::Udp)),
+        format!("tcpout:127.0.0.1:{}", relay.port),
+    ];
+    let mut station = ground(folder.path(), &calls);
     station.wait_for_line("START observed");
     drop(relay);
     station.wait_for_line("one link down");
@@ -92,8 +100,8 @@ fn a_link_that_dies_in_flight_is_named_and_the_other_carries_on() {
 #[test]
 fn a_ground_that_restarts_is_answered_again() {
     let folder = tempfile::tempdir().unwrap();
-    let port = free_port();
-    let mut flight = vehicle(folder.path(), &[format!("udpin:127.0.0.1:{port}")]);
+    let mut flight = vehicle(folder.path(), &["udpin:127.0.0.1:0".to_owned()]);
+    let port = flight.bound_port(Bound::Udp);
     flight.wait_for_line("PAD_IDLE");
     let watcher = || {
         let mut command = program(Program::Ground);
@@ -159,16 +167,17 @@ struct Relay {
 }
 
 impl Relay {
-    fn between(port: u16, to: u16) -> Self {
+    fn to(to: u16) -> Self {
         let (stop, stopped) = std::sync::mpsc::sync_channel::<()>(0);
-        let listener = std::net::TcpListener::bind(("127.0.0.1", port)).unwrap();
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
         std::thread::Builder::new()
             .name("relay".to_owned())
             .spawn(move || {
                 let (near, _) = listener.accept().unwrap();
                 // Nobody is let in a second time.
                 drop(listener);
-                let far = connect(to);
+                let far = std::net::TcpStream::connect(("127.0.0.1", to)).unwrap();
                 let copy = |mut from: std::net::TcpStream, mut to: std::net::TcpStream| {
                     std::thread::Builder::new()
                         .name("relay copy".to_owned())
@@ -186,15 +195,4 @@ impl Relay {
             .unwrap();
         Self { port, _stop: stop }
     }
-}
-
-/// Connects as soon as the other side listens.
-fn connect(to: u16) -> std::net::TcpStream {
-    for _ in 0..3_000 {
-        if let Ok(stream) = std::net::TcpStream::connect(("127.0.0.1", to)) {
-            return stream;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    panic!("nobody listens on port {to}");
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use e2e::{Ended, Program, Running, free_port, program};
+use e2e::{Bound, Ended, Program, Running, program};
 
 fn keygen(folder: &Path, name: &str) -> Ended {
     Running::to_end(program(Program::OnboardSim).args(["keygen", name]).current_dir(folder))
@@ -18,15 +18,15 @@ fn with_one_key_they_land_and_remember_their_timestamps() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(0));
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(1), "a key is not overwritten");
-    let port = free_port();
-    let flight = fly(folder.path(), "flight.key", &format!("udpout:127.0.0.1:{port}"));
     let mut station = program(Program::Ground);
     station
-        .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--key", "flight.key"])
+        .args(["--connect", "udpin:127.0.0.1:0", "--key", "flight.key"])
         .args(["--headless", "--auto", "--log", "ground.mcap"])
         .current_dir(folder.path());
-    let station = Running::to_end(&mut station);
-    let flight = flight.wait();
+    let mut station = Running::start(&mut station);
+    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
+    let flight = fly(folder.path(), "flight.key", &link);
+    let (station, flight) = (station.wait(), flight.wait());
     assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
     for user in ["vehicle", "ground"] {
         let stamps = folder.path().join(format!("flight.key.{user}.stamps"));
@@ -48,12 +48,12 @@ fn with_another_key_nothing_is_believed_on_either_side() {
     for name in ["vehicle.key", "other.key"] {
         assert_eq!(keygen(folder.path(), name).code, Some(0));
     }
-    let port = free_port();
-    let flight = fly(folder.path(), "vehicle.key", &format!("udpout:127.0.0.1:{port}"));
+    let mut flight = fly(folder.path(), "vehicle.key", "udpin:127.0.0.1:0");
+    let link = format!("udpout:127.0.0.1:{}", flight.bound_port(Bound::Udp));
     for key in [Some("other.key"), None] {
         let mut station = program(Program::Ground);
         station
-            .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--headless", "--auto", "--log", "none"])
+            .args(["--connect", &link, "--headless", "--auto", "--log", "none"])
             .args(["--timeout-s", "8"])
             .args(key.iter().flat_map(|key| ["--key", key]))
             .current_dir(folder.path());

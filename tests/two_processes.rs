@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use e2e::{Ended, Program, Running, SerialLine, command_frame, free_port, program};
+use e2e::{Bound, Ended, Program, Running, SerialLine, command_frame, program};
 use protocol::dialect::MavCmd;
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
@@ -28,9 +28,9 @@ fn verified(folder: &Path) -> Ended {
 #[test]
 fn over_udp_they_land_and_the_vehicle_s_log_replays() {
     let folder = tempfile::tempdir().unwrap();
-    let port = free_port();
-    let station = Running::start(&mut ground(folder.path(), &format!("udpin:127.0.0.1:{port}")));
-    let flight = Running::start(&mut vehicle(folder.path(), &format!("udpout:127.0.0.1:{port}")));
+    let mut station = Running::start(&mut ground(folder.path(), "udpin:127.0.0.1:0"));
+    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
+    let flight = Running::start(&mut vehicle(folder.path(), &link));
     let (station, flight) = (station.wait(), flight.wait());
     assert_eq!(station.code, Some(0), "{}", station.output);
     assert_eq!(flight.code, Some(0), "{}", flight.output);
@@ -99,38 +99,6 @@ fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
     assert!(at("no cut-off exists") < at("burn-out"), "{}", ended.output);
 }
 
-/// A flight over socat's pseudo-terminals, where socat is installed: it is what a crew tests its radio with.
-#[test]
-fn over_a_socat_pair_they_land() {
-    let folder = tempfile::tempdir().unwrap();
-    let ends = ["near", "far"].map(|end| folder.path().join(end));
-    let address = |end: &Path| format!("pty,raw,echo=0,link={}", end.display());
-    let socat =
-        Command::new("socat").args(["-d", "-d", &address(&ends[0]), &address(&ends[1])]).spawn_probe();
-    let Some(mut socat) = socat else {
-        println!("NOT RUN: socat is not installed (Debian package socat)");
-        return;
-    };
-    socat.wait_for_line("starting data transfer loop");
-    let link = |end: &Path| format!("serial:{}:57600", end.display());
-    let flight = Running::start(&mut vehicle(folder.path(), &link(&ends[0])));
-    let station = Running::start(&mut ground(folder.path(), &link(&ends[1])));
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
-}
-
-/// Starting a program that may not be installed.
-trait SpawnProbe {
-    fn spawn_probe(&mut self) -> Option<Running>;
-}
-
-impl SpawnProbe for Command {
-    fn spawn_probe(&mut self) -> Option<Running> {
-        let probe = Command::new(self.get_program()).arg("-V").output();
-        probe.is_ok().then(|| Running::start(self))
-    }
-}
-
 #[test]
 fn a_flight_that_misses_its_limits_is_called_so_by_both() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,9 +108,8 @@ fn a_flight_that_misses_its_limits_is_called_so_by_both() {
     // A motor 8 % weaker than the controller believes.
     let weak = format!("{}\n[plant]\nthrust_scale = 0.92\n", listed.output);
     std::fs::write(folder.path().join("weak.toml"), weak).unwrap();
-    let port = free_port();
-    let station = Running::start(&mut ground(folder.path(), &format!("udpin:127.0.0.1:{port}")));
-    let link = format!("udpout:127.0.0.1:{port}");
+    let mut station = Running::start(&mut ground(folder.path(), "udpin:127.0.0.1:0"));
+    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
     let flight = Running::start(vehicle(folder.path(), &link).args(["--profile", "weak.toml"]));
     let (station, flight) = (station.wait(), flight.wait());
     assert_eq!(station.code, Some(3), "{}", station.output);

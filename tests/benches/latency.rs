@@ -9,7 +9,7 @@ use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use e2e::{SerialLine, free_port};
+use e2e::SerialLine;
 use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
@@ -75,10 +75,13 @@ fn boot_ms_of(message: &MavMessage) -> Option<u32> {
 }
 
 /// Receives with the ground's own links and model until the vehicle is silent for a while; returns the latencies.
-async fn receive(listening: Endpoint, vehicle: Endpoint) -> Result<Vec<Duration>, Failure> {
+async fn receive(listening: Endpoint, vehicle: Option<Endpoint>) -> Result<Vec<Duration>, Failure> {
     let clock = Clock::start();
     let mut wire = Wire::open(vec![listening], None, clock, None, LogTime::Run(clock)).await?;
     let ticks = Ticks::default();
+    // Over UDP the vehicle speaks to the port that the system chose.
+    let bound = wire.endpoints().next().map(ToString::to_string).unwrap_or_default();
+    let vehicle = vehicle.map_or_else(|| bound.replace("udpin", "udpout").parse(), Ok)?;
     let vehicle = start_vehicle(vehicle, &ticks)?;
     let mut model = Model::new(Settings::on_screen(""));
     let mut latencies = Vec::new();
@@ -133,16 +136,12 @@ fn report(name: &str, mut latencies: Vec<Duration>) -> std::io::Result<()> {
 
 fn main() -> Result<(), Failure> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let port = free_port();
-    let udp = runtime.block_on(receive(
-        format!("udpin:127.0.0.1:{port}").parse()?,
-        format!("udpout:127.0.0.1:{port}").parse()?,
-    ))?;
+    let udp = runtime.block_on(receive("udpin:127.0.0.1:0".parse()?, None))?;
     report("udp", udp)?;
     for baud in [57_600, 115_200] {
         let line = SerialLine::new(baud);
         let [near, far] = [&line.near, &line.far].map(|device| format!("serial:{}:{baud}", device.display()));
-        let serial = runtime.block_on(receive(far.parse()?, near.parse()?))?;
+        let serial = runtime.block_on(receive(far.parse()?, Some(near.parse()?)))?;
         report(&format!("serial {baud}"), serial)?;
     }
     Ok(())

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use e2e::{BareGround, Program, Running, Terminal, free_port, program};
+use e2e::{BareGround, Bound, Program, Running, Terminal, program};
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavModeFlag,
@@ -72,10 +72,10 @@ fn now() -> Instant {
     Instant::now()
 }
 
-fn ground(folder: &tempfile::TempDir, port: u16, tells_repeats: bool) -> Terminal {
+fn ground(folder: &tempfile::TempDir, tells_repeats: bool) -> Terminal {
     let mut command = program(Program::Ground);
     command
-        .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--log", "ground.mcap"])
+        .args(["--connect", "udpin:127.0.0.1:0", "--log", "ground.mcap"])
         .env("XDG_RUNTIME_DIR", folder.path())
         .current_dir(folder.path());
     Terminal::start(&command, SIZE, tells_repeats)
@@ -152,8 +152,8 @@ fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
 /// The time of each abort that was sent; a chord of two Ctrl-X that reach a busy machine as if one were held sends none.
 fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
     let folder = tempfile::tempdir()?;
-    let port = free_port();
-    let mut terminal = ground(&folder, port, hand.tells_repeats);
+    let mut terminal = ground(&folder, hand.tells_repeats);
+    let port = terminal.bound_port(Bound::Udp);
     let socket = UdpSocket::bind("127.0.0.1:0")?;
     let stop = Arc::new(AtomicBool::new(false));
     let speaker = {
@@ -214,9 +214,9 @@ fn mark(terminal: &Terminal) -> (Instant, Duration, u64) {
 /// A real flight, armed and started by the hand; what the screen cost on the pad and during the landing.
 fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
-    let port = free_port();
     let mut watch = BareGround::new();
-    let mut terminal = ground(&folder, port, false);
+    let mut terminal = ground(&folder, false);
+    let port = terminal.bound_port(Bound::Udp);
     let mut vehicle = program(Program::OnboardSim);
     vehicle.args(["fly", "--stay", "--mavlink", &format!("udpout:127.0.0.1:{port}")]);
     let _vehicle = Running::start(vehicle.args(["--mavlink", &watch.link()]).current_dir(folder.path()));

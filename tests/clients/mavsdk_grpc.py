@@ -1,11 +1,14 @@
-"""MAVSDK 3.x with its server against a vehicle that speaks to 127.0.0.1:PORT.
+"""MAVSDK 3.x with its server against a vehicle that listens on 127.0.0.1:PORT.
 
-Usage: mavsdk_grpc.py PORT GRPC_PORT.
+Usage: mavsdk_grpc.py PORT.
 """
 
 import asyncio
+import os
+import re
 import sys
 
+import mavsdk
 from mavsdk import System
 from mavsdk.action import ActionError
 
@@ -38,10 +41,29 @@ async def refused(awaitable):
     return None
 
 
+async def port_of(server):
+    """The server tells its port once it has found the vehicle."""
+    async for line in server.stdout:
+        told = re.search(rb"listen on [0-9.]+:(\d+)", line)
+        if told:
+            return int(told[1])
+    raise AssertionError("the server has ended")
+
+
 async def main():
-    port, grpc_port = sys.argv[1:3]
-    drone = System(port=int(grpc_port))
-    await within("connected", drone.connect(system_address=f"udpin://127.0.0.1:{port}"))
+    # Port 0: the system chooses one that is nobody's, which the library would not learn of the server that it starts.
+    program = os.path.join(os.path.dirname(mavsdk.__file__), "bin", "mavsdk_server")
+    options = ["-p", "0", f"udpout://127.0.0.1:{sys.argv[1]}"]
+    server = await asyncio.create_subprocess_exec(program, *options, stdout=asyncio.subprocess.PIPE)
+    try:
+        await fly(System("127.0.0.1", await within("the server serves", port_of(server))))
+    finally:
+        server.kill()
+        await server.wait()
+
+
+async def fly(drone):
+    await within("connected", drone.connect())
     await within("found", first(drone.core.connection_state(), lambda state: state.is_connected))
     attitude = drone.telemetry.attitude_quaternion()
     await within("the attitude is upright", first(attitude, lambda a: abs(a.y - 0.7071) < 0.01))

@@ -1,6 +1,6 @@
-// node-mavlink against a vehicle that speaks to 127.0.0.1:PORT.
+// node-mavlink against a vehicle that speaks to the loopback port that it listens on.
 //
-// Usage: node node_client.mjs PORT, in the folder that node-mavlink is installed in.
+// Usage: node node_client.mjs, in the folder that node-mavlink is installed in.
 
 import { createRequire } from 'node:module'
 import { createSocket } from 'node:dgram'
@@ -12,7 +12,6 @@ const { MavLinkPacketSplitter, MavLinkPacketParser, MavLinkProtocolV2, minimal, 
 
 const PATIENCE_MS = 30_000
 const REGISTRY = { ...minimal.REGISTRY, ...common.REGISTRY }
-const port = Number(process.argv[2])
 const socket = createSocket('udp4')
 const bytes = new PassThrough()
 const packets = bytes.pipe(new MavLinkPacketSplitter()).pipe(new MavLinkPacketParser())
@@ -65,7 +64,7 @@ function check(fact, holds) {
   console.log('ok', fact)
 }
 
-socket.bind(port, '127.0.0.1', async () => {
+socket.bind(0, '127.0.0.1', async () => {
   try {
     const beat = await message(minimal.Heartbeat)
     check('the vehicle is a rocket', beat.type === minimal.MavType.ROCKET)

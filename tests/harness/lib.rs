@@ -4,8 +4,8 @@
 
 mod air;
 mod bare_ground;
-mod clients;
 mod log_file;
+mod ports;
 mod process;
 mod programs;
 mod serial_line;
@@ -14,9 +14,9 @@ mod window;
 
 pub use air::{Air, Weather};
 pub use bare_ground::{BareGround, command_frame};
-pub use clients::{Clients, install};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
+pub use ports::Bound;
 pub use process::{Ended, Running};
 pub use programs::{Program, program};
 pub use serial_line::SerialLine;
@@ -27,16 +27,3 @@ use std::time::Duration;
 
 /// Longer than anything here takes on a busy machine; reaching it fails the test.
 pub const PATIENCE: Duration = Duration::from_secs(90);
-
-/// A loopback port that nobody used a moment ago, neither for TCP nor for UDP.
-///
-/// # Panics
-/// There is none.
-pub fn free_port() -> u16 {
-    let free = |_| {
-        let tcp = std::net::TcpListener::bind("127.0.0.1:0").ok()?;
-        let address = tcp.local_addr().ok()?;
-        std::net::UdpSocket::bind(address).ok().map(|_| address.port())
-    };
-    (0..100).find_map(free).expect("a free port")
-}

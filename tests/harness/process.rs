@@ -9,6 +9,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use crate::PATIENCE;
+use crate::ports::{Bound, bound_port};
 
 /// A running program.
 pub struct Running {
@@ -124,6 +125,14 @@ impl Running {
         let statm = std::fs::read_to_string(format!("/proc/{}/statm", self.child.id())).expect("it runs");
         let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
         pages * 4096
+    }
+
+    /// The loopback port that it has bound, given port 0; waits until it has.
+    ///
+    /// # Panics
+    /// It does not bind one.
+    pub fn bound_port(&mut self, bound: Bound) -> u16 {
+        bound_port(&mut self.child, bound)
     }
 
     /// Sends a signal.

@@ -38,7 +38,10 @@ fn built() -> &'static PathBuf {
         let folder = test.ancestors().nth(2).expect("the folder of the profile").to_owned();
         let target = folder.parent().expect("the target folder");
         let mut build = Command::new(env!("CARGO"));
-        build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).args(["build", "--bins", "--quiet"]);
+        // With any one test among them, the programs are those that `cargo test` has built already. Without, their
+        // dependencies would lack what the tests' own dependencies want of them, and half of all would be built anew.
+        build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        build.args(["build", "--quiet", "--bins", "--test", "outside_clients"]);
         build.arg("--target-dir").arg(target);
         if !cfg!(debug_assertions) {
             build.arg("--release");

@@ -13,6 +13,7 @@ use rustix::pty::{OpenptFlags, ioctl_tiocgptpeer, openpt, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::PATIENCE;
+use crate::ports::{Bound, bound_port};
 use crate::process::{left, now, processor_time_of};
 use crate::window::Window;
 
@@ -195,6 +196,14 @@ impl Terminal {
     /// Bytes that the program has written to its terminal.
     pub fn written(&self) -> u64 {
         self.look().bytes().len() as u64
+    }
+
+    /// The loopback port that the program has bound, given port 0; waits until it has.
+    ///
+    /// # Panics
+    /// It does not bind one.
+    pub fn bound_port(&mut self, bound: Bound) -> u16 {
+        bound_port(&mut self.child, bound)
     }
 
     /// Processor time that the program has used.

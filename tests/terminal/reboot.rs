@@ -1,6 +1,6 @@
 //! A vehicle that loses its power in flight.
 
-use e2e::{Program, Running, Signal, Terminal, free_port, program};
+use e2e::{Bound, Program, Running, Signal, Terminal, program};
 
 use crate::stage::{ARM, SIZE, START, Stage, ground};
 
@@ -36,12 +36,13 @@ fn a_vehicle_that_reboots_in_its_descent_is_said_to_and_nothing_is_armed_by_itse
 #[test]
 fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_new_commands() {
     let folder = tempfile::tempdir().unwrap();
-    let port = free_port();
-    let vehicle = || {
+    let vehicle = |port: u16| {
         let mut command = program(Program::OnboardSim);
         command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:127.0.0.1:{port}")]);
         Running::start(&mut command)
     };
+    let mut first = vehicle(0);
+    let port = first.bound_port(Bound::Udp);
     let link = format!("udpout:127.0.0.1:{port}");
     let mut station =
         Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
@@ -54,12 +55,11 @@ fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_
         flying.wait_for_line("AERO_DESCENT");
         station.wait_for("AERO_DESCENT");
     };
-    let mut first = vehicle();
     fly(&mut station, &mut first);
     first.signal(Signal::SIGKILL);
     first.wait();
     station.wait_for("LINK LOST");
-    let mut second = vehicle();
+    let mut second = vehicle(port);
     station.wait_for("the vehicle has REBOOTED");
     station.wait_until("a disarmed pad", |window| {
         let top = window.rows().swap_remove(0);

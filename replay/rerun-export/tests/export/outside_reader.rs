@@ -1,9 +1,8 @@
-//! The recordings that the program writes, read by Rerun's own command, which `replay/tests/outside/setup` installs.
+//! The recordings that the program writes, read by Rerun's own command.
 
-use std::path::Path;
 use std::process::Command;
 
-use e2e::install;
+use clients::RERUN;
 
 use crate::flown::{MK2, NOMINAL, Simulated};
 
@@ -17,17 +16,14 @@ fn said(command: &mut Command) -> String {
 
 #[test]
 fn recordings_pass_rerun_rrd_verify() {
-    let setup = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/outside/setup");
-    let Some(folder) = install(&setup, "readers") else { return };
-    let rerun = || Command::new(folder.join("rerun/bin/rerun"));
     let verified = |flight: &Simulated, name: &str| {
         let recording = flight.beside(name);
         let mut export = Command::new(env!("CARGO_BIN_EXE_replay-rerun"));
         let exported = said(export.arg(&flight.log).arg("--output").arg(&recording));
         assert!(exported.contains("controller ticks") && !exported.contains("warning"), "{exported}");
-        let verified = said(rerun().args(["rrd", "verify"]).arg(&recording));
+        let verified = said(RERUN.program("rerun").args(["rrd", "verify"]).arg(&recording));
         assert!(verified.contains("verified without error"), "{verified}");
-        said(rerun().args(["rrd", "stats"]).arg(&recording))
+        said(RERUN.program("rerun").args(["rrd", "stats"]).arg(&recording))
     };
     for (flight, name) in [(&NOMINAL, "planar.rrd"), (&MK2, "mk2.rrd")] {
         let stats = verified(flight, name);

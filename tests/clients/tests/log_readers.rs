@@ -1,18 +1,17 @@
 //! The files that replay writes, read by other people's programs: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core` and application,
-//! Rerun, pandas, polars, pyarrow, pymavlink. `tests/outside/setup` installs them into the target folder and nowhere else.
+//! Rerun, pandas, polars, pyarrow, pymavlink.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-#[path = "replay/from_apogee.rs"]
+#[path = "../../../replay/tests/replay/from_apogee.rs"]
 mod from_apogee;
-#[path = "replay/simulated.rs"]
+#[path = "../../../replay/tests/replay/simulated.rs"]
 mod simulated;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{LazyLock, OnceLock};
+use std::sync::LazyLock;
 
-use e2e::install;
+use clients::{FOXGLOVE, NODE_MCAP, READERS, RERUN, file, found};
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::info::info;
 use replay::log::{FlightLog, Recording};
@@ -22,23 +21,6 @@ use replay::refly::{ReflyOptions, refly_flight, write_log};
 use from_apogee::LANDED;
 use simulated::{DISPERSED, MK2, NOMINAL, WITH_FRAMES};
 
-/// The folder with the outside readers, installed by the first call. `None`, and a loud line, where this machine cannot
-/// have them.
-fn readers() -> Option<&'static Path> {
-    static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| install(&script("setup"), "readers"));
-    folder.as_deref()
-}
-
-/// A program of a Python environment.
-fn python(folder: &Path, environment: &str, program: &str) -> Command {
-    Command::new(folder.join(environment).join("bin").join(program))
-}
-
-fn script(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outside").join(name)
-}
-
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
@@ -46,9 +28,9 @@ fn said(command: &mut Command) -> String {
     said
 }
 
-fn hex(folder: &Path, number: f64) -> String {
+fn hex(number: f64) -> String {
     let print = format!("print(float('{number:?}').hex())");
-    said(python(folder, "readers", "python").arg("-c").arg(print)).trim().to_owned()
+    said(READERS.python().arg("-c").arg(print)).trim().to_owned()
 }
 
 /// The recorder's log, one flown again and one recovered; and of a flight from apogee.
@@ -80,15 +62,14 @@ fn commands(recording: &Recording) -> (&'static str, usize, f64) {
 
 #[test]
 fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
-    let Some(folder) = readers() else { return };
     for log in LOGS.iter() {
-        let read = said(python(folder, "readers", "python").arg(script("read_mcap.py")).arg(log));
+        let read = said(READERS.python().arg(file("readers/read_mcap.py")).arg(log));
         assert!(read.contains("/vehicle/truth"), "{read}");
-        said(python(folder, "readers", "pymcap-cli").arg("doctor").arg(log));
+        said(READERS.program("pymcap-cli").arg("doctor").arg(log));
         let recording = Recording::open(log).unwrap();
         let (topic, count, command_rad) = commands(&recording);
         assert!(read.contains(&format!("{topic} {count}\n")), "{read}");
-        assert!(read.contains(&format!("gimbal {}\n", hex(folder, command_rad))), "{read}");
+        assert!(read.contains(&format!("gimbal {}\n", hex(command_rad))), "{read}");
         // The recovered log was cut before its verdict.
         assert_eq!(read.contains("/verdict 1\n"), recording.verdict.is_some(), "{read}");
     }
@@ -97,10 +78,8 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
 /// What Foxglove is built on decodes every message by the schema in the log, and what is to be plotted is numbers.
 #[test]
 fn logs_are_read_by_foxgloves_library() {
-    let Some(folder) = readers() else { return };
     for log in LOGS.iter() {
-        let node = folder.join("node");
-        let read = said(Command::new("node").arg(script("read_mcap.mjs")).arg(log).current_dir(node));
+        let read = said(NODE_MCAP.node().arg(file("readers/read_mcap.mjs")).arg(log));
         let (topic, count, _) = commands(&Recording::open(log).unwrap());
         let mut channels = read.lines().map(|line| line.split(' ').collect::<Vec<_>>());
         let of_commands = channels.clone().find(|channel| channel[0] == topic).unwrap();
@@ -116,35 +95,19 @@ fn logs_are_read_by_foxgloves_library() {
     }
 }
 
-/// A browser that needs no window. `None`, and a loud line, where there is none.
-fn browser() -> Option<PathBuf> {
-    const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
-    let folders: Vec<PathBuf> =
-        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
-    let found = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
-    let found = found.into_iter().find(|path| path.is_file());
-    if found.is_none() {
-        assert!(std::env::var_os("TOUCHDOWN_CLIENTS_REQUIRED").is_none(), "no Chromium for Foxglove");
-        // Past the test's captured output, so that nobody overlooks it; nothing is left to do if it cannot be said.
-        let _ =
-            writeln!(std::io::stderr(), "NOT RUN: Foxglove's application needs Chromium, which is not here");
-    }
-    found
-}
-
 /// Foxglove's own application lists every topic with its messages, and draws what it is asked to plot.
 #[test]
 fn logs_open_in_foxglove_with_plots() {
-    let (Some(folder), Some(browser)) = (readers(), browser()) else { return };
+    let browser = found(&["chromium", "chromium-browser", "google-chrome"], "chromium");
     let flights = [
         (&NOMINAL, "/vehicle/truth.state.z_m", "/controller/tick.output.gimbal_command_rad"),
         (&MK2, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[0]"),
     ];
     for (flight, height, gimbal) in flights {
         let picture = flight.beside("foxglove.png");
-        let mut open = Command::new("node");
-        open.arg(script("open_in_foxglove.mjs")).args([&browser, &flight.log]);
-        open.args([height, gimbal]).arg(&picture).current_dir(folder.join("foxglove"));
+        let mut open = FOXGLOVE.node();
+        open.arg(file("readers/open_in_foxglove.mjs")).args([&browser, &flight.log]);
+        open.args([height, gimbal]).arg(&picture);
         let shown: serde_json::Value = serde_json::from_str(&said(&mut open)).unwrap();
         let words = shown["words"].as_str().unwrap();
         for channel in info(&flight.log).unwrap().channels {
@@ -165,9 +128,8 @@ fn grouped(count: u64) -> String {
 
 #[test]
 fn logs_pass_rerun_mcap_check() {
-    let Some(folder) = readers() else { return };
     for log in LOGS.iter() {
-        let checked = said(python(folder, "rerun", "rerun").args(["mcap", "check"]).arg(log));
+        let checked = said(RERUN.program("rerun").args(["mcap", "check"]).arg(log));
         let accepted = |line: &str| line.starts_with("ok ") && line.contains("/vehicle/truth");
         assert!(checked.lines().any(accepted), "{checked}");
         assert!(!checked.lines().any(|line| line.starts_with("error")), "{checked}");
@@ -176,18 +138,15 @@ fn logs_pass_rerun_mcap_check() {
 
 #[test]
 fn parquet_is_read_by_pandas_polars_and_pyarrow() {
-    let Some(folder) = readers() else { return };
     let check = |log: &Path, directory: PathBuf, table: &str, rows: usize, values: &[(&str, f64)]| {
         let mut opened = FlightLog::open(log).unwrap();
         let files = export_tables(&mut opened, TableFormat::Parquet, &directory).unwrap();
         let path = directory.join(table);
         let columns = files.iter().find(|file| file.path == path).unwrap().columns;
         for (column, value) in values {
-            let read = said(
-                python(folder, "readers", "python").arg(script("read_tables.py")).arg(&path).arg(column),
-            );
+            let read = said(READERS.python().arg(file("readers/read_tables.py")).arg(&path).arg(column));
             for reader in ["pandas", "polars", "pyarrow"] {
-                let line = format!("{reader} {rows} {columns} {}\n", hex(folder, *value));
+                let line = format!("{reader} {rows} {columns} {}\n", hex(*value));
                 assert!(read.contains(&line), "{line} is not in\n{read}");
             }
         }
@@ -204,11 +163,10 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
 
 #[test]
 fn a_tlog_is_read_by_pymavlink() {
-    let Some(folder) = readers() else { return };
     let path = WITH_FRAMES.beside("flight.tlog");
     export_tlog(&|| FlightLog::open(&WITH_FRAMES.log), None, &path).unwrap();
-    let mut command = python(folder, "readers", "python");
-    let read = said(command.arg(script("read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
+    let mut command = READERS.python();
+    let read = said(command.arg(file("readers/read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
     for name in ["HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"] {
         let line = read.lines().find(|line| line.starts_with(name)).unwrap();
         let count: u32 = line.rsplit(' ').next().unwrap().parse().unwrap();

@@ -1,0 +1,81 @@
+//! Other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and Parquet, a browser.
+//!
+//! Python and Node packages are installed by name, with pinned versions, into `target/clients` and nowhere else. Programs
+//! are taken as the machine has them. One that is not here fails its test and says what to install: nobody who asks for
+//! these tests is told that they passed when they did not run.
+//!
+//! Every one of these programs runs with settings of its own ([`outside`]): what a user has set for it (plugins, paths,
+//! preferences) plays no part.
+
+mod install;
+mod run;
+
+pub use install::{NodePackages, PythonPackages};
+pub use run::{found, outside, tshark, tshark_folder};
+
+use std::path::{Path, PathBuf};
+
+/// MAVProxy asks for plotting and vision packages that its command line does not need.
+pub static PYMAVLINK: PythonPackages = PythonPackages::without_dependencies(
+    "pymavlink",
+    &[
+        "pymavlink==2.4.50",
+        "fastcrc==0.5.0",
+        "lxml==6.1.3",
+        "MAVProxy==1.8.75",
+        "pyserial==3.5",
+        "pynmeagps==1.1.8",
+        "packaging==26.3",
+        "numpy==2.4.6",
+    ],
+);
+
+/// MAVSDK as one native library.
+pub static MAVSDK_NATIVE: PythonPackages =
+    PythonPackages::without_dependencies("mavsdk-native", &["mavsdk==4.1.0"]);
+
+/// MAVSDK with its server.
+pub static MAVSDK_GRPC: PythonPackages = PythonPackages::without_dependencies(
+    "mavsdk-grpc",
+    &["mavsdk==3.17.4", "grpcio==1.85.1", "protobuf==7.36.2", "typing_extensions==4.16.0"],
+);
+
+/// Readers of the files that `replay` writes.
+pub static READERS: PythonPackages = PythonPackages::with_dependencies(
+    "readers",
+    &[
+        "mcap==1.6.0",
+        "mcap-protobuf-support==0.6.0",
+        "pymcap-cli==0.34.0",
+        "pandas==3.1.1",
+        "polars==2.1.0",
+        "pyarrow==26.0.1",
+        "pymavlink==2.4.50",
+    ],
+);
+
+/// Rerun, with its command.
+pub static RERUN: PythonPackages = PythonPackages::with_dependencies("rerun", &["rerun-sdk==0.36.3"]);
+
+/// A MAVLink library for Node.
+pub static NODE_MAVLINK: NodePackages = NodePackages::new("node-mavlink", &["node-mavlink@2.3.0"]);
+
+/// What Foxglove reads MCAP with.
+pub static NODE_MCAP: NodePackages =
+    NodePackages::new("node-mcap", &["@mcap/core@2.2.2", "@mcap/support@1.1.0", "protobufjs@8.8.1"]);
+
+/// Foxglove's application, the last that is open source, and what drives a browser.
+pub static FOXGLOVE: NodePackages = NodePackages::new(
+    "foxglove",
+    &["@foxglove/studio-base@1.48.0", "react@17.0.2", "react-dom@17.0.2", "puppeteer-core@24.43.1"],
+);
+
+/// A file of this package.
+pub fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// The MAVLink definitions of our own.
+pub fn dialect() -> PathBuf {
+    file("../../protocol/dialect/touchdown.xml")
+}

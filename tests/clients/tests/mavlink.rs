@@ -1,0 +1,172 @@
+//! Other people's MAVLink clients against the real vehicle process.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use clients::{MAVSDK_GRPC, MAVSDK_NATIVE, NODE_MAVLINK, PYMAVLINK, PythonPackages, file};
+use e2e::{Bound, Ended, Program, Running, SerialLine, Signal, program, raw_frames_of};
+
+fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
+    let mut command = program(Program::OnboardSim);
+    Running::start(
+        command.args(["fly", "--stay", "--log", "flight.mcap"]).args(arguments).current_dir(folder),
+    )
+}
+
+/// A script of ours.
+fn script(packages: &PythonPackages, name: &str) -> Command {
+    let mut command = packages.python();
+    command.arg(file(name));
+    command
+}
+
+fn well(ended: &Ended) {
+    assert_eq!(ended.code, Some(0), "{}", ended.output);
+    assert!(ended.output.contains("ALL OK"), "{}", ended.output);
+}
+
+/// Runs a client to its end that calls a vehicle.
+fn calls(client: &mut Command) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut vehicle = vehicle(folder.path(), &["--mavlink", "udpin:127.0.0.1:0"]);
+    well(&Running::to_end(client.arg(vehicle.bound_port(Bound::Udp).to_string())));
+}
+
+/// Runs a client to its end that listens, and is called by a vehicle.
+fn is_called(client: &mut Command) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut client = Running::start(client);
+    let link = format!("udpout:127.0.0.1:{}", client.bound_port(Bound::Udp));
+    let _vehicle = vehicle(folder.path(), &["--mavlink", &link]);
+    well(&client.wait());
+}
+
+#[test]
+fn val_pymavlink_is_answered_as_the_standard_says() {
+    calls(&mut script(&PYMAVLINK, "pymavlink_client.py"));
+}
+
+/// Over UDP, and over a radio's serial line.
+#[test]
+fn val_pymavlink_flies_a_rocket_and_aborts_its_descent() {
+    let line = SerialLine::new(57_600);
+    let serial = format!("serial:{}:57600", line.near.display());
+    for link in ["udpin:127.0.0.1:0", &serial] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut vehicle = vehicle(folder.path(), &["--profile", "mk2", "--mavlink", link]);
+        let mut client = script(&PYMAVLINK, "pymavlink_rocket.py");
+        if link == serial {
+            client.arg(&line.far).arg("57600");
+        } else {
+            client.arg(vehicle.bound_port(Bound::Udp).to_string());
+        }
+        well(&Running::to_end(&mut client));
+        vehicle.signal(Signal::SIGTERM);
+        let flight = vehicle.wait();
+        assert_eq!(flight.code, Some(4), "{link}: {}", flight.output);
+        assert!(flight.output.contains("parachute deployed"), "{link}: {}", flight.output);
+    }
+}
+
+#[test]
+fn val_pymavlink_two_grounds_are_each_answered_for_themselves() {
+    calls(&mut script(&PYMAVLINK, "two_grounds.py"));
+}
+
+#[test]
+fn val_mavsdk_native_finds_reads_arms_and_terminates() {
+    is_called(&mut script(&MAVSDK_NATIVE, "mavsdk_native.py"));
+}
+
+#[test]
+fn val_mavsdk_with_its_server_finds_reads_arms_and_terminates() {
+    calls(&mut script(&MAVSDK_GRPC, "mavsdk_grpc.py"));
+}
+
+#[test]
+fn val_node_mavlink_reads_arms_and_terminates() {
+    is_called(NODE_MAVLINK.node().arg(file("node_client.mjs")));
+}
+
+/// pymavlink signs, and is believed; whatever is not signed, or not well, is not. The same after a restart.
+#[test]
+fn val_pymavlink_signatures_are_wanted_and_judged() {
+    let folder = tempfile::tempdir().unwrap();
+    let key = folder.path().join("flight.key");
+    let made = Running::to_end(program(Program::OnboardSim).arg("keygen").arg(&key));
+    assert_eq!(made.code, Some(0), "{}", made.output);
+    for further in [None, Some("restarted")] {
+        let log = if further.is_some() { "second.mcap" } else { "first.mcap" };
+        let mut command = program(Program::OnboardSim);
+        command.args([
+            "fly",
+            "--stay",
+            "--mavlink",
+            "udpin:127.0.0.1:0",
+            "--log",
+            log,
+            "--key",
+            "flight.key",
+        ]);
+        let mut vehicle = Running::start(command.current_dir(folder.path()));
+        let port = vehicle.bound_port(Bound::Udp).to_string();
+        let mut client = script(&PYMAVLINK, "signed_client.py");
+        well(&Running::to_end(client.arg(port).arg(&key).args(further)));
+        vehicle.signal(Signal::SIGTERM);
+        vehicle.wait();
+        assert!(
+            raw_frames_of(&folder.path().join(log), "tx").iter().all(|frame| frame[2] == 0),
+            "no signatures"
+        );
+    }
+}
+
+/// MAVProxy, driven through its standard input as an operator would.
+#[test]
+fn val_mavproxy_shows_arms_and_terminates() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut vehicle = vehicle(folder.path(), &["--mavlink", "udpin:127.0.0.1:0"]);
+    let port = vehicle.bound_port(Bound::Udp);
+    vehicle.wait_for_line("PAD_IDLE");
+    let mut command = PYMAVLINK.program("mavproxy.py");
+    command
+        .args(["--master", &format!("udpout:127.0.0.1:{port}"), "--source-system", "255"])
+        .args(["--source-component", "190", "--nodtr", "--mav20", "--state-basedir", "."])
+        .env("HOME", folder.path())
+        .current_dir(folder.path());
+    let (mut operator, mut proxy) = Running::start_with_input(&mut command);
+    let types = |operator: &mut std::process::ChildStdin, words: &str| {
+        writeln!(operator, "{words}").and_then(|()| operator.flush()).unwrap();
+    };
+    // Without the declined file request this would take MAVProxy some 11 s more.
+    proxy.wait_for_line("Received 23 parameters");
+    types(&mut operator, "param show NMPC_W_THETA");
+    let shown = proxy.wait_for_line("NMPC_W_THETA");
+    assert!(shown.contains("150"), "{shown}");
+    types(&mut operator, "param set RATE_FINS 1");
+    // MAVProxy sets in the background; it is asked until it has heard the vehicle's answer.
+    let is_set = (0..1_000).any(|_| {
+        types(&mut operator, "param show RATE_FINS");
+        proxy.wait_for_line("RATE_FINS").contains("1.0")
+    });
+    assert!(is_set, "the rate is set");
+    types(&mut operator, "long 300 0");
+    proxy.wait_for_line("MISSION_START: DENIED");
+    proxy.wait_for_line("start refused: cannot start in PAD_IDLE");
+    types(&mut operator, "arm throttle");
+    // What HEARTBEAT says, not what was acknowledged.
+    proxy.wait_for_line("Mode(2)");
+    types(&mut operator, "disarm");
+    proxy.wait_for_line("DISARMED");
+    types(&mut operator, "long 185 1");
+    proxy.wait_for_line("DO_FLIGHTTERMINATION: ACCEPTED");
+    types(&mut operator, "arm throttle force");
+    proxy.wait_for_line("refused");
+    drop(operator);
+    drop(proxy);
+    vehicle.signal(Signal::SIGTERM);
+    let ended = vehicle.wait();
+    assert_eq!(ended.code, Some(4), "{}", ended.output);
+}

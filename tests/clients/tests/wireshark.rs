@@ -1,0 +1,126 @@
+//! Wireshark reads what the vehicle sends, whatever its user has made of it.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use clients::{PYMAVLINK, dialect, tshark, tshark_folder};
+use e2e::{BareGround, Program, Running, program, raw_frames_of};
+
+/// A dissector generated from our XML by pymavlink's generator reads every frame of whole flights, and between the two
+/// vehicles every message of ours is among them.
+#[test]
+fn val_wireshark_finds_no_malformed_frame() {
+    // The usual folder for temporary files may be one that only root may enter.
+    let folder = tempfile::tempdir_in("/tmp").unwrap();
+    tshark_folder(folder.path()).unwrap();
+    let mut generator = PYMAVLINK.program("mavgen.py");
+    generator.args(["--lang", "WLua", "--wire-protocol", "2.0", "-o", "touchdown"]).arg(dialect());
+    let generated = Running::to_end(generator.current_dir(folder.path()));
+    assert_eq!(generated.code, Some(0), "{}", generated.output);
+
+    // HEARTBEAT, SYS_STATUS, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, VFR_HUD, EXTENDED_SYS_STATE, STATUSTEXT.
+    let both = [0, 1, 31, 32, 74, 245, 253];
+    let planar = dissected(folder.path(), "paper-calibrated");
+    // Besides: ESTIMATOR_STATUS, TD_DESCENT.
+    let spatial = dissected(folder.path(), "mk2");
+    for (ids, more) in [(&planar, &[][..]), (&spatial, &[230, 54_008])] {
+        for id in both.iter().chain(more) {
+            assert!(ids.contains(id), "message {id} is in the flight: {ids:?}");
+        }
+    }
+    let text = std::fs::read_to_string(dialect()).unwrap();
+    let ours = text.split("<message id=\"").skip(1).filter_map(|rest| rest.split('"').next()?.parse().ok());
+    let ours: BTreeSet<u32> = ours.collect();
+    let seen: BTreeSet<u32> = planar.union(&spatial).copied().collect();
+    assert!(!ours.is_empty() && ours.is_subset(&seen), "{ours:?} of ours, {seen:?} seen");
+}
+
+/// Flies this profile and has Wireshark read every frame of the vehicle; the messages' numbers.
+fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
+    let (log, capture) = (format!("{profile}.mcap"), format!("{profile}.pcap"));
+    let flown = Running::to_end(
+        program(Program::OnboardSim)
+            .args(["fly", "--profile", profile, "--speed", "max", "--auto-start", "--log", &log])
+            .args(["--mavlink", &BareGround::new().link()])
+            .current_dir(folder),
+    );
+    assert_eq!(flown.code, Some(0), "{}", flown.output);
+    let frames = raw_frames_of(&folder.join(&log), "tx");
+    assert!(frames.len() > 500, "{} frames", frames.len());
+    std::fs::write(folder.join(&capture), capture_of(&frames)).unwrap();
+    let read = |filter: &[&str]| {
+        let mut command = tshark(folder);
+        command
+            .args(["-r", &capture, "-X", "lua_script:touchdown.lua", "-d", "udp.port==14550,mavlink_proto"])
+            .args(filter);
+        Running::to_end(&mut command).output
+    };
+    let found = read(&["-Y", "mavlink_proto", "-T", "fields", "-e", "mavlink_proto.msgid"]);
+    let ids: Vec<u32> = found.lines().filter_map(|line| line.parse().ok()).collect();
+    assert_eq!(ids.len(), frames.len(), "every frame is read");
+    let malformed = read(&["-V", "-Y", "_ws.malformed || _ws.lua.error || _ws.expert.severity >= error"]);
+    let lines: Vec<&str> = malformed.lines().filter(|line| !line.starts_with("Running as user")).collect();
+    assert!(lines.is_empty(), "{}", lines.join("\n"));
+    ids.into_iter().collect()
+}
+
+/// A libpcap file with one UDP datagram to port 14550 for each frame.
+fn capture_of(frames: &[Vec<u8>]) -> Vec<u8> {
+    // Magic, version 2.4, zone, accuracy, longest packet, link type 228: IPv4 without anything below it.
+    let mut capture = Vec::new();
+    for word in [0xa1b2_c3d4_u32, 0x0004_0002, 0, 0, 65_535, 228] {
+        capture.extend_from_slice(&word.to_le_bytes());
+    }
+    for frame in frames {
+        let udp_len = 8 + frame.len() as u16;
+        let len = u32::from(20 + udp_len);
+        for word in [0, 0, len, len] {
+            capture.extend_from_slice(&word.to_le_bytes());
+        }
+        capture.extend_from_slice(&[0x45, 0]);
+        capture.extend_from_slice(&(20 + udp_len).to_be_bytes());
+        capture.extend_from_slice(&[0, 0, 0, 0, 64, 17, 0, 0, 127, 0, 0, 1, 127, 0, 0, 1]);
+        for word in [14_551, 14_550, udp_len, 0] {
+            capture.extend_from_slice(&u16::to_be_bytes(word));
+        }
+        capture.extend_from_slice(frame);
+    }
+    capture
+}
+
+/// The same once more for a user who has plugins, preferences and paths of Wireshark's: a dissector of another project
+/// with our dissector's name, which cannot even be read, and MAVLink's port given to it.
+#[test]
+fn a_users_own_wireshark_settings_play_no_part() {
+    let home = tempfile::tempdir_in("/tmp").unwrap();
+    tshark_folder(home.path()).unwrap();
+    let (settings, plugins) =
+        (home.path().join(".config/wireshark"), home.path().join(".local/lib/wireshark/plugins"));
+    for folder in [&settings, &settings.join("plugins"), &plugins] {
+        std::fs::create_dir_all(folder).unwrap();
+        std::fs::write(folder.join("mavlink.lua"), OTHER_DISSECTOR).unwrap();
+    }
+    std::fs::write(settings.join("init.lua"), OTHER_DISSECTOR).unwrap();
+    std::fs::write(settings.join("disabled_protos"), "udp\n").unwrap();
+    std::fs::write(settings.join("preferences"), "gui.column.format: \"No.\", \"%m\"\n").unwrap();
+    // Built and installed with the user's real settings; Cargo keeps its own below the home.
+    program(Program::OnboardSim);
+    PYMAVLINK.installed();
+    let cargo = std::env::home_dir().unwrap().join(".cargo");
+    let again = Command::new(std::env::current_exe().unwrap())
+        .env("CARGO_HOME", std::env::var_os("CARGO_HOME").unwrap_or(cargo.into()))
+        .args(["--exact", "val_wireshark_finds_no_malformed_frame"])
+        .env("HOME", home.path())
+        .env("XDG_CONFIG_HOME", home.path().join(".config"))
+        .env("WIRESHARK_CONFIG_DIR", &settings)
+        .env("WIRESHARK_PLUGIN_DIR", &plugins)
+        .env("WIRESHARK_DATA_DIR", home.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&again.stdout);
+    assert!(again.status.success() && said.contains("1 passed"), "{said}");
+}
+
+const OTHER_DISSECTOR: &str = "local other = Proto('mavlink_proto', 'Another project')\nerror('not ours')\n";
