@@ -4,8 +4,9 @@
 use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
-use clients::{MAVSDK_GRPC, MAVSDK_NATIVE, NODE_MAVLINK, PYMAVLINK, PythonPackages, file};
+use clients::{MAVSDK_GRPC, MAVSDK_NATIVE, NODE_MAVLINK, PYMAVLINK, PythonPackages, dialect, file};
 use e2e::{Bound, Ended, Program, Running, SerialLine, Signal, program, raw_frames_of};
 
 fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
@@ -13,6 +14,27 @@ fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
     Running::start(
         command.args(["fly", "--stay", "--log", "flight.mcap"]).args(arguments).current_dir(folder),
     )
+}
+
+/// Our own dialect beside pymavlink's, generated anew by every run: the definitions may have changed.
+static DIALECT: LazyLock<()> = LazyLock::new(|| {
+    let place = Running::to_end(
+        PYMAVLINK.python().args(["-c", "import pymavlink.dialects.v20 as d; print(d.__path__[0])"]),
+    );
+    let place = Path::new(&place.output);
+    let folder = tempfile::tempdir_in(place).unwrap();
+    let made = folder.path().join("touchdown.py");
+    let mut generator = PYMAVLINK.program("mavgen.py");
+    generator.args(["--lang", "Python3", "--wire-protocol", "2.0", "-o"]).arg(&made).arg(dialect());
+    let generated = Running::to_end(&mut generator);
+    assert_eq!(generated.code, Some(0), "{}", generated.output);
+    // At once: another run may be reading it.
+    std::fs::rename(&made, place.join("touchdown.py")).unwrap();
+});
+
+fn pymavlink(name: &str) -> Command {
+    LazyLock::force(&DIALECT);
+    script(&PYMAVLINK, name)
 }
 
 /// A script of ours.
@@ -45,7 +67,7 @@ fn is_called(client: &mut Command) {
 
 #[test]
 fn val_pymavlink_is_answered_as_the_standard_says() {
-    calls(&mut script(&PYMAVLINK, "pymavlink_client.py"));
+    calls(&mut pymavlink("pymavlink_client.py"));
 }
 
 /// Over UDP, and over a radio's serial line.
@@ -56,7 +78,7 @@ fn val_pymavlink_flies_a_rocket_and_aborts_its_descent() {
     for link in ["udpin:127.0.0.1:0", &serial] {
         let folder = tempfile::tempdir().unwrap();
         let mut vehicle = vehicle(folder.path(), &["--profile", "mk2", "--mavlink", link]);
-        let mut client = script(&PYMAVLINK, "pymavlink_rocket.py");
+        let mut client = pymavlink("pymavlink_rocket.py");
         if link == serial {
             client.arg(&line.far).arg("57600");
         } else {
@@ -72,7 +94,7 @@ fn val_pymavlink_flies_a_rocket_and_aborts_its_descent() {
 
 #[test]
 fn val_pymavlink_two_grounds_are_each_answered_for_themselves() {
-    calls(&mut script(&PYMAVLINK, "two_grounds.py"));
+    calls(&mut pymavlink("two_grounds.py"));
 }
 
 #[test]
@@ -112,7 +134,7 @@ fn val_pymavlink_signatures_are_wanted_and_judged() {
         ]);
         let mut vehicle = Running::start(command.current_dir(folder.path()));
         let port = vehicle.bound_port(Bound::Udp).to_string();
-        let mut client = script(&PYMAVLINK, "signed_client.py");
+        let mut client = pymavlink("signed_client.py");
         well(&Running::to_end(client.arg(port).arg(&key).args(further)));
         vehicle.signal(Signal::SIGTERM);
         vehicle.wait();
