@@ -19,7 +19,8 @@ fn a_newcomer_sees_a_landing_and_its_log_replays_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let flight = Running::to_end(program(Program::Ground).current_dir(folder.path()));
     assert_eq!(flight.code, Some(0), "{}", flight.output);
-    for words in ["PAD_ARMED", "POWERED", "TOUCHDOWN", "LANDED"] {
+    // The mission itself: from apogee, through both phases, to the ground.
+    for words in ["PAD_ARMED", "AERO_DESCENT", "LAND_ARMED", "POWERED", "TOUCHDOWN", "LANDED"] {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
     let log = log_in(&flight.output, folder.path());
@@ -30,9 +31,18 @@ fn a_newcomer_sees_a_landing_and_its_log_replays_to_the_bit() {
 
     let info = Running::to_end(program(Program::Replay).arg("info").arg(&log));
     assert_eq!(info.code, Some(0), "{}", info.output);
-    for words in ["paper-calibrated", "/controller/tick", "/mavlink/rx/raw", "/mavlink/tx/raw", "bit-exact"] {
+    for words in ["mission mk2", "/pilot/tick", "/mavlink/rx/raw", "/mavlink/tx/raw", "bit-exact"] {
         assert!(info.output.contains(words), "no {words} in:\n{}", info.output);
     }
+}
+
+#[test]
+fn the_papers_landing_alone_is_asked_for_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--profile", "paper-calibrated", "--speed", "4"];
+    let flight = Running::to_end(program(Program::Ground).args(arguments).current_dir(folder.path()));
+    assert_eq!(flight.code, Some(0), "{}", flight.output);
+    assert!(flight.output.contains("POWERED") && !flight.output.contains("AERO_DESCENT"), "{}", flight.output);
 }
 
 #[test]

@@ -9,20 +9,19 @@ use clap::{Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::transport::Endpoint;
 
-use crate::attach::place;
 use crate::config::{Characters, Colour};
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::words;
 
 /// What is flown when no link is named and nothing else is said.
-const DEMO_PROFILE: &str = "paper-calibrated";
+const DEMO_PROFILE: &str = "mk2";
 const DEMO_SEED: u64 = 1;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
-/// Without --connect it flies a demonstration: a simulated vehicle in this process, on real MAVLink over a
-/// loopback UDP socket. On a terminal it shows the full screen (? lists the keys); without one, a line an
+/// Without --connect it flies a demonstration, always: a simulated vehicle in this process, from apogee to touchdown, on
+/// real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys); without one, a line an
 /// event, the landing verdict at the end, and the exit code says how it went.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP)]
@@ -46,23 +45,17 @@ pub struct Cli {
     #[arg(long, value_name = "FILE|none", global = true)]
     pub log: Option<LogChoice>,
 
-    /// Demonstration: built-in profile or TOML file.
-    #[arg(
-        long,
-        value_name = "NAME|FILE",
-        default_value = DEMO_PROFILE,
-        conflicts_with = "connect",
-        global = true
-    )]
-    pub profile: String,
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2; the paper's landing is paper-calibrated.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
+    pub profile: Option<String>,
 
-    /// Demonstration: seed of the profile's dispersions.
-    #[arg(long, value_name = "NUMBER", default_value_t = DEMO_SEED, conflicts_with = "connect", global = true)]
-    pub seed: u64,
+    /// Demonstration: seed of its dispersions. Default: 1.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", global = true)]
+    pub seed: Option<u64>,
 
-    /// Demonstration: speed of simulated time, a factor or `max`.
-    #[arg(long, value_name = "FACTOR|max", default_value = "1", conflicts_with = "connect", global = true)]
-    pub speed: Speed,
+    /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
+    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", global = true)]
+    pub speed: Option<Speed>,
 
     /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
     ///
@@ -76,7 +69,7 @@ pub struct Cli {
     #[arg(long, value_name = "FILE", global = true)]
     pub config: Option<PathBuf>,
 
-    /// Fly the demonstration although the settings name a link.
+    /// `ground daemon`: fly the demonstration although the settings name a link.
     #[arg(long, conflicts_with = "connect", global = true)]
     pub demo: bool,
 
@@ -88,9 +81,13 @@ pub struct Cli {
     #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
     pub from: Option<ReplayFrom>,
 
-    /// Socket between a station and its screens; by default this user's own.
+    /// Socket between a station and its screens. Default: one of its own for each station; `ground status` lists them.
     #[arg(long, value_name = "PATH", global = true)]
     pub socket: Option<PathBuf>,
+
+    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub operator: Option<String>,
 
     /// Ring the terminal's bell on an alarm. Default: true.
     #[arg(long, value_name = "true|false", global = true)]
@@ -108,7 +105,7 @@ pub struct Cli {
     #[arg(long, value_name = "WHEN", visible_alias = "color", global = true)]
     pub colour: Option<Colour>,
 
-    /// Arm and start without a hand. The demonstration without a screen always does.
+    /// Arm and start without a hand; with a simulated vehicle only. The demonstration without a screen always does.
     #[arg(long, global = true)]
     pub auto: bool,
 
@@ -135,6 +132,14 @@ pub enum Command {
         /// Show only; command nothing.
         #[arg(long)]
         watch: bool,
+    },
+    /// Every station of yours: its socket, process, link, vehicle, phase, log and screens.
+    Status,
+    /// End a station. Refused while its vehicle is armed or in flight.
+    Stop {
+        /// Also while armed or in flight; the vehicle is left as it is.
+        #[arg(long)]
+        force: bool,
     },
     /// The settings file.
     Config {
@@ -220,17 +225,38 @@ impl FromStr for Seconds {
 }
 
 impl Cli {
-    /// The socket of the station.
-    pub fn socket_path(&self) -> PathBuf {
-        self.socket.clone().unwrap_or_else(place::default_path)
+    /// What is flown as a demonstration.
+    pub fn demonstration(&self) -> (&str, u64, Speed) {
+        let profile = self.profile.as_deref().unwrap_or(DEMO_PROFILE);
+        (profile, self.seed.unwrap_or(DEMO_SEED), self.speed.unwrap_or(Speed::Factor(1.0)))
     }
 
-    /// Whether a demonstration is described, which no link and no station that runs already can be meant by.
+    /// Whether a demonstration is described, which no link of the settings can be meant by.
     pub fn describes_demonstration(&self) -> bool {
-        let replayed = self.replay.is_some() || matches!(self.command, Some(Command::Attach { .. }));
-        let described =
-            self.profile != DEMO_PROFILE || self.seed != DEMO_SEED || self.speed != Speed::Factor(1.0);
-        described && !replayed
+        self.demo || self.profile.is_some() || self.seed.is_some() || self.speed.is_some()
+    }
+
+    /// A flag that means nothing to a command which has no vehicle, no log and no end of its own.
+    pub fn ignored_flag(&self) -> Option<&'static str> {
+        let ignores = matches!(
+            self.command,
+            Some(Command::Attach { .. } | Command::Status | Command::Stop { .. })
+        );
+        let given = [
+            ("--connect", !self.connect.is_empty()),
+            ("--key", self.key.is_some()),
+            ("--log", self.log.is_some()),
+            ("--tlog", self.tlog.is_some()),
+            ("--profile", self.profile.is_some()),
+            ("--seed", self.seed.is_some()),
+            ("--speed", self.speed.is_some()),
+            ("--demo", self.demo),
+            ("--replay", self.replay.is_some()),
+            ("--auto", self.auto),
+            ("--timeout-s", self.timeout_s.is_some()),
+            ("--alarm-command", self.alarm_command.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| ignores && *given).map(|(flag, _)| flag)
     }
 
     /// Whether the flight is started without a hand.
@@ -280,15 +306,36 @@ mod tests {
     }
 
     #[test]
-    fn a_demonstration_without_a_screen_starts_by_itself_and_an_attached_ground_only_watches() {
-        let describes =
-            |arguments: &[&str]| Cli::try_parse_from(arguments).unwrap().describes_demonstration();
-        assert!(!describes(&["ground"]) && !describes(&["ground", "attach"]));
-        assert!(describes(&["ground", "--profile", "mk2"]) && describes(&["ground", "--seed", "3"]));
-        assert!(!describes(&["ground", "--connect", "udpin:0.0.0.0:14550"]));
+    fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap();
+        assert_eq!(demo.demonstration(), ("mk2", 1, Speed::Factor(1.0)), "the mission itself");
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
-        let attached = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
-        assert!(!attached.starts_by_itself(false));
+        let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
+        assert!(!live.starts_by_itself(false));
+    }
+
+    #[test]
+    fn flags_that_an_attached_screen_would_ignore_are_found() {
+        let ignored = |line: &str| Cli::try_parse_from(line.split(' ')).unwrap().ignored_flag();
+        for (flag, value) in [
+            ("--connect", " udpin:0.0.0.0:14550"),
+            ("--key", " k"),
+            ("--log", " none"),
+            ("--tlog", " none"),
+            ("--profile", " mk2"),
+            ("--seed", " 1"),
+            ("--speed", " 1"),
+            ("--demo", ""),
+            ("--auto", ""),
+            ("--alarm-command", " true"),
+        ] {
+            for command in ["attach", "status", "stop"] {
+                assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
+            }
+            assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
+        }
+        assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
+        assert_eq!(ignored("ground --replay f.mcap attach"), Some("--replay"));
+        assert_eq!(ignored("ground attach --watch --socket s --operator anna --bell false"), None);
     }
 }

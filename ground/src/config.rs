@@ -6,13 +6,13 @@ use clap::ValueEnum;
 use protocol::transport::Endpoint;
 use serde::Deserialize;
 
-use crate::cli::{Cli, LogChoice};
+use crate::cli::{Cli, Command, LogChoice};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
 # Looked for in $XDG_CONFIG_HOME/touchdown/ground.toml, else ~/.config/touchdown/ground.toml.
 
-# Links to the vehicle, as for --connect. Without one, `ground` flies its demonstration.
+# Links to the vehicle, as for --connect, for `ground daemon`. A bare `ground` flies its demonstration.
 #connect = ["udpin:0.0.0.0:14550"]
 
 # Signing key, as for --key. Default: nothing is signed.
@@ -24,8 +24,8 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Telemetry log (.tlog), or "none". Default with a link: the log's name with this ending.
 #tlog = "flight.tlog"
 
-# Socket between a station and its screens. Default: this user's own.
-#socket = "/run/user/1000/touchdown-ground.sock"
+# Socket between a station and its screens. Default: one of its own for each station.
+#socket = "/run/user/1000/touchdown/field.sock"
 
 # Ring the terminal's bell on an alarm.
 #bell = true
@@ -155,8 +155,9 @@ impl Config {
         fn parsed<T: std::str::FromStr>(value: Option<&String>) -> Option<T> {
             value.and_then(|value| value.parse().ok())
         }
-        // A replay, an attached screen and a demonstration that was asked for need no link.
-        if cli.connect.is_empty() && cli.replay.is_none() && !cli.demo {
+        // Without a command it is the link on the command line or the demonstration, whatever was written long ago.
+        let is_daemon = matches!(cli.command, Some(Command::Daemon));
+        if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
             cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
         }
         if cli.key.is_none() && !cli.connect.is_empty() {

@@ -46,7 +46,7 @@ impl Key {
             return None;
         }
         // A held key is one press, where the terminal tells repeats apart: neither an abort nor a
-        // confirmed question. Taking letters back and scrolling may go on.
+        // confirmed question. Scrolling may go on.
         if event.kind == KeyEventKind::Repeat && !may_repeat(event.code) {
             return None;
         }
@@ -79,6 +79,21 @@ impl Key {
         }
     }
 
+    /// Whether it moves a list and does nothing else; such keys are held down on purpose.
+    pub fn scrolls(self) -> bool {
+        matches!(
+            self,
+            Self::Up
+                | Self::Down
+                | Self::Left
+                | Self::Right
+                | Self::PageUp
+                | Self::PageDown
+                | Self::Home
+                | Self::End
+        )
+    }
+
     /// The key's name, for the log.
     pub fn name(self) -> String {
         match self {
@@ -107,8 +122,7 @@ impl Key {
 fn may_repeat(code: KeyCode) -> bool {
     matches!(
         code,
-        KeyCode::Backspace
-            | KeyCode::Up
+        KeyCode::Up
             | KeyCode::Down
             | KeyCode::Left
             | KeyCode::Right
@@ -126,7 +140,7 @@ mod tests {
         let chord = |kind| KeyEvent::new_with_kind(KeyCode::Char('x'), KeyModifiers::CONTROL, kind);
         let held = |code| KeyEvent::new_with_kind(code, KeyModifiers::NONE, KeyEventKind::Repeat);
         assert_eq!(Key::from_event(&held(KeyCode::Char('q'))), None);
-        assert_eq!(Key::from_event(&held(KeyCode::Backspace)), Some(Key::Backspace));
+        assert_eq!(Key::from_event(&held(KeyCode::Down)), Some(Key::Down));
         assert_eq!(Key::from_event(&chord(KeyEventKind::Press)), Some(Key::CtrlX));
         assert_eq!(Key::from_event(&chord(KeyEventKind::Repeat)), None);
         assert_eq!(Key::from_event(&chord(KeyEventKind::Release)), None);

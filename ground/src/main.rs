@@ -17,6 +17,11 @@ fn main() -> ExitCode {
             return if message.use_stderr() { code(Exit::Usage) } else { ExitCode::SUCCESS };
         }
     };
+    if let Some(flag) = cli.ignored_flag() {
+        let why = "it belongs to the station that holds the link";
+        let _ = writeln!(std::io::stderr(), "error: {flag} means nothing to this command: {why}");
+        return code(Exit::Usage);
+    }
     // A panic has restored the terminal and ended the log while it unwound, and has said what it was.
     let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&cli)));
     match ended {

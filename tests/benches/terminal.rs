@@ -228,7 +228,7 @@ fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Fai
     let before = mark(&terminal);
     std::thread::sleep(watched);
     idle.add(&terminal, before);
-    terminal.type_bytes(b"AARM\r");
+    terminal.type_by_hand(b"AARM\r");
     // The ground offers to start once a heartbeat says armed, and it hears the vehicle when we do.
     watch.wait_for("an armed heartbeat", |_, message| match message {
         Some(MavMessage::HEARTBEAT(beat)) => {

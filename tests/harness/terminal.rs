@@ -24,6 +24,9 @@ const ANSWER: &[u8] = b"\x1b[?0u";
 /// What every terminal answers when asked what it is; it ends the wait for an answer to the question.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
+/// Between two keys of an unhurried hand.
+const BETWEEN_KEYS: Duration = Duration::from_millis(150);
+
 /// A running program and the terminal that it runs on.
 pub struct Terminal {
     child: Child,
@@ -106,6 +109,45 @@ impl Terminal {
         self.keyboard.write_all(bytes).expect("a terminal that takes keys");
     }
 
+    /// Types these keys as a hand does, one after the other.
+    ///
+    /// # Panics
+    /// The terminal is gone.
+    pub fn type_by_hand(&mut self, keys: &[u8]) {
+        for (k, key) in keys.iter().enumerate() {
+            if k > 0 {
+                pause(BETWEEN_KEYS);
+            }
+            self.type_bytes(&[*key]);
+        }
+    }
+
+    /// Holds a key down for so many repeats, on a keyboard that repeats it after half a second and every 33 ms then.
+    ///
+    /// # Panics
+    /// The terminal is gone.
+    pub fn hold(&mut self, key: u8, repeats: usize) {
+        self.type_bytes(&[key]);
+        pause(Duration::from_millis(500));
+        for _ in 0..repeats {
+            self.type_bytes(&[key]);
+            pause(Duration::from_millis(33));
+        }
+    }
+
+    /// Pastes a text: between marks if the program has asked for them, as terminals do.
+    ///
+    /// # Panics
+    /// The terminal is gone.
+    pub fn paste(&mut self, text: &str) {
+        let typed = text.replace('\n', "\r");
+        if self.look().wants_pastes_marked() {
+            self.type_bytes(format!("\x1b[200~{typed}\x1b[201~").as_bytes());
+        } else {
+            self.type_bytes(typed.as_bytes());
+        }
+    }
+
     /// What its window shows now. The program's output waits while the answer is held.
     pub fn look(&self) -> impl std::ops::Deref<Target = Window> + '_ {
         self.window.look()
@@ -166,12 +208,20 @@ impl Terminal {
         let window = self.look();
         let count = |what: &[u8]| window.bytes().windows(what.len()).filter(|bytes| *bytes == what).count();
         // Key flags pushed and popped (kitty's keyboard protocol).
-        modes == self.modes && !window.is_taken() && count(b"\x1b[>") == count(b"\x1b[<1u")
+        modes == self.modes
+            && !window.is_taken()
+            && !window.wants_pastes_marked()
+            && count(b"\x1b[>") == count(b"\x1b[<1u")
     }
 
     /// Takes nothing of what the program writes while the answer is held: a stopped scroll, a session that hangs.
     pub fn stall(&self) -> impl Sized + '_ {
         self.window.reading.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The process on it that was started first.
+    pub fn pid(&self) -> u32 {
+        self.child.id()
     }
 
     /// Sends the program a signal.
@@ -220,6 +270,14 @@ impl Drop for Terminal {
         // It may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// Time passes at the keyboard.
+fn pause(time: Duration) {
+    let end = now() + time;
+    while !left(end).is_zero() {
+        std::thread::park_timeout(left(end));
     }
 }
 

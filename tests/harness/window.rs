@@ -119,6 +119,11 @@ impl Window {
         self.parser.screen().alternate_screen() || self.parser.screen().hide_cursor()
     }
 
+    /// Whether a program has asked that what is pasted comes between marks.
+    pub fn wants_pastes_marked(&self) -> bool {
+        self.parser.screen().bracketed_paste()
+    }
+
     /// Whether the last program on it has ended.
     pub fn is_closed(&self) -> bool {
         self.closed

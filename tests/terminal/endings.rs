@@ -56,16 +56,25 @@ fn quit_and_terminated_it_gives_the_terminal_back_and_ends_its_log() {
 }
 
 #[test]
-fn armed_it_asks_before_it_quits_and_a_second_key_ends_it() {
+fn armed_its_screen_quits_by_a_typed_word_alone_and_the_station_goes_on() {
     let mut stage = Stage::set("paper-calibrated");
     stage.arm();
-    stage.terminal.type_bytes(b"q");
+    stage.terminal.type_by_hand(b"q");
     stage.terminal.wait_for("QUIT although armed or in flight");
-    stage.terminal.type_bytes(b"x");
+    stage.terminal.type_by_hand(b"x");
     stage.terminal.wait_for("quit: cancelled");
-    stage.terminal.type_bytes(b"qq");
-    stage.terminal.wait_for_end();
-    assert!(stage.terminal.is_restored());
+    stage.terminal.type_by_hand(b"qquit\r");
+    // What it says from now on is said on the terminal as it was.
+    stage.terminal.wait_for("the screen was quit; armed or in flight, so the station goes on");
+    assert!(stage.terminal.is_restored() && !stage.terminal.look().is_closed());
+    stage.terminal.signal(Signal::SIGINT);
+    stage.terminal.wait_for("SIGINT: the station goes on while armed or in flight");
+    let mut second = Terminal::start(&ground(stage.folder.path(), &["attach"]), SIZE, false);
+    second.wait_for(" ARMED ");
+    second.type_bytes(b"\x18\r");
+    second.wait_for("acknowledged accepted  observed yes");
+    stage.terminal.signal(Signal::SIGTERM);
+    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
     whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
 }
 
@@ -88,7 +97,7 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
     third.wait_for("WATCHING only");
     third.wait_for("acknowledged accepted  observed yes");
     for screen in [&mut second, &mut third] {
-        screen.type_bytes(b"q");
+        screen.type_by_hand(b"q");
         screen.wait_for_end();
         assert!(screen.is_restored());
     }

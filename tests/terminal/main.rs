@@ -5,6 +5,8 @@
 
 mod attack;
 mod endings;
+mod finding;
+mod hand;
 mod reboot;
 mod resize;
 mod stage;

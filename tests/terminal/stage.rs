@@ -62,10 +62,10 @@ impl Stage {
         self.air.commands().iter().filter(asked).count()
     }
 
-    /// Types this until something comes of it; returns how often.
+    /// Types this by hand until something comes of it; returns how often.
     pub(crate) fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
         for typed in 1..=20 {
-            self.terminal.type_bytes(keys);
+            self.terminal.type_by_hand(keys);
             let shown = |window: &e2e::Window| window.shows(words).then_some(());
             if self.terminal.wait_within(TYPED_AGAIN_AFTER, shown).is_some() {
                 return typed;
@@ -84,7 +84,7 @@ impl Stage {
 
     /// Starts the countdown.
     pub(crate) fn start(&mut self) {
-        self.type_until(b"S\r", "START  commanded");
+        self.type_until(b"SSTART\r", "START  commanded");
         self.wait_for_fact("START", "observed yes");
     }
 

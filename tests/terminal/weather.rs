@@ -55,7 +55,7 @@ fn an_arm_whose_answer_is_lost_is_not_sent_again_and_the_vehicle_is_believed() {
     let mut stage = Stage::set("paper-calibrated");
     stage.terminal.wait_for("GO: every arming check passes");
     stage.air.set(Weather { eats_answers: true, ..Weather::default() });
-    stage.terminal.type_bytes(b"AARM\r");
+    stage.terminal.type_by_hand(b"AARM\r");
     stage.wait_for_fact("ARM", "acknowledged NEVER  observed yes");
     stage.terminal.wait_for(" ARMED ");
     assert_eq!(stage.sent(ARM, 1.0), 1);

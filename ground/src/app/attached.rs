@@ -14,12 +14,14 @@ use super::clock::Clock;
 use super::output::Output;
 use super::server::read_one;
 use super::signals::Signals;
+use super::status;
 use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_asked};
 use crate::attach::place;
 use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
+use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
 use crate::update::{Action, Msg, update};
 
@@ -30,25 +32,40 @@ const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Messages waiting to be taken into the model.
 const WAITING_MAX: usize = 4_096;
 
+/// Who sits at an attached screen.
+#[derive(Debug, Clone)]
+pub struct Viewer {
+    /// Commands nothing.
+    pub watch: bool,
+    /// Their name.
+    pub operator: String,
+}
+
 /// Shows the station until the person at the screen quits; the station goes on. Without a terminal for a screen it tells
 /// the events in lines, and commands nothing.
 ///
 /// # Errors
 /// No station runs there, or the terminal failed.
-pub async fn session(path: &Path, watch: bool, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
-    let mut link = Link::open(path, watch).await.with_context(|| {
+pub async fn session(
+    named: Option<&Path>,
+    viewer: &Viewer,
+    config: &Config,
+    interactive: bool,
+) -> anyhow::Result<Exit> {
+    let path = status::the_station(named).await?;
+    let mut link = Link::open(&path, viewer).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
     })?;
     let clock = Clock::start();
     let mut signals = Signals::listen()?;
-    let mut model = Model::new(settings(&Hello::default(), watch));
+    let mut model = Model::new(settings(&Hello::default(), viewer));
     let mut times = Times::default();
     // The history first: the first frame shows everything.
     let mut live = false;
     while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
         live = told == Told::Live;
-        take(&mut model, told, at, watch)?;
+        take(&mut model, told, at, viewer)?;
     }
     let mut output = Output::open(interactive, config)?;
     model.repeats_told = output.tells_repeats();
@@ -79,11 +96,11 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                 }
                 if let Some((told, at)) = told {
                     times.heard(at, clock.now());
-                    take_live(&mut model, told, at)
+                    take_live(&mut model, told, at, viewer)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // An abort that waits for its answer must not die with the station that repeats it.
-                    model.link.abort_unsent |= !watch && model.commands.is_aborting();
+                    model.link.abort_unsent |= !viewer.watch && model.commands.is_aborting();
                     // Cut off while it told the past, it tells no more of it.
                     model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
@@ -92,14 +109,21 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
             },
             () = clock.sleep_until(look_again_at) => {
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
-                if let Ok(mut found) = Link::open(path, watch).await {
+                // Where no socket was named, the station that holds the same link now; never another vehicle's.
+                let place = match named {
+                    Some(path) => Some(path.to_owned()),
+                    None => status::station_over(&model.settings.link_name).await,
+                };
+                if let Some(place) = place
+                    && let Ok(mut found) = Link::open(&place, viewer).await
+                {
                     let abort_unsent = model.link.abort_unsent
                         && !found.ask(&Asked::Command(CommandKind::Abort)).await;
                     link = found;
                     // Another station: another clock, another history.
                     times = Times::default();
                     let pages = model.pages;
-                    model = Model::new(settings(&Hello::default(), watch));
+                    model = Model::new(settings(&Hello::default(), viewer));
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
                     model.repeats_told = output.tells_repeats();
@@ -126,7 +150,12 @@ pub async fn session(path: &Path, watch: bool, config: &Config, interactive: boo
                 Action::Bell => output.bell(),
                 Action::Quit => quit = true,
                 // The station itself sends, records and tells.
-                Action::Send(_) | Action::Record(_) | Action::SyncLog | Action::Alarm(_) => {}
+                Action::Send(_)
+                | Action::Record(_)
+                | Action::SyncLog
+                | Action::Alarm(_)
+                | Action::Tell(_)
+                | Action::LeaveScreen => {}
             }
         }
         let now = clock.now();
@@ -152,12 +181,12 @@ fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
             model.alarms.acknowledge();
             return;
         }
-        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) => return,
+        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) | Asked::Status | Asked::Stop { .. } => return,
     };
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 
-fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Result<()> {
+fn take(model: &mut Model, told: Told, at: Duration, viewer: &Viewer) -> anyhow::Result<()> {
     match told {
         Told::Hello(hello) => {
             let (ours, theirs) = (VERSION, hello.version);
@@ -165,19 +194,21 @@ fn take(model: &mut Model, told: Told, at: Duration, watch: bool) -> anyhow::Res
                 ours == theirs,
                 "the station speaks version {theirs}, this screen {ours}; update"
             );
-            model.settings = settings(&hello, watch);
+            model.settings = settings(&hello, viewer);
         }
         Told::Live => model.history_ends(),
         // What the station did then is done.
         Told::Msg(msg) => drop(update(model, msg, at)),
+        // Answers to questions that a screen does not ask.
+        Told::Status(_) | Told::Stopping { .. } => {}
     }
     Ok(())
 }
 
-fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
+fn take_live(model: &mut Model, told: Told, at: Duration, viewer: &Viewer) -> Vec<Action> {
     match told {
         Told::Hello(hello) => {
-            model.settings = settings(&hello, model.settings.role == Role::Watching);
+            model.settings = settings(&hello, viewer);
             Vec::new()
         }
         Told::Live => {
@@ -189,16 +220,19 @@ fn take_live(model: &mut Model, told: Told, at: Duration) -> Vec<Action> {
             // The station asks for what the crew asks; a screen only rings.
             actions.into_iter().filter(|action| *action == Action::Bell).collect()
         }
+        Told::Status(_) | Told::Stopping { .. } => Vec::new(),
     }
 }
 
-fn settings(hello: &Hello, watch: bool) -> Settings {
+fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
     let path = |path: &String| Some(path.clone()).filter(|path| !path.is_empty());
     Settings {
         link_capacity_bytes_s: Some(hello.link_capacity_bytes_s).filter(|most| *most > 0),
         log_path: path(&hello.log_path),
         tlog_path: path(&hello.tlog_path),
-        role: if watch { Role::Watching } else { Role::Attached },
+        role: if viewer.watch { Role::Watching } else { Role::Attached },
+        seat: Seat::new(hello.screen, viewer.operator.clone()),
+        demonstration: hello.demonstration,
         auto: hello.auto,
         ..Settings::on_screen(&hello.link_name)
     }
@@ -233,7 +267,7 @@ struct Link {
 }
 
 impl Link {
-    async fn open(path: &Path, watch: bool) -> std::io::Result<Self> {
+    async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
         let (mut read, write) = place::connect(path).await?.into_split();
         let (tell, told) = mpsc::channel(WAITING_MAX);
         tokio::spawn(async move {
@@ -245,7 +279,7 @@ impl Link {
             }
         });
         let mut link = Self { told, write };
-        link.ask(&Asked::Hello { watch }).await;
+        link.ask(&Asked::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 

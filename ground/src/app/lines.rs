@@ -25,6 +25,11 @@ impl Lines {
         Self::default()
     }
 
+    /// What was said so far was shown elsewhere.
+    pub fn from_now_on(model: &Model) -> Self {
+        Self { seen: model.events.total(), closed: false }
+    }
+
     /// Nobody reads them.
     pub fn closed() -> Self {
         Self { seen: 0, closed: true }

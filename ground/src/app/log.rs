@@ -77,6 +77,19 @@ impl LogGuard {
         Self { recorder }
     }
 
+    /// Takes the log away again: nothing has begun that it could tell of.
+    pub fn discard(mut self) {
+        let Some(recorder) = self.recorder.take() else { return };
+        let tlog = recorder.tlog_path().map(Path::to_owned);
+        // Whether it was written does not matter any more, and the files are this run's own.
+        if let Ok(path) = recorder.finish() {
+            let _ = std::fs::remove_file(path);
+        }
+        if let Some(tlog) = tlog {
+            let _ = std::fs::remove_file(tlog);
+        }
+    }
+
     /// Ends the log; returns its path.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ pub mod attached;
 pub mod clock;
 pub mod lines;
 pub mod log;
+mod operator;
 mod output;
 mod paper;
 pub mod print;
@@ -13,6 +14,7 @@ pub mod screen;
 pub mod server;
 pub mod signals;
 mod station;
+pub mod status;
 pub mod wire;
 
 use std::io::IsTerminal as _;
@@ -24,12 +26,13 @@ use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::Endpoint;
 
-use crate::attach::place;
 use crate::cli::{Cli, Command, LogChoice, Seconds};
 use crate::config::Config;
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
+use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
+use attached::Viewer;
 use clock::{Clock, LogTime};
 use log::LogGuard;
 use output::Output;
@@ -51,40 +54,37 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         _ => {}
     }
     let config = Config::load(cli.config.as_deref())?.overridden_by(cli);
-    // Who names a link means that link, not the station that may run already.
     let mut cli = cli.clone();
-    cli.demo |= cli.describes_demonstration();
-    let may_attach = cli.connect.is_empty() && !cli.demo;
     config.fill(&mut cli);
     let (cli, config) = (&cli, &config);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
+    let socket = cli.socket.as_deref();
+    let operator = operator::operator(cli.operator.as_deref());
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     runtime.block_on(async {
         match (&cli.command, &cli.replay) {
+            (Some(Command::Status), _) => status::list().await,
+            (Some(Command::Stop { force }), _) => status::stop(socket, *force, operator).await,
             (Some(Command::Attach { watch }), _) => {
-                attached::session(&cli.socket_path(), *watch, config, interactive).await
+                let viewer = Viewer { watch: *watch, operator };
+                attached::session(socket, &viewer, config, interactive).await
             }
-            (Some(Command::Daemon), _) => session(cli, config, false).await,
+            (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
             (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
-            (_, None) if interactive && may_attach && station_runs(cli).await => {
-                attached::session(&cli.socket_path(), false, config, interactive).await
-            }
-            (_, None) => session(cli, config, interactive).await,
+            (_, None) => session(cli, config, interactive, operator).await,
         }
     })
 }
 
-/// A station of this user runs on this machine already.
-async fn station_runs(cli: &Cli) -> bool {
-    place::connect(&cli.socket_path()).await.is_ok()
-}
-
-async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
+async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &cli.connect[..] {
-        [] => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
+        [] => {
+            let (profile, seed, speed) = cli.demonstration();
+            Some(DemoOptions::load(profile, seed, speed)?)
+        }
         _ => None,
     };
     let header = match &demo_options {
@@ -95,26 +95,56 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
             ..LogHeader::default()
         },
     };
+    let tlog = cli.tlog.as_ref();
+    let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
+    let recorder = log::open(cli.log.as_ref(), tlog, &header)?;
+    let log_guard = LogGuard::new(recorder.clone());
+    let (mut station, mut model, mut wire) =
+        match start(cli, config, interactive, operator, (clock, demo_options, recorder)).await {
+            Ok(started) => started,
+            Err(error) => {
+                log_guard.discard();
+                return Err(error);
+            }
+        };
+    let ran = station.run(&mut model, &mut wire).await;
+    wire.remember();
+    station.close(&model).await;
+    let log_path = log_guard.finish();
+    ran?;
+    lines::closing(&model, interactive, log_path.as_ref());
+    log_path.context("the log")?;
+    Ok(exit::decide(&model.outcome, interactive))
+}
+
+/// Opens everything that a station is, but its log.
+async fn start(
+    cli: &Cli,
+    config: &Config,
+    interactive: bool,
+    operator: String,
+    (clock, demo_options, recorder): (Clock, Option<DemoOptions>, Option<Recorder>),
+) -> anyhow::Result<(Station, Model, Wire)> {
+    let is_daemon = matches!(cli.command, Some(Command::Daemon));
     // The demonstration takes any free port, so that it runs beside a real ground station.
     let mut endpoints = cli.connect.clone();
     if endpoints.is_empty() {
         endpoints.push(Endpoint::UdpIn("127.0.0.1:0".to_owned()));
     }
     let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
-    let tlog = cli.tlog.as_ref();
-    let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
-    let recorder = log::open(cli.log.as_ref(), tlog, &header)?;
-    let log_guard = LogGuard::new(recorder.clone());
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let mut wire = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await?;
+    let opened = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await;
+    let wire = match opened {
+        Ok(wire) => wire,
+        Err(error) => return Err(status::explain(error, &cli.connect).await),
+    };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
             Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
         }
         _ => None,
     };
-    let is_daemon = matches!(cli.command, Some(Command::Daemon));
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
     let mut model = Model::new(Settings {
@@ -128,41 +158,59 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         role: Role::Station,
+        seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
+        demonstration: demo.is_some(),
         auto,
         // A daemon, too, goes on after a flight.
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
     });
+    let server = serve(cli, &mut model, interactive, &clock).await?;
+    if demo.is_some()
+        && !is_daemon
+        && let Some(line) = status::beside().await
+    {
+        model.info(clock.now(), line);
+    }
     let output = Output::open(interactive, config)?;
     model.repeats_told = output.tells_repeats();
-    let socket = cli.socket_path();
-    let server = match is_daemon {
-        true => Some(Server::open(&socket, hello(&model)).await?),
-        // Other screens may watch a real vehicle's station; where one is served already, they watch that.
-        false if interactive && demo.is_none() => Server::open(&socket, hello(&model)).await.ok(),
-        false => None,
-    };
-    let alarm_command = config.alarm_command.clone();
-    let mut station = Station {
+    let station = Station {
         clock,
         log_time,
         recorder,
         demo,
         output,
-        socket,
+        socket: cli.socket.clone(),
         server,
-        alarm_command,
+        screens: Vec::new(),
+        alarm_command: config.alarm_command.clone(),
         quiet_input: None,
         report_at: Duration::ZERO,
     };
-    let ran = station.run(&mut model, &mut wire).await;
-    wire.remember();
-    station.close(&model).await;
-    let log_path = log_guard.finish();
-    ran?;
-    lines::closing(&model, interactive, log_path.as_ref());
-    log_path.context("the log")?;
-    Ok(exit::decide(&model.outcome, interactive))
+    Ok((station, model, wire))
+}
+
+/// The socket of a station with a real vehicle, and of every daemon; a demonstration on a terminal needs none.
+async fn serve(
+    cli: &Cli,
+    model: &mut Model,
+    interactive: bool,
+    clock: &Clock,
+) -> anyhow::Result<Option<Server>> {
+    let is_daemon = matches!(cli.command, Some(Command::Daemon));
+    if model.settings.demonstration && !is_daemon {
+        return Ok(None);
+    }
+    let first_screen = if interactive { 2 } else { 1 };
+    match Server::open(cli.socket.as_deref(), hello(model), first_screen).await {
+        Ok(server) => Ok(Some(server)),
+        Err(error) if is_daemon => Err(error),
+        // It has a screen, or lines, of its own.
+        Err(error) => {
+            model.warn(clock.now(), format!("no other screen can attach: {error:#}"));
+            Ok(None)
+        }
+    }
 }
 
 fn start_demo(

@@ -81,6 +81,13 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             msg = screen.input() => match msg {
                 Msg::Key(crate::key::Key::CtrlL) => screen.clear(),
                 Msg::Key(key) if player.on_key(key) => return Ok(()),
+                // Held or pasted: of such keys those count that move a list or the time.
+                Msg::Keys(keys) => {
+                    for key in keys.into_iter().filter(|key| key.scrolls()) {
+                        player.on_key(key);
+                    }
+                    screen.mark_changed();
+                }
                 Msg::Terminate(_) => return Ok(()),
                 _ => screen.mark_changed(),
             },

@@ -3,22 +3,26 @@
 use std::io;
 use std::mem::ManuallyDrop;
 use std::os::fd::OwnedFd;
+use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use anyhow::Context as _;
 use crossterm::cursor::Show;
 use crossterm::event::{
-    Event, EventStream, KeyboardEnhancementFlags, PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
+    DisableBracketedPaste, EnableBracketedPaste, Event, EventStream, KeyboardEnhancementFlags,
+    PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
 };
 use crossterm::terminal::{
     EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
     supports_keyboard_enhancement,
 };
 use crossterm::{execute, queue};
-use futures_util::StreamExt as _;
+use futures_util::Stream as _;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
+use rustix::termios::QueueSelector;
 
 use super::paper::{self, Page, Paper};
 use crate::config::{Characters, Colour, Config};
@@ -34,6 +38,13 @@ const FRAME: Duration = Duration::from_millis(100);
 const CALM_FRAME: Duration = Duration::from_millis(500);
 /// Ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
+
+/// Keys told at once, at most: a paste must not hold up link and clock. What is beyond comes together again.
+const TOGETHER_MAX: usize = 1_024;
+/// A paste is over when nothing has come for this long; a slow line may bring its pieces some way apart.
+const QUIET_FOR: Duration = Duration::from_millis(50);
+/// Nobody waits longer for a paste to end.
+const QUIET_WITHIN: Duration = Duration::from_secs(2);
 
 /// Why a screen ends without a signal.
 pub const GONE: &str = "the terminal is gone";
@@ -57,6 +68,8 @@ pub struct Screen {
     drawn_at: Option<Duration>,
     /// The next frame is written whole.
     whole: bool,
+    /// Came behind keys that are told first.
+    waiting: Option<Msg>,
     input_ended: bool,
 }
 
@@ -78,6 +91,7 @@ impl Screen {
             wait: Duration::ZERO,
             drawn_at: None,
             whole: false,
+            waiting: None,
             input_ended: false,
         })
     }
@@ -157,27 +171,41 @@ impl Screen {
         }
     }
 
-    /// The next thing done at the terminal.
+    /// The next thing done at the terminal: a key, or all the keys that came together.
     pub async fn input(&mut self) -> Msg {
-        loop {
-            if self.input_ended {
-                return std::future::pending().await;
-            }
-            match self.events.next().await {
-                Some(Ok(Event::Key(event))) => {
-                    if let Some(key) = Key::from_event(&event) {
-                        return Msg::Key(key);
-                    }
-                }
-                // Also when it is back at its old size before anything was drawn: the terminal has cut what it showed.
-                Some(Ok(Event::Resize(..))) => self.clear(),
-                Some(Ok(_)) => {}
-                Some(Err(_)) | None => {
-                    self.input_ended = true;
-                    return Msg::Terminate(GONE);
-                }
-            }
+        std::future::poll_fn(|context| self.poll_input(context)).await
+    }
+
+    fn poll_input(&mut self, context: &mut Context<'_>) -> Poll<Msg> {
+        if let Some(msg) = self.waiting.take() {
+            return Poll::Ready(msg);
         }
+        let mut keys = Vec::new();
+        let other = loop {
+            if self.input_ended || keys.len() >= TOGETHER_MAX {
+                break None;
+            }
+            match Pin::new(&mut self.events).poll_next(context) {
+                Poll::Pending => break None,
+                Poll::Ready(Some(Ok(Event::Key(event)))) => keys.extend(Key::from_event(&event)),
+                Poll::Ready(Some(Ok(Event::Paste(_)))) => break Some(Msg::Pasted),
+                // Also when it is back at its old size before anything was drawn: the terminal has cut what it showed.
+                Poll::Ready(Some(Ok(Event::Resize(..)))) => self.clear(),
+                Poll::Ready(Some(Ok(_))) => {}
+                Poll::Ready(Some(Err(_)) | None) => {
+                    self.input_ended = true;
+                    break Some(Msg::Terminate(GONE));
+                }
+            }
+        };
+        // Keys first, as they came; what else came is told by the next call.
+        let first = match &keys[..] {
+            [] => return other.map_or(Poll::Pending, Poll::Ready),
+            [key] => Msg::Key(*key),
+            _ => Msg::Keys(keys),
+        };
+        self.waiting = other;
+        Poll::Ready(first)
     }
 }
 
@@ -206,7 +234,7 @@ fn theme(config: &Config) -> Theme {
 fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<Page>>, Paper)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
-    execute!(io::stdout(), EnterAlternateScreen)?;
+    execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     tell_repeats()?;
     let (paper, page) = Paper::new()?;
     Ok((Terminal::new(CrosstermBackend::new(page))?, paper))
@@ -231,6 +259,8 @@ fn restore() {
     if !TAKEN.swap(false, Ordering::Relaxed) {
         return;
     }
+    // Still in raw mode: line by line, as a shell reads, the rest of a paste would not be there to be taken away.
+    drain_input();
     let _ = disable_raw_mode();
     // Half a frame before it would swallow what is said here; a terminal that takes nothing is not talked to.
     if !paper::wait_for_end() {
@@ -241,8 +271,25 @@ fn restore() {
     if KEYBOARD_ENHANCED.swap(false, Ordering::Relaxed) {
         let _ = queue!(out, PopKeyboardEnhancementFlags);
     }
-    let _ = queue!(out, LeaveAlternateScreen, Show);
+    let _ = queue!(out, DisableBracketedPaste, LeaveAlternateScreen, Show);
     let _ = io::Write::flush(&mut out);
+}
+
+/// Throws away what was typed and not taken: the rest of a paste must not run on into the shell.
+fn drain_input() {
+    let stdin = io::stdin();
+    if !rustix::termios::isatty(&stdin) {
+        return;
+    }
+    // A terminal that is gone has nothing more to say.
+    let _ = rustix::termios::tcflush(&stdin, QueueSelector::IFlush);
+    for _ in 0..QUIET_WITHIN.as_millis() / QUIET_FOR.as_millis() {
+        std::thread::sleep(QUIET_FOR);
+        if !matches!(rustix::io::ioctl_fionread(&stdin), Ok(1..)) {
+            return;
+        }
+        let _ = rustix::termios::tcflush(&stdin, QueueSelector::IFlush);
+    }
 }
 
 /// Puts a pipe that nothing comes out of where a terminal was that is gone; it stays one while the answer is held.

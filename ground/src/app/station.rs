@@ -12,12 +12,13 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::clock::{Clock, LogTime};
 use super::lines::Lines;
 use super::output::Output;
-use super::server::{Server, hello};
+use super::server::{News, Server, hello};
 use super::signals::Signals;
 use super::wire::Wire;
-use super::{alarm_command, screen};
-use crate::attach::codec::Asked;
+use super::{alarm_command, screen, status};
+use crate::attach::codec::{Asked, Told};
 use crate::demo::Demo;
+use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model};
 use crate::update::{Action, Msg, update};
 
@@ -32,13 +33,24 @@ pub(super) struct Station {
     pub(super) recorder: Option<Recorder>,
     pub(super) demo: Option<Demo>,
     pub(super) output: Output,
-    pub(super) socket: PathBuf,
+    /// Where it was asked to serve screens.
+    pub(super) socket: Option<PathBuf>,
     pub(super) server: Option<Server>,
+    /// The attached screens; whether each only watches.
+    pub(super) screens: Vec<(Seat, bool)>,
     pub(super) alarm_command: Option<String>,
     /// What keeps the input quiet where a terminal was.
     pub(super) quiet_input: Option<OwnedFd>,
     /// When the links' figures are told next.
     pub(super) report_at: Duration,
+}
+
+/// What the loop does next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Next {
+    Go,
+    LeaveScreen,
+    Quit,
 }
 
 impl Station {
@@ -50,6 +62,7 @@ impl Station {
         let mut signals = Signals::listen()?;
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        self.tell_crew(model, wire);
         loop {
             let redraw_at = self.output.redraw_at();
             let (demo, server) = (&mut self.demo, &mut self.server);
@@ -59,7 +72,7 @@ impl Station {
                 // link last: it alone can be busy all the time, and it is read until nothing waits.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
-                asked = server_asks(server) => self.asked(asked),
+                news = server_hears(server) => self.hear(news, model),
                 msg = self.output.input() => vec![msg],
                 () = self.clock.sleep_until(chord_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
@@ -67,30 +80,45 @@ impl Station {
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
                 received = wire.receive() => wire.take(received),
             };
-            let mut quit = false;
+            let mut next = Next::Go;
             let report = self.is_report_due(&msgs).then(|| wire.report());
             for msg in report.into_iter().chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
-                        self.lose_screen(model).await;
+                        self.lose_screen(Lines::closed(), model).await;
                         Msg::ScreenGone
                     }
                     msg => msg,
                 };
                 self.output.mark_message(&msg, model);
-                quit |= self.step(model, wire, msg);
+                next = next.max(self.step(model, wire, msg));
+            }
+            if next == Next::LeaveScreen {
+                self.lose_screen(Lines::from_now_on(model), model).await;
+                next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
             if let Err(gone) = self.output.show(model, now, now) {
                 if !self.outlives_its_screen() {
                     return Err(gone);
                 }
-                self.lose_screen(model).await;
-                quit |= self.step(model, wire, Msg::ScreenGone);
+                self.lose_screen(Lines::closed(), model).await;
+                next = next.max(self.step(model, wire, Msg::ScreenGone));
             }
-            if quit {
+            self.tell_crew(model, wire);
+            if next == Next::Quit {
                 return Ok(());
             }
+        }
+    }
+
+    /// Tells who can command, when that has changed.
+    fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
+        let own = matches!(self.output, Output::Screen(_)).then(|| model.settings.seat.clone());
+        let attached = self.screens.iter().filter(|(_, watch)| !watch).map(|(seat, _)| seat.clone());
+        let seats: Vec<Seat> = own.into_iter().chain(attached).collect();
+        if seats != model.crew.seats() {
+            self.step(model, wire, Msg::Crew(seats));
         }
     }
 
@@ -113,37 +141,58 @@ impl Station {
         self.demo.is_none() || (self.server.is_some() && matches!(self.output, Output::Lines(_)))
     }
 
-    /// Goes on without the terminal, and serves screens from now on.
-    async fn lose_screen(&mut self, model: &Model) {
-        self.output = Output::Lines(Lines::closed());
+    /// Goes on without the full screen, and serves screens from now on.
+    async fn lose_screen(&mut self, lines: Lines, model: &Model) {
+        self.output = Output::Lines(lines);
         if self.quiet_input.is_none() {
             self.quiet_input = screen::quiet_input();
         }
         if self.server.is_none() {
             // Another station may serve there; then this one goes on alone.
-            self.server = Server::open(&self.socket, hello(model)).await.ok();
+            self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
         }
     }
 
-    /// What a screen elsewhere asks for.
-    fn asked(&self, asked: Asked) -> Vec<Msg> {
-        match asked {
-            Asked::Command(kind) => vec![Msg::Requested(kind)],
-            Asked::Acknowledge => vec![Msg::Acknowledged],
-            Asked::Parameters => vec![Msg::ParametersWanted],
-            Asked::Hello { .. } => Vec::new(),
-            Asked::Key(name) => {
-                if let Some(recorder) = &self.recorder {
-                    let at_ns = self.log_time.now_ns();
-                    let action = OperatorAction {
-                        time_s: 0.0,
-                        kind: "key".to_owned(),
-                        detail: format!("{name} (attached screen)"),
-                    };
-                    recorder.try_record(timed(Record::OperatorAction(action), at_ns), at_ns);
-                }
+    /// What comes over the socket.
+    fn hear(&mut self, news: News, model: &Model) -> Vec<Msg> {
+        match news {
+            News::Came { seat, watch } => {
+                self.screens.push((seat, watch));
                 Vec::new()
             }
+            News::Left(number) => {
+                self.screens.retain(|(seat, _)| seat.screen != number);
+                Vec::new()
+            }
+            News::Asked(by, Asked::Command(kind)) => vec![Msg::Requested { kind, by }],
+            News::Asked(_, Asked::Acknowledge) => vec![Msg::Acknowledged],
+            News::Asked(_, Asked::Parameters) => vec![Msg::ParametersWanted],
+            News::Asked(by, Asked::Key(name)) => {
+                self.record_operator("key", format!("{name}{}", by.in_brackets()));
+                Vec::new()
+            }
+            News::Wants(Asked::Stop { force, operator }, answer) => {
+                let told = status::stopping(model, force);
+                let stops = matches!(told, Told::Stopping { stops: true, .. });
+                let ending = if stops { "ends" } else { "refused" };
+                self.record_operator("stop", format!("asked for by {operator}: {ending}"));
+                // Who asked may be gone; the station ends nevertheless.
+                let _ = answer.send(told);
+                if stops { vec![Msg::Terminate("ground stop")] } else { Vec::new() }
+            }
+            News::Wants(_, answer) => {
+                let _ = answer.send(Told::Status(status::of(model, &self.screens)));
+                Vec::new()
+            }
+            News::Asked(..) => Vec::new(),
+        }
+    }
+
+    fn record_operator(&self, kind: &str, detail: String) {
+        if let Some(recorder) = &self.recorder {
+            let at_ns = self.log_time.now_ns();
+            let action = OperatorAction { time_s: 0.0, kind: kind.to_owned(), detail };
+            recorder.try_record(timed(Record::OperatorAction(action), at_ns), at_ns);
         }
     }
 
@@ -168,10 +217,10 @@ impl Station {
         if health == model.log { vec![Msg::Tick] } else { vec![Msg::Log(health), Msg::Tick] }
     }
 
-    /// One message through the model, and what it wants done. Returns whether to quit.
-    fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> bool {
+    /// One message through the model, and what it wants done.
+    fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
         let now = self.clock.now();
-        let mut quit = false;
+        let mut next = Next::Go;
         if let Some(server) = &mut self.server {
             server.publish(&msg, now);
         }
@@ -204,14 +253,22 @@ impl Station {
                 Action::Alarm(words) => self.tell_alarm(&words),
                 // A station asks nobody.
                 Action::Request(_) => {}
-                Action::Quit => quit = true,
+                Action::Tell(kind) => {
+                    if let Some(server) = &mut self.server {
+                        server.publish(&Msg::Requested { kind, by: model.settings.seat.clone() }, now);
+                    }
+                }
+                Action::LeaveScreen => next = next.max(Next::LeaveScreen),
+                Action::Quit => next = Next::Quit,
             }
         }
-        quit
+        next
     }
 
     /// The terminal first: whatever comes after may take a while.
     pub(super) async fn close(self, model: &Model) {
+        // Lets the last answers of the socket out.
+        tokio::task::yield_now().await;
         match self.output {
             Output::Screen(screen) => drop(screen),
             Output::Lines(mut lines) => lines.show(model),
@@ -233,7 +290,7 @@ fn timed(mut record: Record, at_ns: u64) -> Record {
     record
 }
 
-async fn server_asks(server: &mut Option<Server>) -> Asked {
+async fn server_hears(server: &mut Option<Server>) -> News {
     match server {
         Some(server) => server.next().await,
         None => std::future::pending().await,

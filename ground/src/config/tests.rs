@@ -91,10 +91,21 @@ fn completions_and_manual_page_have_the_flag_of_every_key() {
     }
 }
 
+/// A link that was written into the settings long ago must not be armed by who wants to see the demonstration.
+#[test]
+fn a_bare_ground_takes_no_link_from_the_settings() {
+    for bare in [&[][..], &["--auto"], &["--headless"], &["--log", "none"]] {
+        assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).0.connect, [], "{bare:?}");
+    }
+}
+
 #[test]
 fn what_stands_in_the_file_is_left_alone_unless_it_is_asked_away() {
-    let (cli, _) = together("connect = [\"udpin:0.0.0.0:14550\"]", &["--demo"]);
-    assert_eq!(cli.connect, []);
+    let file = "connect = [\"udpin:0.0.0.0:14550\"]";
+    for demonstration in [&["daemon", "--demo"][..], &["daemon", "--seed", "2"]] {
+        assert_eq!(together(file, demonstration).0.connect, []);
+    }
+    assert_eq!(together(file, &["daemon"]).0.connect.len(), 1);
     let (_, config) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
     assert_eq!(config.alarm_command, None);
     let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);

@@ -68,10 +68,14 @@ impl AbortChord {
         complete
     }
 
-    /// Another key was pressed: a key that is held no longer repeats then. Returns whether the chord is
-    /// complete; it is over either way.
+    /// Another key was pressed: a key that is held no longer repeats then. Returns whether the chord is complete; then
+    /// it is over. What was only begun stands: nothing but time takes it back.
     pub fn end(&mut self) -> bool {
-        matches!(std::mem::take(self), Self::Twice(_))
+        let complete = matches!(self, Self::Twice(_));
+        if complete {
+            *self = Self::Open;
+        }
+        complete
     }
 
     /// Time passes. Returns whether the chord is complete; then it is over.

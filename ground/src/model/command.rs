@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::command::{CommandSender, Resend, Ticket};
 use protocol::dialect::{MavCmd, MavResult, TdInterlock, TdPhase};
 
+use super::seat::Seat;
 use super::vehicle::Vehicle;
 
 /// An accepted command should show in the vehicle's own state within this time: two heartbeats and a bit.
@@ -101,10 +102,12 @@ pub enum Acknowledged {
 }
 
 /// One command and its three facts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Track {
     /// What was asked.
     pub kind: CommandKind,
+    /// Who asked, and from which screen.
+    pub by: Seat,
     /// When it was asked.
     pub commanded_at: Duration,
     /// How often it was sent.
@@ -123,6 +126,12 @@ impl Track {
     /// Accepted by the vehicle.
     pub fn accepted(&self) -> bool {
         self.acknowledged == Acknowledged::Answered(MavResult::MAV_RESULT_ACCEPTED as u8)
+    }
+
+    /// Asked, and neither refused nor given up nor seen to be done.
+    pub fn is_on_its_way(&self, now: Duration) -> bool {
+        let open = matches!(self.acknowledged, Acknowledged::Waiting | Acknowledged::InProgress);
+        self.observed_at.is_none() && (open || (self.accepted() && !self.disagrees(now)))
     }
 
     /// Accepted, and yet the vehicle's state does not show it.

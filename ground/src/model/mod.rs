@@ -4,9 +4,11 @@ pub mod alarm;
 pub mod chord;
 pub mod command;
 mod course;
+pub mod crew;
 pub mod dialog;
 pub mod events;
 pub mod flown;
+pub mod hand;
 pub mod history;
 pub mod judgement;
 pub mod link;
@@ -15,6 +17,7 @@ pub mod outcome;
 pub mod page;
 pub mod parameters;
 pub mod reckoning;
+pub mod seat;
 pub mod telemetry;
 pub mod too_late;
 pub mod trend;
@@ -30,13 +33,16 @@ use crate::update::Action;
 use alarm::Alarms;
 use chord::AbortChord;
 use command::Commands;
+use crew::Crew;
 use dialog::Dialog;
 use events::{Events, Speaker};
+use hand::Hand;
 use history::History;
 use link::Link;
 use outcome::Outcome;
 use page::{Page, Pages};
 use parameters::Parameters;
+use seat::Seat;
 use vehicle::Vehicle;
 
 /// What the run was asked to be; never changes during it.
@@ -52,6 +58,10 @@ pub struct Settings {
     pub tlog_path: Option<String>,
     /// What this screen may do.
     pub role: Role,
+    /// This screen and who sits at it.
+    pub seat: Seat,
+    /// The vehicle is simulated in the station's own process.
+    pub demonstration: bool,
     /// Arm and start without a hand.
     pub auto: bool,
     /// Someone watches a screen: the end of a flight does not end the program.
@@ -69,6 +79,8 @@ impl Settings {
             log_path: None,
             tlog_path: None,
             role: Role::Station,
+            seat: Seat::default(),
+            demonstration: false,
             auto: false,
             interactive: true,
             time_limit: None,
@@ -163,6 +175,10 @@ pub struct Model {
     pub dialog: Dialog,
     /// How far the abort chord is.
     pub abort_chord: AbortChord,
+    /// How the keys come.
+    pub hand: Hand,
+    /// The commanding screens.
+    pub crew: Crew,
     /// The terminal tells a held key's repeats from presses, so that none of them arrives here.
     pub repeats_told: bool,
     /// What happened.
@@ -185,6 +201,8 @@ pub struct Model {
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
+    /// A key to quit was pressed; it counts unless another key follows before this time.
+    pub(crate) quit_at: Option<Duration>,
     pub(crate) outbox: Vec<Action>,
 }
 
@@ -202,6 +220,8 @@ impl Model {
             commands: Commands::default(),
             dialog: Dialog::Closed,
             abort_chord: AbortChord::default(),
+            hand: Hand::default(),
+            crew: Crew::default(),
             repeats_told: false,
             events: Events::default(),
             outcome: Outcome::default(),
@@ -215,6 +235,7 @@ impl Model {
             texts: Reassembler::new(),
             due: Due::default(),
             auto_step: AutoStep::default(),
+            quit_at: None,
             outbox: Vec::new(),
         }
     }
@@ -222,6 +243,12 @@ impl Model {
     /// Everything that was told so far was the past: what holds of it rings now, what is over does not.
     pub fn history_ends(&mut self) {
         self.alarms.history_ends();
+    }
+
+    /// Armed, in flight, or being aborted: nobody may go away unawares.
+    pub fn is_at_risk(&self) -> bool {
+        let armed = self.vehicle.armed().is_some_and(|armed| armed.value);
+        armed || self.commands.is_aborting() || self.vehicle.in_flight()
     }
 
     /// The screen to show.

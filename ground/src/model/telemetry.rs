@@ -19,7 +19,10 @@ const REORDERED_MS: u32 = 5_000;
 pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
     let rebooted = note_clock(vehicle, message);
     match message {
-        MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),
+        MavMessage::HEARTBEAT(data) => {
+            vehicle.hil = data.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
+            vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
+        }
         MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::{
     TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock,
-    TdPhase,
+    TdPhase, TdVehicleFlag,
 };
 
 use super::flown::Flown;
@@ -134,6 +134,8 @@ pub struct Vehicle {
     pub burn: Flown,
     /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
     pub in_space: bool,
+    /// `MAV_MODE_FLAG_HIL_ENABLED`: it says that it is simulated.
+    pub hil: bool,
     /// The vehicle's clock, ms since its boot.
     pub last_boot_ms: Option<u32>,
 }
@@ -155,6 +157,12 @@ impl Vehicle {
     /// Armed by the vehicle's own heartbeat; `None` before the first.
     pub fn armed(&self) -> Option<Sample<bool>> {
         self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
+    }
+
+    /// Both of its words say that it is simulated.
+    pub fn is_simulated(&self) -> bool {
+        let flag = TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED;
+        self.hil && self.status.as_ref().is_some_and(|status| status.value.vehicle_flags.contains(flag))
     }
 
     /// The interlocks, if known.

@@ -3,9 +3,12 @@
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
+use protocol::log::record::EventLevel;
 
 use super::commands;
 use crate::model::command::CommandKind;
+use crate::model::events::Speaker;
+use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model, words};
 
 /// The vehicle has this long, from when it was first heard, to become ready.
@@ -16,6 +19,9 @@ const ASK_AGAIN_AFTER: Duration = Duration::from_secs(1);
 pub(super) fn step(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.state(now).carries() {
         return;
+    }
+    if model.auto_step != AutoStep::Done && is_live(model) {
+        return refuse(model, now);
     }
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
     let phase = model.vehicle.phase().map(|phase| phase.value);
@@ -37,6 +43,19 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     }
 }
 
+/// Whether the vehicle is known to be a real one, or not known to be a simulated one although it has said what it is.
+fn is_live(model: &Model) -> bool {
+    let has_said = model.vehicle.heartbeat.is_some() && model.vehicle.status.is_some();
+    has_said && !model.settings.demonstration && !model.vehicle.is_simulated()
+}
+
+fn refuse(model: &mut Model, now: Duration) {
+    let why = "the vehicle is live: it does not say that it is simulated";
+    model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
+    model.auto_step = AutoStep::Done;
+    model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
+}
+
 /// An arming was refused for now. Returns whether the automatic mode will ask again, once the checks pass:
 /// a new submission with its own reason, never the old frame sent again.
 pub(super) fn ask_again(model: &mut Model, now: Duration) -> bool {
@@ -55,7 +74,7 @@ fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
         None => {
             model.info(now, "automatic mode: the checks pass; arming");
             model.auto_step = AutoStep::WaitForArmed;
-            commands::submit(model, CommandKind::Arm, now);
+            commands::submit(model, CommandKind::Arm, Seat::automatic(), now);
         }
         Some(why) if waited >= PATIENCE => {
             let seconds = PATIENCE.as_secs();
@@ -89,6 +108,6 @@ fn start(model: &mut Model, now: Duration) {
     model.info(now, "automatic mode: starting");
     model.auto_step = AutoStep::Done;
     if model.vehicle.countdown_s().is_none() {
-        commands::submit(model, CommandKind::Start, now);
+        commands::submit(model, CommandKind::Start, Seat::automatic(), now);
     }
 }

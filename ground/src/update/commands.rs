@@ -10,10 +10,11 @@ use protocol::log::record::EventLevel;
 use super::{Action, auto, keys};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::events::Speaker;
+use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model};
 
 /// Asks the vehicle, and begins to follow what becomes of it.
-pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
+pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {
     let commands = &mut model.commands;
     let aborting = commands.of(CommandKind::Abort).is_some_and(|track| is_open(track.acknowledged));
     if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
@@ -30,13 +31,14 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, now: Duration) {
         model.auto_step = AutoStep::Done;
     }
     // Pressed again while it is under way, an abort is sent at once and its attempts go on counting.
-    let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).copied();
+    let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).cloned();
     let ticket = send(model, kind, now);
     let commands = &mut model.commands;
     commands.tracks.retain(|track| track.kind != kind);
     commands.tracks.push(Track {
         kind,
-        commanded_at: earlier.map_or(now, |track| track.commanded_at),
+        by,
+        commanded_at: earlier.as_ref().map_or(now, |track| track.commanded_at),
         attempts: earlier.map_or(0, |track| track.attempts),
         acknowledged: Acknowledged::Waiting,
         acknowledged_at: None,
@@ -107,11 +109,12 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let Some(track) = track else { return };
     let kind = track.kind;
     let name = kind.name();
+    let by = track.by.in_brackets();
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
             track.acknowledged = Acknowledged::Waiting;
-            ("commanded", EventLevel::Info, format!("{name} commanded, attempt {}", track.attempts))
+            ("commanded", EventLevel::Info, format!("{name} commanded, attempt {}{by}", track.attempts))
         }
         CommandEvent::InProgress { .. } => {
             track.acknowledged = Acknowledged::InProgress;
@@ -137,7 +140,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => Some(result),
         _ => None,
     };
-    keys::record_operator(model, operator_kind, &text, now);
+    let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
+    keys::record_operator(model, operator_kind, &told, now);
     model.say(now, Speaker::Ground, level, text);
     if let Some(result) = answered {
         on_final_answer(model, kind, result, now);

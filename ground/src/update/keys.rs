@@ -1,7 +1,8 @@
 //! The hand of the crew.
 //!
-//! Nothing dangerous on a single letter: arming takes the dialog and then the typed word, start and
-//! disarming a letter and Enter, an abort Ctrl-X and Enter (or Ctrl-X twice); each within its time.
+//! Nothing dangerous on a single letter: arming, start and quitting in flight take a letter, a typed word and Enter,
+//! disarming a letter and Enter, an abort Ctrl-X and Enter (or Ctrl-X twice); each within its time. But for the abort,
+//! keys count only as a finger strikes them: neither pasted nor repeated by the keyboard.
 
 use std::time::Duration;
 
@@ -14,8 +15,10 @@ use super::{Action, commands};
 use crate::attach::codec::Asked;
 use crate::key::Key;
 use crate::model::command::CommandKind;
-use crate::model::dialog::{ARM_TIME_LIMIT, ARM_WORD, CONFIRM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT};
+use crate::model::dialog::Dialog;
+use crate::model::hand::{FINGERS_APART, Touch};
 use crate::model::page::Page;
+use crate::model::seat::Seat;
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
 use crate::model::{Model, Role};
@@ -25,14 +28,66 @@ const SCROLL_PAGE: i32 = 10;
 /// No list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
-pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
-    record_operator(model, "key", &key.name(), now);
-    expire(model, now);
-    let why_not = model.settings.role.why_not_command();
-    if let (Some(why), Key::CtrlX | Key::Char('A' | 'S' | 'D')) = (why_not, key) {
-        return model.info(now, why);
+/// Keys that came in one read of the terminal: one by a finger, many by a paste, a held key or a slow line.
+pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
+    for key in keys {
+        let touch = match model.settings.role {
+            // There is nothing to command, and time stands still while it is paused.
+            Role::Replaying => Touch::Finger,
+            _ => model.hand.touch(*key, keys.len() > 1, now),
+        };
+        on_key(model, *key, touch, now);
     }
+}
+
+/// What is pasted is meant for another window.
+pub(super) fn on_paste(model: &mut Model, now: Duration) {
+    record_operator(model, "key", "a paste", now);
+    model.quit_at = None;
+    cancel(model, now);
+    model.info(now, "a paste was dropped");
+}
+
+fn on_key(model: &mut Model, key: Key, touch: Touch, now: Duration) {
+    if touch != Touch::Hurried || matches!(key, Key::CtrlX | Key::Enter) {
+        record_operator(model, "key", &key.name(), now);
+    }
+    expire(model, now);
+    if touch != Touch::Repeat {
+        model.quit_at = None;
+    }
+    if on_abort_key(model, key, now) {
+        return;
+    }
+    match touch {
+        _ if key.scrolls() => {}
+        Touch::Finger => {}
+        Touch::Repeat => return,
+        Touch::Hurried => {
+            cancel(model, now);
+            if model.hand.says(now) {
+                model.info(now, "keys faster than a hand types them were dropped: a paste?");
+            }
+            return;
+        }
+    }
+    if key == Key::CtrlL {
+        model.outbox.push(Action::Redraw);
+    }
+    match std::mem::replace(&mut model.dialog, Dialog::Closed) {
+        Dialog::Closed => on_free_key(model, key, now),
+        dialog => on_offer_key(model, dialog, key, now),
+    }
+}
+
+/// The abort, before everything else and whatever is thought of the keys: no paste, no speed, no dialog takes it away.
+/// Returns whether the key is done with.
+fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     if key == Key::CtrlX {
+        if let Some(why) = model.settings.role.why_not_command() {
+            model.info(now, why);
+            return true;
+        }
         // An Enter that comes too late for the abort must not start or arm what was offered before.
         model.dialog = Dialog::Closed;
         // Where the terminal tells repeats apart, a second Ctrl-X was pressed, however soon it came.
@@ -41,49 +96,69 @@ pub(super) fn on_key(model: &mut Model, key: Key, now: Duration) {
         } else {
             model.abort_chord.press(now);
         }
-        return;
+        return true;
     }
-    // Before any dialog: who has begun an abort means the abort.
-    if key == Key::Enter && model.abort_chord.confirm(now) {
-        return abort(model, now);
-    }
-    // Twice Ctrl-X with nothing between; once complete, nothing takes it back.
-    if model.abort_chord.end() {
+    // Who has begun an abort means the abort; and twice Ctrl-X, once complete, nothing takes back.
+    let complete =
+        if key == Key::Enter { model.abort_chord.confirm(now) } else { model.abort_chord.end() };
+    if complete {
         abort(model, now);
     }
+    // While the abort is offered, another key neither takes it back nor does anything else.
+    complete || model.abort_chord.is_begun(now)
+}
+
+/// The next letter of the offer's word, Enter behind the whole word; every other key cancels the offer.
+fn on_offer_key(model: &mut Model, mut dialog: Dialog, key: Key, now: Duration) {
     match key {
-        Key::CtrlC => return quit(model, now),
-        Key::CtrlL => return model.outbox.push(Action::Redraw),
-        _ => {}
+        Key::Enter if dialog.is_complete() => climbed(model, &dialog, now),
+        Key::Char(letter) if dialog.take(letter) => model.dialog = dialog,
+        _ => {
+            let (name, word) = (dialog.name(), dialog.word());
+            let wanted = word.filter(|_| matches!(key, Key::Enter | Key::Char(_)));
+            let wanted = wanted.map_or_else(String::new, |word| format!("; the word is {word}"));
+            model.info(now, format!("{name}: cancelled, nothing was done{wanted}"));
+        }
     }
+}
+
+/// The whole ladder of this offer.
+fn climbed(model: &mut Model, dialog: &Dialog, now: Duration) {
+    match dialog {
+        Dialog::Closed => {}
+        Dialog::Arm { .. } => ask(model, CommandKind::Arm, now),
+        Dialog::Start { .. } => ask(model, CommandKind::Start, now),
+        Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
+        // A live station must not end with its screen; a demonstration and a screen of another station may.
+        Dialog::Quit { .. } => {
+            let stays = model.settings.role == Role::Station && !model.settings.demonstration;
+            let leave = if stays && model.is_at_risk() { Action::LeaveScreen } else { Action::Quit };
+            model.outbox.push(leave);
+        }
+    }
+}
+
+/// Closes an offer that something foreign came between.
+fn cancel(model: &mut Model, now: Duration) {
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
-        Dialog::Closed => on_free_key(model, key, now),
-        Dialog::Arm { typed, until } => on_arm_key(model, key, typed, until, now),
-        Dialog::Start { until } => match key {
-            Key::Enter => ask(model, CommandKind::Start, now),
-            Key::Escape => model.info(now, "start: cancelled"),
-            _ => model.dialog = Dialog::Start { until },
-        },
-        Dialog::Disarm { until } => match key {
-            Key::Enter => ask(model, CommandKind::Disarm, now),
-            Key::Escape => model.info(now, "disarm: cancelled"),
-            _ => model.dialog = Dialog::Disarm { until },
-        },
-        Dialog::Quit { .. } if matches!(key, Key::Char('q' | 'Q')) => model.outbox.push(Action::Quit),
-        Dialog::Quit { .. } => model.info(now, "quit: cancelled"),
+        Dialog::Closed => {}
+        dialog => model.info(now, format!("{}: cancelled, nothing was done", dialog.name())),
     }
 }
 
 /// Closes what has waited too long: an offer to arm does not stay open behind the crew's back.
 pub(super) fn expire(model: &mut Model, now: Duration) {
     if model.dialog.until().is_some_and(|until| now > until) {
-        let words = match std::mem::replace(&mut model.dialog, Dialog::Closed) {
-            Dialog::Arm { .. } => "arming: time is up, nothing was sent",
-            Dialog::Start { .. } => "start: time is up, nothing was sent",
-            Dialog::Disarm { .. } => "disarm: time is up, nothing was sent",
-            Dialog::Quit { .. } | Dialog::Closed => return,
-        };
-        model.info(now, words);
+        let dialog = std::mem::replace(&mut model.dialog, Dialog::Closed);
+        model.info(now, format!("{}: time is up, nothing was done", dialog.name()));
+    }
+}
+
+/// Quits, once no other key has followed the one that asked for it.
+pub(super) fn pass_quit(model: &mut Model, now: Duration) {
+    if model.quit_at.is_some_and(|at| now >= at) {
+        model.quit_at = None;
+        model.outbox.push(Action::Quit);
     }
 }
 
@@ -96,18 +171,21 @@ pub(super) fn record_operator(model: &mut Model, kind: &str, detail: &str, now: 
 }
 
 fn on_free_key(model: &mut Model, key: Key, now: Duration) {
+    if let (Some(why), Key::Char('A' | 'S' | 'D')) = (model.settings.role.why_not_command(), key) {
+        return model.info(now, why);
+    }
     match key {
         Key::Char('A') => match why_not_arm(model, now) {
-            None => model.dialog = Dialog::Arm { typed: String::new(), until: now + ARM_TIME_LIMIT },
+            None => model.dialog = Dialog::arm(now),
             Some(why) => model.warn(now, format!("cannot arm: {why}")),
         },
         Key::Char('S') => match why_not_start(model, now) {
-            None => model.dialog = Dialog::Start { until: now + CONFIRM_TIME_LIMIT },
+            None => model.dialog = Dialog::start(now),
             Some(why) => model.warn(now, format!("cannot start: {why}")),
         },
-        Key::Char('D') => model.dialog = Dialog::Disarm { until: now + CONFIRM_TIME_LIMIT },
+        Key::Char('D') => model.dialog = Dialog::disarm(now),
         Key::Char('a' | 's' | 'd') => model.info(now, "capital letters: A arms, S starts, D disarms"),
-        Key::Char('q' | 'Q') => quit(model, now),
+        Key::Char('q' | 'Q') | Key::CtrlC => quit(model, now),
         _ => on_page_key(model, key, now),
     }
 }
@@ -164,45 +242,40 @@ pub(super) fn ask_parameters(model: &mut Model) {
     })));
 }
 
-fn on_arm_key(model: &mut Model, key: Key, mut typed: String, until: Duration, now: Duration) {
-    match key {
-        Key::Escape => return model.info(now, "arming: cancelled"),
-        Key::Enter if typed.eq_ignore_ascii_case(ARM_WORD) => {
-            return ask(model, CommandKind::Arm, now);
-        }
-        Key::Backspace => {
-            typed.pop();
-        }
-        Key::Char(c) if typed.chars().count() < ARM_WORD.len() => typed.push(c),
-        // A wrong word; or a letter too many, which could not be shown and must not be taken back unseen.
-        Key::Enter | Key::Char(_) => {
-            return model.info(now, format!("arming: the word is {ARM_WORD}; nothing was sent"));
-        }
-        _ => {}
-    }
-    model.dialog = Dialog::Arm { typed, until };
-}
-
 /// The ladder is complete: commands here, or asks the station that this screen shows.
 fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
     match model.settings.role {
         Role::Attached => model.outbox.push(Action::Request(Asked::Command(kind))),
-        Role::Station => command(model, kind, now),
+        Role::Station => {
+            let by = model.settings.seat.clone();
+            model.outbox.push(Action::Tell(kind));
+            command(model, kind, &by, now);
+        }
         Role::Watching | Role::Replaying => {}
     }
 }
 
-/// Commands, unless the vehicle has changed since the ladder was begun.
-pub(super) fn command(model: &mut Model, kind: CommandKind, now: Duration) {
+/// Commands, unless the vehicle has changed since the ladder was begun, or another screen has asked for the same.
+pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
     let why_not = match kind {
-        CommandKind::Arm => why_not_arm(model, now),
-        CommandKind::Start => why_not_start(model, now),
+        CommandKind::Arm => on_its_way(model, kind, now).or_else(|| why_not_arm(model, now)),
+        CommandKind::Start => on_its_way(model, kind, now).or_else(|| why_not_start(model, now)),
         CommandKind::Disarm | CommandKind::Abort => None,
     };
     match why_not {
-        None => commands::submit(model, kind, now),
-        Some(why) => model.warn(now, format!("cannot {}: {why}", kind.name().to_lowercase())),
+        None => commands::submit(model, kind, by.clone(), now),
+        Some(why) => {
+            let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
+            record_operator(model, "not sent", &text, now);
+            model.warn(now, text);
+        }
     }
+}
+
+/// Two hands that ask for one thing at one time ask for it once.
+fn on_its_way(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
+    let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
+    Some(format!("{} is on its way already{}", kind.name(), track.by.in_brackets()))
 }
 
 pub(super) fn acknowledge(model: &mut Model, now: Duration) {
@@ -253,15 +326,10 @@ fn abort(model: &mut Model, now: Duration) {
 }
 
 fn quit(model: &mut Model, now: Duration) {
-    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
-    // A screen that ends leaves its station as it is.
-    let is_station = model.settings.role == Role::Station;
-    let risky = is_station && (armed || model.commands.is_aborting() || model.vehicle.in_flight());
-    let confirmed = matches!(model.dialog, Dialog::Quit { .. });
-    if confirmed || !risky {
-        model.dialog = Dialog::Closed;
-        model.outbox.push(Action::Quit);
+    let commands = model.settings.role.why_not_command().is_none();
+    if commands && model.is_at_risk() {
+        model.dialog = Dialog::quit(now);
     } else {
-        model.dialog = Dialog::Quit { until: now + QUIT_TIME_LIMIT };
+        model.quit_at = Some(now + FINGERS_APART);
     }
 }

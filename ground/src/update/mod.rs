@@ -5,6 +5,7 @@
 pub mod alarms;
 pub mod auto;
 pub mod commands;
+pub mod crew;
 pub mod frames;
 pub mod keys;
 pub mod observe;
@@ -22,19 +23,33 @@ use crate::key::Key;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
-use crate::model::{LogHealth, Model};
+use crate::model::seat::Seat;
+use crate::model::{LogHealth, Model, Role};
 
 /// Something that reached the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Msg {
     /// A key was pressed.
     Key(Key),
+    /// Several keys came in one read of the terminal.
+    Keys(Vec<Key>),
+    /// Something was pasted, as the terminal says.
+    Pasted,
     /// A frame arrived.
     Frame(Frame),
     /// The crew commanded this then: in a replay.
     Commanded(CommandKind),
-    /// The crew has climbed the whole ladder of this on a screen elsewhere.
-    Requested(CommandKind),
+    /// The crew has climbed the whole ladder of this on a screen of the station.
+    Requested {
+        /// What is asked for.
+        kind: CommandKind,
+        /// Who asks, and from which screen.
+        by: Seat,
+    },
+    /// These screens can command now.
+    Crew(Vec<Seat>),
+    /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station goes on.
+    ScreenQuit,
     /// The crew has seen the alarms, on a screen elsewhere.
     Acknowledged,
     /// A screen elsewhere wants the parameters.
@@ -95,6 +110,10 @@ pub enum Action {
     Redraw,
     /// Ask the station that runs elsewhere.
     Request(Asked),
+    /// The crew has asked for this at the station's own screen: the other screens are told.
+    Tell(CommandKind),
+    /// Give the terminal back and go on without a screen.
+    LeaveScreen,
     /// Ring the terminal's bell.
     Bell,
     /// An alarm was raised: tell whoever is not at the screen.
@@ -117,14 +136,25 @@ impl Action {
 /// Takes a message into the model.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
-        Msg::Key(key) => keys::on_key(model, key, now),
-        Msg::Commanded(kind) => commands::submit(model, kind, now),
-        Msg::Requested(kind) => keys::command(model, kind, now),
+        Msg::Key(key) => keys::on_keys(model, &[key], now),
+        Msg::Keys(keys) => keys::on_keys(model, &keys, now),
+        Msg::Pasted => keys::on_paste(model, now),
+        Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
+        Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
+        Msg::Crew(seats) => {
+            model.crew.sit(seats, now);
+            model.info(now, model.crew.words());
+        }
         Msg::Acknowledged => keys::acknowledge(model, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => {
             keys::expire(model, now);
             keys::pass_abort_chord(model, now);
+            keys::pass_quit(model, now);
+        }
+        Msg::ScreenQuit => {
+            let goes_on = "armed or in flight, so the station goes on";
+            model.warn(now, format!("the screen was quit; {goes_on}: `ground attach` shows it"));
         }
         Msg::ScreenGone => {
             model.warn(now, "the terminal is gone: link and log go on; `ground attach` shows them");
@@ -159,6 +189,10 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
                 model.outcome.error = Some(why);
             }
         }
+        Msg::Terminate("SIGINT") if outlives_ctrl_c(model) => {
+            let ends = "SIGTERM or `ground stop --force` ends it";
+            model.warn(now, format!("SIGINT: the station goes on while armed or in flight; {ends}"));
+        }
         Msg::Terminate(signal) => {
             model.warn(now, format!("{signal}: ending; the vehicle is left as it is"));
             model.outbox.push(Action::Quit);
@@ -167,6 +201,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     }
     alarms::watch(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+/// Ctrl-C where a screen was, or where none ever was, is a hand's slip as well as its wish.
+fn outlives_ctrl_c(model: &Model) -> bool {
+    model.settings.role == Role::Station && !model.settings.demonstration && model.is_at_risk()
 }
 
 fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<SigningCounters>, now: Duration) {

@@ -9,7 +9,7 @@ use protocol::identity::VEHICLE;
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, commands, frames, keys};
+use super::{Action, auto, commands, crew, frames, keys};
 use crate::model::Model;
 use crate::model::events::Speaker;
 use crate::model::link::LinkState;
@@ -26,6 +26,7 @@ const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
     keys::expire(model, now);
     keys::pass_abort_chord(model, now);
+    keys::pass_quit(model, now);
     heartbeat(model, now);
     if model.link.heartbeat_at.is_some() && is_due(&mut model.due.timesync, TIMESYNC_EVERY, now) {
         let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
@@ -45,6 +46,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     auto::step(model, now);
     commands::poll(model, now);
     commands::observe(model, now);
+    crew::step(model, now);
     if model.link.heartbeat_at.is_some()
         && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now)
     {

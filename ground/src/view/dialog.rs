@@ -9,11 +9,12 @@ use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
 use super::theme::{Role, Theme};
-use crate::model::Model;
-use crate::model::dialog::{ARM_WORD, Dialog};
+use crate::model::{self, Model};
+use crate::model::dialog::{ARM_WORD, Dialog, QUIT_WORD, START_WORD};
 use crate::model::words;
 
 const BOX_COLUMNS: u16 = 68;
+const ANY_OTHER_KEY: &str = "Any other key cancels. Nothing is sent before Enter.";
 
 /// The dialog's title and lines; `None` if none is open.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
@@ -25,30 +26,40 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
         Dialog::Arm { typed, .. } => {
             let mut lines = vec![
                 strong(format!("Type {ARM_WORD} and Enter within {left:.0} s:  [{typed:<3}]")),
-                plain("Esc cancels. Nothing is sent before Enter.".to_owned()),
+                plain(ANY_OTHER_KEY.to_owned()),
             ];
             lines.extend(checks(model, theme));
             ("ARM, step 2 of 2", lines)
         }
-        Dialog::Start { .. } => (
+        Dialog::Start { typed, .. } => (
             "START the countdown",
             vec![
-                strong(format!("Enter within {left:.0} s starts the countdown.")),
-                plain("Esc cancels.".to_owned()),
+                strong(format!("Type {START_WORD} and Enter within {left:.0} s:  [{typed:<5}]")),
+                plain(ANY_OTHER_KEY.to_owned()),
             ],
         ),
         Dialog::Disarm { .. } => (
             "DISARM",
-            vec![strong(format!("Enter within {left:.0} s disarms.")), plain("Esc cancels.".to_owned())],
-        ),
-        Dialog::Quit { .. } => (
-            "QUIT although armed or in flight",
             vec![
-                strong(format!("q (or Ctrl-C) again within {left:.0} s quits; any other key stays.")),
-                plain("Recording goes on till then; quitting ends the log.".to_owned()),
-                plain("Quitting neither disarms nor aborts.".to_owned()),
+                strong(format!("Enter within {left:.0} s disarms.")),
+                plain("Any other key cancels.".to_owned()),
             ],
         ),
+        Dialog::Quit { typed, .. } => {
+            let goes_on = match model.settings.role {
+                model::Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
+                model::Role::Station => "The station goes on without its screen: `ground attach` shows it.",
+                _ => "The station goes on; a countdown is held once nobody is there to command.",
+            };
+            (
+                "QUIT although armed or in flight",
+                vec![
+                    strong(format!("Type {QUIT_WORD} and Enter within {left:.0} s:  [{typed:<4}]")),
+                    plain(goes_on.to_owned()),
+                    plain("Quitting neither disarms nor aborts. Any other key stays.".to_owned()),
+                ],
+            )
+        }
     };
     Some(dialog)
 }

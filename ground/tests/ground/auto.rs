@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, is_arm, settings};
 use ground::exit::{Exit, decide};
+use ground::model::Settings;
 use protocol::dialect::{MavCmd, TdPhase};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -112,4 +113,27 @@ fn refused_for_good_ends_with_its_own_code() {
     assert!(bench.commands().is_empty());
     assert!(bench.wants_to_quit());
     assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+}
+
+/// A vehicle that does not say that it is simulated, or says so once only, is a real one.
+#[test]
+fn the_automatic_mode_is_refused_with_a_live_vehicle() {
+    for interactive in [false, true] {
+        let mut bench = Bench::new(settings(true, interactive));
+        bench.simulated = false;
+        bench.run(2.0);
+        assert!(bench.take_commands().is_empty());
+        assert!(bench.events().contains("automatic mode refused: the vehicle is live"), "{}", bench.events());
+        bench.simulated = true;
+        bench.armed = true;
+        bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
+        bench.run(5.0);
+        assert!(bench.take_commands().is_empty(), "refused is refused");
+        assert_eq!(bench.wants_to_quit(), !interactive);
+        assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+    }
+    let mut own = Bench::new(Settings { demonstration: true, ..settings(true, false) });
+    own.simulated = false;
+    own.run(2.0);
+    assert!(is_arm(&own.take_commands()[0]), "the vehicle of this very process");
 }

@@ -13,6 +13,7 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
     TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase,
+    TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -21,6 +22,9 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
+
+/// Between two keys of an unhurried hand.
+const FINGER: Duration = Duration::from_millis(130);
 
 pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
 
@@ -36,6 +40,8 @@ pub(crate) struct Bench {
     pub(crate) interlocks: TdInterlock,
     pub(crate) checks_failed: u16,
     pub(crate) pad_wait_s: u16,
+    /// It says that it is a simulated one.
+    pub(crate) simulated: bool,
     /// Whether the vehicle sends anything at all.
     pub(crate) speaks: bool,
     encoder: Encoder,
@@ -54,6 +60,7 @@ impl Bench {
             interlocks: TdInterlock::TD_INTERLOCK_PIN_OUT,
             checks_failed: 0,
             pad_wait_s: 0,
+            simulated: true,
             speaks: true,
             encoder: Encoder::new(VEHICLE),
         }
@@ -71,7 +78,14 @@ impl Bench {
         self.actions.extend(actions);
     }
 
+    /// A key, some time after the one before: a finger's.
     pub(crate) fn key(&mut self, key: Key) {
+        self.now += FINGER;
+        self.press(key);
+    }
+
+    /// A key at this very moment.
+    pub(crate) fn press(&mut self, key: Key) {
         self.msg(Msg::Key(key));
     }
 
@@ -100,7 +114,7 @@ impl Bench {
         for elapsed_ms in (0..seconds * 1_000).step_by(1) {
             let repeats = elapsed_ms >= delay_ms && (elapsed_ms - delay_ms).is_multiple_of(period_ms);
             if elapsed_ms == 0 || repeats {
-                self.key(key);
+                self.press(key);
             }
             if elapsed_ms.is_multiple_of(10) {
                 self.msg(Msg::Tick);
@@ -144,8 +158,9 @@ impl Bench {
     }
 
     pub(crate) fn heartbeat(&mut self) {
-        let base_mode =
-            if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+        let mut base_mode = MavModeFlag::empty();
+        base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, self.armed);
+        base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated);
         let phase = self.phase as u32;
         self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: phase,
@@ -166,6 +181,11 @@ impl Bench {
             pad_wait_s: self.pad_wait_s,
             phase: self.phase,
             abort_effect: self.abort_effect,
+            vehicle_flags: if self.simulated {
+                TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED
+            } else {
+                TdVehicleFlag::empty()
+            },
             ..TD_FLIGHT_STATUS_DATA::default()
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use ground::attach::codec::{Asked, Told, decode_told, encode_asked, length};
 use ground::model::command::CommandKind;
+use ground::model::seat::Seat;
 use ground::model::{Model, Role, Settings};
 use ground::update::{Msg, update};
 use protocol::dialect::TdPhase;
@@ -34,6 +35,8 @@ impl Daemon {
             .arg(&socket)
             .arg("--log")
             .arg(&log)
+            // Found by nobody else's test.
+            .env("XDG_RUNTIME_DIR", directory.path())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -74,7 +77,8 @@ impl Screen {
         });
         let mut stream = stream.expect("the daemon listens");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a time limit");
-        stream.write_all(&encode_asked(&Asked::Hello { watch })).expect("a greeting");
+        let greeting = Asked::Hello { watch, operator: "anna".to_owned() };
+        stream.write_all(&encode_asked(&greeting)).expect("a greeting");
         let role = if watch { Role::Watching } else { Role::Attached };
         let model = Model::new(Settings { role, ..settings(false, true) });
         let mut screen = Self { stream, model, now: Duration::ZERO, live: false };
@@ -103,6 +107,7 @@ impl Screen {
                     self.now = at;
                     drop(update(&mut self.model, msg, at));
                 }
+                Told::Status(_) | Told::Stopping { .. } => panic!("nobody has asked"),
             }
         }
         panic!("{what} never came");
@@ -134,7 +139,8 @@ fn screens_come_and_go_the_station_stays() {
     first.ask(&Asked::Key("A".to_owned()));
     first.ask(&Asked::Command(CommandKind::Arm));
     first.until("armed", Screen::armed);
-    assert!(first.model.commands.of(CommandKind::Arm).is_some_and(ground::model::command::Track::accepted));
+    let arm = first.model.commands.of(CommandKind::Arm).unwrap();
+    assert!(arm.accepted() && arm.by == Seat::new(2, "anna"), "{arm:?}");
     // The other screen sees the same, and the screen that commanded may vanish.
     drop(first);
     watching.until("armed there, too", Screen::armed);
@@ -157,7 +163,7 @@ fn screens_come_and_go_the_station_stays() {
         if let LogItem::Message { channel_id, data, .. } = item
             && reader.channel(channel_id).is_some_and(|channel| channel.topic == "/operator")
         {
-            operator += usize::from(String::from_utf8_lossy(&data).contains("A (attached screen)"));
+            operator += usize::from(String::from_utf8_lossy(&data).contains("A (screen 2, anna)"));
         }
     }
     assert_eq!((reader.damage(), operator), (None, 1));
@@ -170,6 +176,7 @@ fn one_station_a_socket_and_no_garbage_ends_it() {
     let second = Command::new(env!("CARGO_BIN_EXE_ground"))
         .args(["daemon", "--log", "none", "--socket"])
         .arg(&daemon.socket)
+        .env("XDG_RUNTIME_DIR", daemon.socket.parent().unwrap())
         .output()
         .unwrap();
     assert_eq!(second.status.code(), Some(1));
@@ -185,9 +192,10 @@ fn one_station_a_socket_and_no_garbage_ends_it() {
 /// The vehicle may have changed since the ladder was climbed on a screen.
 #[test]
 fn a_request_is_checked_again_by_the_station() {
+    let request = |kind| Msg::Requested { kind, by: Seat::new(2, "anna") };
     let mut model = Model::new(settings(false, true));
-    drop(update(&mut model, Msg::Requested(CommandKind::Arm), Duration::from_secs(1)));
+    drop(update(&mut model, request(CommandKind::Arm), Duration::from_secs(1)));
     assert!(model.commands.tracks.is_empty(), "nothing was heard of a vehicle yet");
-    let actions = update(&mut model, Msg::Requested(CommandKind::Abort), Duration::from_secs(1));
+    let actions = update(&mut model, request(CommandKind::Abort), Duration::from_secs(1));
     assert!(actions.iter().any(|action| matches!(action, ground::update::Action::Send(_))));
 }

@@ -1,4 +1,8 @@
-//! Properties of the keyboard: whatever the keys, only the complete ladder arms, and an abort always works.
+//! Properties of the keyboard: whatever comes from it, nothing but a complete ladder, struck by a hand, arms, starts,
+//! disarms, aborts or quits; and an abort always works.
+//!
+//! The ladders are written here once more, as a small oracle that reads a history of keys backwards and knows nothing of
+//! dialogs.
 
 use std::time::Duration;
 
@@ -7,32 +11,217 @@ use ground::key::Key;
 use ground::model::Role;
 use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::command::CommandKind;
-use ground::model::dialog::ARM_TIME_LIMIT;
-use ground::update::Action;
+use ground::update::{Action, Msg};
 use proptest::prelude::*;
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
-use crate::hand::ladder;
+use crate::hand::{armed_on_pad, ladder, leaves, quit_ladder, start_ladder};
 
-/// Whether the keys up to the last one end in a complete ladder, read backwards from the Enter.
-fn ends_in_complete_ladder(history: &[(Key, Duration)]) -> bool {
-    let Some(((Key::Enter, entered_at), before)) = history.split_last() else { return false };
-    let opens = |(k, (key, at)): (usize, &(Key, Duration))| {
-        if *key != Key::Char('A') || entered_at.saturating_sub(*at) > ARM_TIME_LIMIT {
-            return false;
+/// What came from the terminal, and when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Came {
+    /// `None` is a paste with its marks.
+    key: Option<Key>,
+    at: Duration,
+    /// With others in one read.
+    together: bool,
+}
+
+/// The history as a hand would tell it: without the repeats of held keys; `None` for what no finger struck.
+fn told_by_hand(history: &[Came]) -> Vec<(Option<Key>, Duration)> {
+    let mut told = Vec::new();
+    for (k, came) in history.iter().enumerate() {
+        let before = k.checked_sub(1).map(|before| history[before]);
+        let gap = before.map_or(Duration::MAX, |before| came.at - before.at);
+        let repeats = before.is_some_and(|before| before.key == came.key) && gap < Duration::from_millis(120);
+        if repeats && !came.together {
+            continue;
         }
-        let mut word = String::new();
-        for (key, _) in &before[k + 1..] {
-            match key {
-                Key::Char(c) => word.push(*c),
-                Key::Backspace => drop(word.pop()),
-                Key::Enter | Key::Escape | Key::CtrlC => return false,
-                _ => {}
-            }
-        }
-        word.eq_ignore_ascii_case("ARM")
+        let struck = !came.together && gap >= Duration::from_millis(25);
+        told.push((came.key.filter(|_| struck), came.at));
+    }
+    told
+}
+
+/// Whether the history ends in: one of these keys, the word (in either case), Enter; within the time.
+fn ends_in_ladder(history: &[Came], opens: &[Key], word: &str, within_s: u64) -> bool {
+    let told = told_by_hand(history);
+    let Some(begin) = told.len().checked_sub(word.len() + 2) else { return false };
+    let rungs = &told[begin..];
+    let letter = |(key, wanted): (Option<Key>, char)| matches!(key, Some(Key::Char(c)) if c.eq_ignore_ascii_case(&wanted));
+    rungs[0].0.is_some_and(|key| opens.contains(&key))
+        && rungs[1..=word.len()].iter().map(|(key, _)| *key).zip(word.chars()).all(letter)
+        && rungs[word.len() + 1].0 == Some(Key::Enter)
+        && rungs[word.len() + 1].1 - rungs[0].1 <= Duration::from_secs(within_s)
+}
+
+/// Whether the history ends in an abort's chord: Ctrl-X and within 2 s Enter; or Ctrl-X twice, not as a held key does.
+/// However they came, and whatever else came in between.
+fn ends_in_chord(history: &[Came]) -> bool {
+    let presses: Vec<Duration> =
+        history.iter().filter(|came| came.key == Some(Key::CtrlX)).map(|came| came.at).collect();
+    let (Some(newest), Some(last)) = (presses.last(), history.last()) else { return false };
+    let entered = last.key == Some(Key::Enter) && last.at - *newest <= ABORT_TIME_LIMIT;
+    let twice = presses.len() > 1 && {
+        let gap = *newest - presses[presses.len() - 2];
+        gap >= Duration::from_millis(120) && gap <= ABORT_TIME_LIMIT
     };
-    before.iter().enumerate().any(opens)
+    entered || twice
+}
+
+/// Whether the last key quits where nothing is at risk: a key to quit, struck.
+fn ends_in_quit(history: &[Came]) -> bool {
+    let told = told_by_hand(history);
+    matches!(told.last(), Some((Some(Key::Char('q' | 'Q') | Key::CtrlC), _)))
+}
+
+/// What a keyboard, a clipboard or noise on a line can bring.
+#[derive(Debug, Clone)]
+enum Stream {
+    ByHand(Vec<Key>),
+    Held { key: Key, delay_ms: u64, period_ms: u64, repeats: usize },
+    /// In one read.
+    Together(Vec<Key>),
+    /// One by one, so far apart.
+    Hurried(Vec<Key>, u64),
+    Marked,
+    Pause(u64),
+}
+
+/// As a terminal's bytes are read.
+fn key_of(byte: u8) -> Option<Key> {
+    match byte {
+        0x03 => Some(Key::CtrlC),
+        0x0C => Some(Key::CtrlL),
+        0x0D => Some(Key::Enter),
+        0x18 => Some(Key::CtrlX),
+        0x1B => Some(Key::Escape),
+        0x7F => Some(Key::Backspace),
+        b' '..=b'~' => Some(Key::Char(char::from(byte))),
+        _ => None,
+    }
+}
+
+fn stream() -> impl Strategy<Value = Stream> {
+    let bytes = prop::collection::vec(any::<u8>(), 1..40)
+        .prop_map(|bytes| bytes.into_iter().filter_map(key_of).collect::<Vec<_>>());
+    let ladders = prop::sample::select(vec![
+        ladder(),
+        start_ladder(),
+        quit_ladder(),
+        vec![Key::Char('D'), Key::Enter],
+        typed("Send the crew away"),
+        [typed("Thanks"), vec![Key::Enter]].concat(),
+    ]);
+    let keys = prop_oneof![2 => ladders.clone(), 1 => bytes, 2 => some_keys()];
+    // Also the end of a ladder alone, and its beginning.
+    let part = (ladders, 0_usize..8, any::<bool>()).prop_map(|(keys, at, end)| {
+        let at = at.min(keys.len());
+        if end { keys[at..].to_vec() } else { keys[..at].to_vec() }
+    });
+    prop_oneof![
+        4 => keys.clone().prop_map(Stream::ByHand),
+        2 => part.clone().prop_map(Stream::ByHand),
+        2 => (some_keys(), 150_u64..900, 20_u64..100, 1_usize..30).prop_map(
+            |(keys, delay_ms, period_ms, repeats)| Stream::Held { key: keys[0], delay_ms, period_ms, repeats }
+        ),
+        2 => keys.clone().prop_map(Stream::Together),
+        1 => part.prop_map(Stream::Together),
+        2 => (keys, 0_u64..60).prop_map(|(keys, apart_ms)| Stream::Hurried(keys, apart_ms)),
+        1 => Just(Stream::Marked),
+        2 => (0_u64..3_000).prop_map(Stream::Pause),
+    ]
+}
+
+/// A bench that is played streams, and checks everything that comes of them against the oracle.
+struct Watched {
+    bench: Bench,
+    history: Vec<Came>,
+}
+
+impl Watched {
+    fn play(&mut self, stream: Stream) -> Result<(), TestCaseError> {
+        match stream {
+            Stream::ByHand(keys) => keys.into_iter().try_for_each(|key| self.key_after(130, key)),
+            Stream::Hurried(keys, apart_ms) => {
+                keys.into_iter().try_for_each(|key| self.key_after(apart_ms, key))
+            }
+            Stream::Held { key, delay_ms, period_ms, repeats } => {
+                self.key_after(130, key)?;
+                self.key_after(delay_ms, key)?;
+                (0..repeats).try_for_each(|_| self.key_after(period_ms, key))
+            }
+            Stream::Together(keys) => {
+                self.pass(50)?;
+                let together = keys.len() > 1;
+                let at = self.bench.now;
+                self.history.extend(keys.iter().map(|key| Came { key: Some(*key), at, together }));
+                self.bench.msg(if let [key] = keys[..] { Msg::Key(key) } else { Msg::Keys(keys.clone()) });
+                // An abort's chord may stand anywhere among them; nothing else may.
+                let begin = self.history.len() - keys.len();
+                let chord = (begin..=self.history.len()).any(|end| ends_in_chord(&self.history[..end]));
+                self.check(chord)
+            }
+            Stream::Marked => {
+                self.pass(50)?;
+                self.history.push(Came { key: None, at: self.bench.now, together: true });
+                self.bench.msg(Msg::Pasted);
+                self.check(false)
+            }
+            Stream::Pause(ms) => self.pass(ms),
+        }
+    }
+
+    fn key_after(&mut self, ms: u64, key: Key) -> Result<(), TestCaseError> {
+        self.pass(ms)?;
+        self.history.push(Came { key: Some(key), at: self.bench.now, together: false });
+        self.bench.press(key);
+        self.check(false)
+    }
+
+    /// Time passes, with the clock's ticks.
+    fn pass(&mut self, ms: u64) -> Result<(), TestCaseError> {
+        for _ in 0..ms / 10 {
+            self.bench.now += Duration::from_millis(10);
+            if self.bench.now.as_millis() % 500 == 0 {
+                self.bench.heartbeat();
+                self.bench.flight_status();
+            }
+            self.bench.msg(Msg::Tick);
+            self.check(false)?;
+        }
+        self.bench.now += Duration::from_millis(ms % 10);
+        Ok(())
+    }
+
+    fn check(&mut self, chord_among: bool) -> Result<(), TestCaseError> {
+        let leaves = leaves(&self.bench);
+        let history = &self.history;
+        let is = |sent: &COMMAND_LONG_DATA, command| sent.command == command;
+        for sent in self.bench.take_commands() {
+            let allowed = if is_abort(&sent) {
+                chord_among || ends_in_chord(history)
+            } else if is_arm(&sent) {
+                ends_in_ladder(history, &[Key::Char('A')], "ARM", 10)
+            } else if is(&sent, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
+                ends_in_ladder(history, &[Key::Char('D')], "", 5)
+            } else {
+                ends_in_ladder(history, &[Key::Char('S')], "START", 10)
+            };
+            // What is sent again by itself was allowed when it was asked for.
+            prop_assert!(allowed || sent.confirmation > 0, "{sent:?} by {history:?}");
+        }
+        let opens = [Key::Char('q'), Key::Char('Q'), Key::CtrlC];
+        let at_risk = self.bench.model.is_at_risk();
+        let quits = ends_in_ladder(history, &opens, "QUIT", 10) || (!at_risk && ends_in_quit(history));
+        prop_assert!(!leaves || quits, "left by {history:?}");
+        if chord_among || ends_in_chord(history) {
+            // What was sent is answered: a repeat of it is no new abort.
+            self.bench.model.commands = ground::model::command::Commands::default();
+        }
+        Ok(())
+    }
 }
 
 fn some_keys() -> impl Strategy<Value = Vec<Key>> {
@@ -75,24 +264,16 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
+    /// Repeated keys, pastes, random bytes, near misses and whole ladders, in any order, on a vehicle that may be armed.
     #[test]
-    fn no_keys_without_the_complete_ladder_arm(
-        steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
-    ) {
-        let mut bench = Bench::crewed();
-        let mut history = Vec::new();
+    fn nothing_without_its_whole_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
+        let mut bench = if armed { armed_on_pad() } else { Bench::crewed() };
         bench.take_commands();
-        for (keys, pause_ms) in steps {
-            bench.run((pause_ms / 100) as f64 / 10.0);
-            prop_assert!(!bench.take_commands().iter().any(is_arm), "armed while no key was pressed");
-            for key in keys {
-                history.push((key, bench.now));
-                bench.key(key);
-                if bench.take_commands().iter().any(is_arm) {
-                    prop_assert!(ends_in_complete_ladder(&history), "{history:?}");
-                }
-            }
+        let mut watched = Watched { bench, history: Vec::new() };
+        for stream in streams {
+            watched.play(stream)?;
         }
+        watched.pass(500)?;
     }
 
     #[test]
@@ -116,32 +297,6 @@ proptest! {
         prop_assert!(bench.take_commands().iter().any(is_abort));
     }
 
-    /// An abort that is sent at a key was begun by a Ctrl-X just before it; and one that is sent later, by two.
-    #[test]
-    fn no_keys_without_the_chord_abort(
-        steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
-    ) {
-        let mut bench = Bench::crewed();
-        let mut history = Vec::new();
-        bench.take_commands();
-        for (keys, pause_ms) in steps {
-            bench.run((pause_ms / 100) as f64 / 10.0);
-            for key in keys {
-                let begun = history.last() == Some(&Key::CtrlX);
-                let twice = history.ends_with(&[Key::CtrlX, Key::CtrlX]);
-                let earlier = bench.take_commands().iter().any(is_abort);
-                prop_assert!(!earlier || twice, "while no key was pressed: {history:?}");
-                bench.key(key);
-                history.push(key);
-                if bench.take_commands().iter().any(is_abort) {
-                    prop_assert!(twice || (begun && key == Key::Enter), "{history:?}");
-                }
-                // What was sent is answered: a repeat of it is no new abort.
-                bench.model.commands = ground::model::command::Commands::default();
-            }
-        }
-    }
-
     /// The same ladder on a screen whose station runs elsewhere; it asks, and sends nothing itself.
     #[test]
     fn an_attached_screen_asks_to_arm_by_the_complete_ladder_alone(
@@ -154,10 +309,12 @@ proptest! {
         for (keys, pause_ms) in steps {
             bench.run((pause_ms / 100) as f64 / 10.0);
             for key in keys {
-                history.push((key, bench.now));
                 bench.key(key);
+                history.push(Came { key: Some(key), at: bench.now, together: false });
                 let asks = bench.actions.contains(&Action::Request(Asked::Command(CommandKind::Arm)));
-                prop_assert!(!asks || ends_in_complete_ladder(&history), "{history:?}");
+                let complete = ends_in_ladder(&history, &[Key::Char('A')], "ARM", 10);
+                prop_assert!(!asks || complete, "{history:?}");
+                bench.actions.clear();
                 prop_assert!(bench.take_commands().is_empty());
             }
         }

@@ -3,6 +3,7 @@
 mod alarms;
 mod auto;
 mod bench;
+mod crew;
 mod daemon;
 mod disarm;
 mod flown;

@@ -9,6 +9,8 @@ fn ground(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ground"))
         .args(arguments)
         .current_dir(directory)
+        .env("XDG_RUNTIME_DIR", directory)
+        .env("XDG_CONFIG_HOME", directory)
         .output()
         .expect("the program can be started")
 }
@@ -51,19 +53,57 @@ fn an_unknown_profile_and_an_existing_log_are_code_1_and_named() {
 }
 
 #[test]
+fn a_flag_that_means_nothing_to_a_screen_is_code_2_and_named() {
+    let directory = tempfile::tempdir().unwrap();
+    for (arguments, flag) in [
+        (&["attach", "--connect", "udpin:127.0.0.1:0"][..], "--connect"),
+        (&["attach", "--auto"], "--auto"),
+        (&["status", "--log", "none"], "--log"),
+    ] {
+        let output = ground(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{}", err(&output));
+        assert!(err(&output).contains(&format!("{flag} means nothing to this command")), "{}", err(&output));
+    }
+}
+
+/// Nothing has begun that a log could tell of.
+#[test]
+fn a_start_that_fails_leaves_no_files() {
+    let directory = tempfile::tempdir().unwrap();
+    let other = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let link = format!("udpin:{}", other.local_addr().unwrap());
+    for arguments in [
+        &["--connect", &link][..],
+        &["daemon", "--connect", &link],
+        &["--connect", &link, "--log", "a.mcap", "--tlog", "b.tlog"],
+        &["--connect", "udpin:127.0.0.1:0", "--key", "no-such-key"],
+    ] {
+        let output = ground(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(1), "{}", err(&output));
+        let left: Vec<_> =
+            std::fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert!(left.is_empty(), "{arguments:?} left {left:?}");
+    }
+    let output = ground(directory.path(), &["--connect", &link]);
+    assert!(err(&output).contains("none of your ground stations does"), "{}", err(&output));
+}
+
+#[test]
 fn nothing_heard_is_code_5() {
     let directory = tempfile::tempdir().unwrap();
     let arguments = ["--connect", "udpin:127.0.0.1:0", "--timeout-s", "0.3", "--log", "none"];
     let output = ground(directory.path(), &arguments);
     assert_eq!(output.status.code(), Some(5), "{}", out(&output));
-    assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0, "no log was wanted");
+    let entries = std::fs::read_dir(directory.path()).unwrap();
+    let names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names, ["touchdown"], "no log was wanted; there its socket was");
 }
 
 /// The demonstration, through real sockets, faster than real time.
 #[test]
-fn the_demonstration_lands_with_code_0_and_names_its_log() {
+fn the_papers_landing_ends_with_code_0_and_names_its_log() {
     let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--speed", "4"]);
+    let output = ground(directory.path(), &["--speed", "4", "--profile", "paper-calibrated"]);
     let text = out(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", err(&output));
     for words in [
@@ -155,7 +195,7 @@ fn completions_and_the_manual_come_from_the_command_line_itself() {
 #[test]
 fn the_telemetry_log_holds_the_same_flight() {
     let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"]);
+    let output = ground(directory.path(), &["--profile", "paper-calibrated", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"]);
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     let verdict = |file: &str| {
         let output = ground(directory.path(), &["--replay", file]);

@@ -54,7 +54,8 @@ fn a_terminal_that_vanishes_takes_nothing_with_it() {
     // The session drops: its terminal is gone at once.
     terminal.kill().unwrap();
     terminal.wait().unwrap();
-    assert!(directory.path().join("touchdown-ground.sock").exists(), "it serves screens");
+    let socket = directory.path().join(format!("touchdown/{process}.sock"));
+    assert!(socket.exists(), "it serves screens");
     let mut attached =
         on_a_terminal(directory.path(), &format!("sh -c 'stty rows 24 cols 80; exec {program} attach'"))
             .unwrap();
@@ -68,5 +69,5 @@ fn a_terminal_that_vanishes_takes_nothing_with_it() {
         std::thread::park_timeout(Duration::from_millis(50));
         !signal("0", &process)
     });
-    assert!(ended && !directory.path().join("touchdown-ground.sock").exists());
+    assert!(ended && !socket.exists());
 }

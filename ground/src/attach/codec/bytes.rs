@@ -101,6 +101,11 @@ impl Reader<'_> {
         framer.next_frame().ok_or(CodecError("not a frame"))
     }
 
+    /// What follows is not read.
+    pub(super) fn skip(&mut self) {
+        self.0 = &[];
+    }
+
     pub(super) fn end(&self) -> Result<(), CodecError> {
         if self.0.is_empty() { Ok(()) } else { Err(CodecError("too long")) }
     }

@@ -24,6 +24,18 @@ fn hello_and_live_come_back_the_same() {
     let hello = Told::Hello(Hello { version: VERSION, link_name: "a".to_owned(), ..Hello::default() });
     assert_eq!(back(&hello, Duration::ZERO).0, hello);
     assert_eq!(back(&Told::Live, Duration::ZERO).0, Told::Live);
+    let status = Status { pid: 7, at_risk: true, phase: "PAD_ARMED".to_owned(), ..Status::default() };
+    assert_eq!(back(&Told::Status(status.clone()), Duration::ZERO).0, Told::Status(status));
+    let stopping = Told::Stopping { stops: false, words: "armed".to_owned() };
+    assert_eq!(back(&stopping, Duration::ZERO).0, stopping);
+}
+
+/// Whatever else it says: a screen must be able to tell its crew to update.
+#[test]
+fn a_station_of_another_version_is_known_by_it() {
+    let hello = Hello { version: VERSION + 1, link_name: "a".to_owned(), ..Hello::default() };
+    let Told::Hello(known) = back(&Told::Hello(hello), Duration::ZERO).0 else { panic!("a greeting") };
+    assert_eq!(known, Hello { version: VERSION + 1, ..Hello::default() });
 }
 
 #[test]
@@ -50,7 +62,9 @@ fn what_is_too_long_is_not_told() {
 #[test]
 fn what_is_asked_comes_back_the_same() {
     let asked = [
-        Asked::Hello { watch: true },
+        Asked::Hello { watch: true, operator: "anna on pts/3".to_owned() },
+        Asked::Status,
+        Asked::Stop { force: true, operator: "anna".to_owned() },
         Asked::Command(CommandKind::Arm),
         Asked::Acknowledge,
         Asked::Parameters,
@@ -105,6 +119,10 @@ fn link() -> impl Strategy<Value = LinkReport> {
     })
 }
 
+fn seat() -> impl Strategy<Value = Seat> {
+    (any::<u32>(), any::<String>()).prop_map(|(screen, operator)| Seat { screen, operator })
+}
+
 /// Every message that the station's model takes from outside its own terminal.
 fn msg() -> impl Strategy<Value = Msg> {
     let heartbeat = any::<u32>().prop_map(|custom_mode| {
@@ -128,7 +146,9 @@ fn msg() -> impl Strategy<Value = Msg> {
         any::<usize>().prop_map(Msg::HeardOver),
         (vec(link(), 0..4), option::of(signing())).prop_map(|(links, signing)| Msg::Links { links, signing }),
         (any::<u64>(), any::<bool>()).prop_map(|(dropped, failed)| Msg::Log(LogHealth { dropped, failed })),
-        kind.prop_map(Msg::Requested),
+        (kind, seat()).prop_map(|(kind, by)| Msg::Requested { kind, by }),
+        vec(seat(), 0..4).prop_map(Msg::Crew),
+        Just(Msg::ScreenQuit),
         option::of(any::<String>()).prop_map(Msg::SimulatorEnded),
     ]
 }
@@ -141,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_panic(bytes in vec(any::<u8>(), 0..80), kind in 0_u8..18) {
+    fn no_bytes_panic(bytes in vec(any::<u8>(), 0..80), kind in 0_u8..33) {
         let _ = decode_told(&bytes);
         let _ = decode_asked(&bytes);
         let mut aimed = vec![kind, 0, 0, 0, 0, 0, 0, 0, 0];

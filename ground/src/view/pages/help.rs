@@ -7,7 +7,7 @@ pub fn lines() -> Vec<Line<'static>> {
     [
         " A               open the arming dialog (step 1);",
         "                 then type ARM and Enter within 10 s (step 2)",
-        " S, Enter        start the countdown; Enter within 5 s",
+        " S               start the countdown: then START and Enter within 10 s",
         " D, Enter        disarm",
         " Ctrl-X Enter    ABORT, from anywhere: Enter within 2 s, or Ctrl-X again;",
         "                 a held key is one press. Sent until acknowledged",
@@ -17,7 +17,7 @@ pub fn lines() -> Vec<Line<'static>> {
         " Up Down PgUp PgDn Home End   scroll a list",
         " Ctrl-L          draw the screen again",
         " In a replay: Space, Left, Right, [ and ] (phases), + and - (speed), g, G",
-        " q, Ctrl-C       quit; asks when armed or in flight",
+        " q, Ctrl-C       quit; armed or in flight only with QUIT and Enter",
         " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
         " observed are three facts; armed is what HEARTBEAT says.",
         " o command, # actual. A line is flown, dots are planned; after the",

@@ -1,0 +1,60 @@
+//! Nobody at the controls: a countdown that this station's crew began does not go on without it.
+
+use std::time::Duration;
+
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TdPhase};
+use protocol::identity::VEHICLE;
+
+use super::{Action, keys};
+use crate::model::Model;
+use crate::model::command::CommandKind;
+use crate::model::crew::ALONE_MAX;
+
+/// The hold is asked for this often: the vehicle need not answer, its countdown does.
+const HOLD_EVERY: Duration = Duration::from_millis(100);
+/// The clock's ticks are this often, and not to the millisecond.
+const HALF_A_TICK: Duration = Duration::from_millis(50);
+
+pub(super) fn step(model: &mut Model, now: Duration) {
+    let alone = !model.settings.auto && model.crew.is_gone(now);
+    if !(alone && counts_down(model) && armed_here(model)) {
+        if model.crew.hold_due.take().is_some() {
+            let why = if alone { "the countdown is gone" } else { "a commanding screen is back" };
+            model.info(now, format!("the hold is not asked for any more: {why}"));
+        }
+        return;
+    }
+    let due = match model.crew.hold_due {
+        Some(due) => due,
+        None => {
+            let text = format!("no commanding screen for {} s in the countdown: HOLD", ALONE_MAX.as_secs());
+            keys::record_operator(model, "hold", &text, now);
+            model.warn(now, text);
+            now
+        }
+    };
+    if now + HALF_A_TICK >= due {
+        model.outbox.push(Action::send(hold()));
+        model.crew.hold_due = Some(now + HOLD_EVERY);
+    }
+}
+
+fn counts_down(model: &Model) -> bool {
+    let on_pad = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_PAD_ARMED);
+    on_pad && model.vehicle.countdown_s().is_some()
+}
+
+/// Another station's countdown is another crew's.
+fn armed_here(model: &Model) -> bool {
+    let arm = model.commands.of(CommandKind::Arm);
+    arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())
+}
+
+fn hold() -> MavMessage {
+    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
+        target_system: VEHICLE.system_id,
+        target_component: VEHICLE.component_id,
+        ..COMMAND_LONG_DATA::default()
+    })
+}
