@@ -32,11 +32,6 @@ impl Injector {
         Self { waiting: waiting.collect(), entered_s: [None; Phase::ALL.len()], happened: 0 }
     }
 
-    /// What has not come about yet, with the moments that were drawn.
-    pub fn waiting(&self) -> &[TimedFault] {
-        &self.waiting
-    }
-
     /// How many came about.
     pub fn happened(&self) -> u64 {
         self.happened
@@ -93,7 +88,7 @@ mod tests {
         let faults = ["abort@ignition+1..3".parse().unwrap(), "gnss-out@ignition+1..3".parse().unwrap()];
         let drawn_s = |number| {
             Injector::new(&faults, 5, number)
-                .waiting()
+                .waiting
                 .iter()
                 .map(|fault| match fault.when {
                     When::Phase(Phase::Ignition, delay_s) => delay_s,
