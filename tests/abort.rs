@@ -86,16 +86,22 @@ fn in_the_countdown_nothing_is_released() {
 }
 
 #[test]
-fn under_thrust_it_holds_upright_and_says_that_no_cut_off_exists() {
+fn under_thrust_it_lands_here_and_says_that_no_cut_off_exists() {
     let mut flight = fly_to(TdPhase::TD_PHASE_POWERED);
     let before = flight.ground.wait_for_phase(TdPhase::TD_PHASE_POWERED);
-    assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY);
+    assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
     flight.ground.wait_for_phase(TdPhase::TD_PHASE_SAFED);
     let ended = ended(flight);
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);
-    assert!(ended.output.contains("STABILISER") && !ended.output.contains("CHUTE"), "{}", ended.output);
+    assert!(ended.output.contains("landing on the ground below"), "{}", ended.output);
+    assert!(!ended.output.contains("CHUTE"), "{}", ended.output);
+    assert!(
+        ended.output.contains("; it LANDED inside its limits"),
+        "the verdict stands beside it: {}",
+        ended.output
+    );
 }
 
 #[test]

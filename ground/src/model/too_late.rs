@@ -15,7 +15,14 @@ pub fn why(model: &Model, now: Duration) -> Option<&'static str> {
     // What was said before the link fell silent counts on: silence gives no time back.
     let offered = model.vehicle.status.as_ref()?.value.abort_effect;
     let chute = offered == TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
-    if !chute && offered != TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT {
+    let before_ignition = chute
+        || matches!(
+            offered,
+            TdAbortEffect::TD_ABORT_EFFECT_BURN
+                | TdAbortEffect::TD_ABORT_EFFECT_IMPACT
+                | TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT
+        );
+    if !before_ignition {
         return None;
     }
     let descent = model.vehicle.descent.as_ref()?;
@@ -25,7 +32,12 @@ pub fn why(model: &Model, now: Duration) -> Option<&'static str> {
     let passes_s = (descent.age(now) + 2 * one_way).as_secs_f64();
     let left_s = f64::from(d.time_to_ignition_s);
     if left_s.is_finite() && left_s < passes_s {
-        return Some("TOO LATE: arrives after ignition");
+        return Some(if offered == TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT {
+            // An older vehicle gives up its landing then.
+            "TOO LATE: arrives after ignition"
+        } else {
+            "TOO LATE: arrives after ignition, lands here"
+        });
     }
     let (above_m, down_m_s) =
         (f64::from(d.height_m) - f64::from(d.commit_height_m), -f64::from(d.vertical_speed_m_s));

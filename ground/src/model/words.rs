@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use super::telemetry::phase_from_number;
-use protocol::dialect::{TdAbortEffect, TdCheck, TdPhase};
+use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdPhase};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
@@ -27,19 +27,27 @@ fn without_prefix(value: &impl Debug, prefix: &str) -> String {
     name.strip_prefix(prefix).unwrap_or(&name).to_owned()
 }
 
-/// What an abort would do now, honestly.
-pub fn abort_effect(effect: TdAbortEffect) -> &'static str {
-    match effect {
+/// What an abort would lead to now, the consequence first.
+pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
+    let words = match status.abort_effect {
         TdAbortEffect::TD_ABORT_EFFECT_NONE => "nothing is left to abort",
         TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD => "disarm and inhibit on the pad",
-        TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "inhibit landing motor, chute at apogee",
-        TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "inhibit motor, fins open, chute NOW",
+        TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "parachute at apogee, landing motor inhibited",
+        TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "parachute NOW, landing motor inhibited",
+        // Of older vehicles, which do not say which.
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
         TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
-        TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE => "lands here: no cut-off exists",
-        TdAbortEffect::TD_ABORT_EFFECT_BURN => "too low for a chute: burns and lands here",
-        TdAbortEffect::TD_ABORT_EFFECT_IMPACT => "too low for a chute, gate shut: IMPACT",
-    }
+        TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE => "lands here, no cut-off exists",
+        TdAbortEffect::TD_ABORT_EFFECT_BURN => "burns and lands here, too low for a chute",
+        TdAbortEffect::TD_ABORT_EFFECT_IMPACT => return impact(status.abort_impact_m_s),
+    };
+    words.to_owned()
+}
+
+/// A fall to the ground, with its speed there unless that is unknown.
+fn impact(speed_m_s: u8) -> String {
+    let speed = if speed_m_s == u8::MAX { String::new() } else { format!(" at about {speed_m_s} m/s") };
+    format!("IMPACT{speed}, too low for a chute")
 }
 
 /// The failing checks' names.
@@ -57,6 +65,28 @@ mod tests {
     fn names_come_from_the_dialect() {
         assert_eq!(phase(TdPhase::TD_PHASE_PAD_IDLE), "PAD_IDLE");
         assert_eq!(lower_case(&TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN, "TD_SOLVER_STATUS_"), "not run");
+    }
+
+    #[test]
+    fn an_abort_is_told_by_what_it_leads_to() {
+        let words = |effect, abort_impact_m_s| {
+            let status = TD_FLIGHT_STATUS_DATA {
+                abort_effect: effect,
+                abort_impact_m_s,
+                ..TD_FLIGHT_STATUS_DATA::default()
+            };
+            abort_effect(&status)
+        };
+        for (effect, consequence) in [
+            (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, "parachute"),
+            (TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE, "lands here"),
+            (TdAbortEffect::TD_ABORT_EFFECT_BURN, "burns and lands here"),
+        ] {
+            assert!(words(effect, 0).starts_with(consequence), "{}", words(effect, 0));
+        }
+        let impact = TdAbortEffect::TD_ABORT_EFFECT_IMPACT;
+        assert_eq!(words(impact, 37), "IMPACT at about 37 m/s, too low for a chute");
+        assert_eq!(words(impact, u8::MAX), "IMPACT, too low for a chute", "unknown is no speed");
     }
 
     #[test]

@@ -103,7 +103,7 @@ fn abort_effect(model: &Model, now: Duration) -> String {
     }
     let mark = if status.is_stale(now) { "~" } else { "" };
     let reach = if let LinkState::Lost(_) = model.link.state(now) { "; MAY NOT ARRIVE" } else { "" };
-    format!("{mark}{}{reach}", words::abort_effect(status.value.abort_effect))
+    format!("{mark}{}{reach}", words::abort_effect(&status.value))
 }
 
 /// After an abort on the pad: nobody goes there yet.

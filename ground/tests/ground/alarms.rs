@@ -140,17 +140,23 @@ fn an_abort_that_would_arrive_too_late_says_so() {
     bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
     bench.run(1.0);
     bench.descent(180.0);
-    assert!(bench.screen(80, 24).contains("abort now: inhibit motor, fins open, chute NOW"));
+    assert!(bench.screen(80, 24).contains("abort now: parachute NOW, landing motor inhibited"));
     // 5 m above the commit height at 21.5 m/s: 0.23 s.
     bench.descent(100.0);
     assert!(bench.screen(80, 24).contains("abort now: TOO LATE for a chute"));
     // 0.2 s to ignition.
     bench.descent(62.0);
-    assert!(bench.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition"));
+    assert!(bench.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition, lands here"));
+    for effect in [TdAbortEffect::TD_ABORT_EFFECT_BURN, TdAbortEffect::TD_ABORT_EFFECT_IMPACT] {
+        bench.abort_effect = effect;
+        bench.run(0.5);
+        bench.descent(62.0);
+        assert!(bench.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition, lands here"));
+    }
     bench.phase = TdPhase::TD_PHASE_POWERED;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
     bench.run(2.0);
-    assert!(bench.screen(80, 24).contains("abort now: TOO LATE: no cut-off exists"));
+    assert!(bench.screen(80, 24).contains("abort now: lands here"));
 }
 
 #[test]

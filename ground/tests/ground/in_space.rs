@@ -101,7 +101,7 @@ pub(crate) fn burning_in_space() -> Bench {
     fall(TdPhase::TD_PHASE_AERO_DESCENT, 18..75, (120.0, 6.0));
     fall(TdPhase::TD_PHASE_IGNITION, 17..18, (120.0, 6.0));
     fall(TdPhase::TD_PHASE_POWERED, 7..17, (300.0, 28.0));
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
     bench.countdown_ms = -2_700;
     bench.run(0.2);
     bench.state_in_space([8.0, -5.5, 27.5], [-3.0, 2.0, -13.0], (300.0, 28.0));

@@ -128,7 +128,7 @@ fn regress_deploy() {
 
 #[test]
 fn regress_land_armed() {
-    let effect = TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT;
+    let effect = TdAbortEffect::TD_ABORT_EFFECT_BURN;
     let mut bench = in_phase(TdPhase::TD_PHASE_LAND_ARMED, effect, (90.0, -38.0), (200.0, 6.0));
     bench.descent_with(90.0, -38.0, TdChute::TD_CHUTE_STOWED);
     let screen = bench.screen(80, 24);
@@ -139,7 +139,7 @@ fn regress_land_armed() {
 
 #[test]
 fn regress_ignition() {
-    let effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    let effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
     let mut bench = in_phase(TdPhase::TD_PHASE_IGNITION, effect, (57.0, -38.5), (200.0, 6.0));
     bench.countdown_ms = -150;
     bench.run(0.1);

@@ -51,7 +51,7 @@ pub(crate) fn counting() -> Bench {
 pub(crate) fn powered() -> Bench {
     let mut bench = counting();
     bench.phase = TdPhase::TD_PHASE_POWERED;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY;
+    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
     bench.countdown_ms = -2_700;
     bench.run(1.0);
     for k in 0..20_u16 {

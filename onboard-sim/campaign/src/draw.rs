@@ -88,6 +88,17 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     Draw { truth, apogee, flight_seed }
 }
 
+/// Shares of a time, evenly in [0, 1), for the faults of flight `number`: from random numbers of their own, so that a
+/// fault changes nothing else about the flight.
+pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
+    /// Any number, as long as no other draw takes it.
+    const OF_FAULTS: u64 = 0xfa17_0000_0000_0001;
+    let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_FAULTS);
+    random.set_stream(number);
+    let mut chance = Chance { random };
+    (0..faults).map(|_| chance.unit()).collect()
+}
+
 /// Random numbers on `libm`, the same on every machine.
 struct Chance {
     random: ChaCha12Rng,

@@ -2,7 +2,7 @@
 //!
 //! On a command line and in a scenario a fault is written `NAME[:VALUE]@WHEN`, for example `gnss-out@5`,
 //! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since apogee in seconds, or a phase with an
-//! optional delay in seconds since it was entered.
+//! optional delay in seconds since it was entered. A delay `+0.5..4` is drawn evenly for each flight.
 
 mod inject;
 mod scenario;
@@ -48,6 +48,8 @@ pub enum When {
     Time(f64),
     /// So many seconds after a phase was entered.
     Phase(Phase, f64),
+    /// The same, drawn evenly between two delays, s, for each flight.
+    PhaseBetween(Phase, [f64; 2]),
 }
 
 /// A fault of a flight.
@@ -61,7 +63,7 @@ pub struct TimedFault {
 
 /// Why a fault was not understood.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("fault `{given}`: {problem}; write NAME[:VALUE]@WHEN, NAME one of {known}, WHEN seconds or one of {phases} with +SECONDS", known = known(), phases = phases())]
+#[error("fault `{given}`: {problem}; write NAME[:VALUE]@WHEN, NAME one of {known}, WHEN seconds or one of {phases} with +SECONDS or +FROM..TO", known = known(), phases = phases())]
 pub struct FaultError {
     given: String,
     problem: String,
@@ -128,6 +130,10 @@ fn phases() -> String {
     PHASES.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
+fn name_of(phase: Phase) -> &'static str {
+    PHASES.iter().find(|(_, known)| *known == phase).map_or("?", |(name, _)| name)
+}
+
 fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
@@ -148,10 +154,15 @@ impl FromStr for When {
             .iter()
             .find(|(known, _)| *known == name)
             .ok_or_else(|| format!("`{name}` is neither a time nor a phase"))?;
-        let delay_s = number(delay)
-            .filter(|delay_s| *delay_s >= 0.0)
-            .ok_or_else(|| format!("`{delay}` is no delay in seconds"))?;
-        Ok(Self::Phase(*phase, delay_s))
+        let seconds = |text: &str| number(text).filter(|delay_s| *delay_s >= 0.0);
+        let read = match delay.split_once("..") {
+            None => seconds(delay).map(|delay_s| Self::Phase(*phase, delay_s)),
+            Some((from, to)) => seconds(from)
+                .zip(seconds(to))
+                .filter(|(from_s, to_s)| from_s <= to_s)
+                .map(|(from_s, to_s)| Self::PhaseBetween(*phase, [from_s, to_s])),
+        };
+        read.ok_or_else(|| format!("`{delay}` is no delay in seconds"))
     }
 }
 
@@ -186,10 +197,9 @@ impl fmt::Display for When {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Time(time_s) => write!(f, "{time_s}"),
-            Self::Phase(phase, delay_s) => {
-                let name = PHASES.iter().find(|(_, known)| known == phase).map_or("?", |(name, _)| name);
-                if *delay_s > 0.0 { write!(f, "{name}+{delay_s}") } else { f.write_str(name) }
-            }
+            Self::Phase(phase, delay_s) if *delay_s > 0.0 => write!(f, "{}+{delay_s}", name_of(*phase)),
+            Self::Phase(phase, _) => f.write_str(name_of(*phase)),
+            Self::PhaseBetween(phase, [from_s, to_s]) => write!(f, "{}+{from_s}..{to_s}", name_of(*phase)),
         }
     }
 }
@@ -234,6 +244,7 @@ mod tests {
             "link-loss@0",
             "link-delay:1.5@descent",
             "accelerometer-bias:50@armed",
+            "abort@ignition+0..4.5",
         ] {
             assert_eq!(text.parse::<TimedFault>().unwrap().to_string(), text);
         }
@@ -254,6 +265,9 @@ mod tests {
             ("no-light@-1", "before apogee"),
             ("no-light@orbit", "neither a time nor a phase"),
             ("no-light@powered+soon", "no delay"),
+            ("abort@powered+3..2", "no delay"),
+            ("abort@powered+-1..2", "no delay"),
+            ("abort@powered+1..", "no delay"),
         ] {
             let message = text.parse::<TimedFault>().unwrap_err().to_string();
             assert!(message.contains(words) && message.contains("NAME[:VALUE]@WHEN"), "{message}");

@@ -60,7 +60,7 @@ impl Sortie {
             number,
             draw,
             flight,
-            injector: Injector::new(&order.faults),
+            injector: Injector::new(&order.faults, order.seed, number),
             leg_limits: [legs.vertical_m_s, legs.lateral_m_s, legs.tilt_deg, legs.rate_deg_s],
             gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
             ignition: None,

@@ -239,6 +239,7 @@ fn fly(
         gimbal_applied_rad: 0.0,
         thrust_scale: 1.0,
         degraded: false,
+        lands_here: false,
         deadline_missed: false,
     };
     rehearsals.push(timed(&mut controller, &input).1);

@@ -25,6 +25,7 @@ fn powered_ticks_do_not_allocate() {
         gimbal_applied_rad: 0.0,
         thrust_scale: 1.0,
         degraded: false,
+        lands_here: false,
         deadline_missed: false,
     };
     for _ in 0..2 {

@@ -80,6 +80,7 @@ fn fly(scenario: &Scenario) -> Flight {
         gimbal_applied_rad: 0.0,
         thrust_scale: 1.0,
         degraded: false,
+        lands_here: false,
         deadline_missed: false,
     };
     if scenario.rehearsed {

@@ -216,7 +216,14 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         }
         Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
         Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
-        Outcome::Aborted => writeln!(out, "ABORTED in {}", summary.phase.name())?,
+        Outcome::Aborted => {
+            let came_down = match summary.judged.as_ref().map(|judged| judged.landed) {
+                Some(true) => "; it LANDED inside its limits",
+                Some(false) => "; NOT LANDED inside its limits",
+                None => "",
+            };
+            writeln!(out, "ABORTED in {}{came_down}", summary.phase.name())?;
+        }
         Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
         Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
     }

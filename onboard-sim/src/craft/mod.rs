@@ -26,7 +26,7 @@ pub use snapshot::{
     Prediction, SensorFacts, Snapshot,
 };
 pub(crate) use snapshot::{bits, violations};
-pub(crate) use words::{DEGRADED, LOG_STOPPED, Readiness, self_test_failed, words_of};
+pub(crate) use words::{LOG_STOPPED, Readiness, self_test_failed, words_of, words_of_landing_here};
 
 use crate::streams::Standard;
 
@@ -142,16 +142,30 @@ pub trait Craft {
         answer::answer(self, request)
     }
 
+    /// Whether a plan to land can be had under thrust; true as long as nobody has tried.
+    fn plans_a_landing(&self) -> bool;
+
+    /// Speed at the ground after a fall from here without thrust, m/s, falling positive.
+    fn impact_m_s(&self) -> f64;
+
     /// Asked of the phase table itself, so that the words beside the abort key are what it would do.
     fn abort_effect(&self) -> AbortEffect {
         let next = transition(self.mode(), self.abort_event(), self.time_s());
         let does = |effect| next.effects.contains(effect);
+        // To be sure, more rather than less; 254 is the most that is told, 255 would be "unknown".
+        let impact = || AbortEffect::Impact { m_s: libm::ceil(self.impact_m_s()).clamp(0.0, 254.0) as u8 };
         match () {
             () if next.refusal.is_some() => AbortEffect::None,
             () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
             () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
-            () if next.mode.interlocks.degraded => AbortEffect::UprightOnly,
-            () if does(Effect::IgniteLandingMotor) || does(Effect::RecordLoss) => AbortEffect::BurnOrInhibit,
+            () if does(Effect::IgniteLandingMotor) => AbortEffect::Burn,
+            () if does(Effect::RecordLoss) => impact(),
+            () if next.mode.interlocks.lands_here => match () {
+                // It was commanded to light and has not.
+                () if self.phase() == Phase::Ignition && self.mode().interlocks.no_light_latched => impact(),
+                () if self.plans_a_landing() => AbortEffect::LandHere,
+                () => AbortEffect::UprightOnly,
+            },
             () => AbortEffect::ChuteAtApogee,
         }
     }

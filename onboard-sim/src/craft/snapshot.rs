@@ -26,9 +26,16 @@ pub enum AbortEffect {
     ChuteAtApogee,
     /// Inhibit the landing motor, parachute now.
     ChuteNow,
-    /// Too low for a parachute: burn if the gate passes, else inhibit.
-    BurnOrInhibit,
-    /// No cut-off exists: hold upright.
+    /// Too low for a parachute, and the gate is open: light the landing motor and land on the ground below.
+    Burn,
+    /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing motor.
+    Impact {
+        /// Speed at the ground, rounded up, m/s.
+        m_s: u8,
+    },
+    /// The motor burns and has no cut-off: land on the ground below instead of at the pad.
+    LandHere,
+    /// The same, where no plan can be had: hold upright.
     UprightOnly,
 }
 

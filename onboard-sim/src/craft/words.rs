@@ -1,7 +1,7 @@
 //! What the crew is told as the phase table does something.
 
 use flight::arming::Check;
-use flight::phase::Effect;
+use flight::phase::{Effect, Interlocks};
 
 use super::Severity;
 
@@ -27,8 +27,16 @@ pub(crate) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
     Some((severity, words.to_owned()))
 }
 
-/// An abort under thrust, in words.
-pub(crate) const DEGRADED: &str = "ABORT: no cut-off exists; holding upright at full vertical thrust";
+/// The words for an abort that found the landing motor lit, if it came between two moments.
+pub(crate) fn words_of_landing_here(before: &Interlocks, after: &Interlocks) -> Option<(Severity, String)> {
+    let aborted = after.lands_here && !before.lands_here;
+    let words = if after.no_light_latched {
+        "ABORT: the landing motor has not lit"
+    } else {
+        "ABORT: no cut-off exists; landing on the ground below"
+    };
+    aborted.then(|| (Severity::Critical, words.to_owned()))
+}
 
 /// A self-test that has failed, in words.
 pub(crate) fn self_test_failed(fins_answering: usize) -> String {

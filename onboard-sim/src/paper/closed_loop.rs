@@ -31,6 +31,7 @@ pub(super) fn fly(profile: &Profile, limits: &TouchdownLimits) -> Finish {
             gimbal_applied_rad: gimbal_rad,
             thrust_scale: 1.0,
             degraded: false,
+            lands_here: false,
             deadline_missed: false,
         };
         let output = step(&mut controller, &input);

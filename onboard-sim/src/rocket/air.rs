@@ -9,7 +9,7 @@ use flight::pilot::{FRAMES_PER_PLAN, Sensed};
 use world::RestOutcome;
 
 use super::{Air, FRAME_S, Rocket};
-use crate::craft::{Craft as _, DEGRADED, Judged, Severity, VehicleEvent, words_of};
+use crate::craft::{Craft as _, Judged, Severity, VehicleEvent, words_of, words_of_landing_here};
 use crate::plant::Impact;
 
 /// Time on the ground before everything is shut down, s.
@@ -80,9 +80,7 @@ impl Rocket {
         for effect in effects_between(before, &after) {
             said.extend(words_of(effect, 0.0));
         }
-        if after.interlocks.degraded && !before.interlocks.degraded {
-            said.push((Severity::Critical, DEGRADED.to_owned()));
-        }
+        said.extend(words_of_landing_here(&before.interlocks, &after.interlocks));
         if let Some(air) = &mut self.air {
             let pilot = air.sortie.flight().pilot();
             let level = air.sortie.flight().output().map_or(ControlLevel::Idle, |output| output.level);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use campaign::sortie::Sortie;
 use flight::arming::{ArmingInput, Check, arming_checks};
+use flight::controller::ControlLevel;
 use flight::phase::{Event, Mode, Phase, Refusal, StartPoint, transition};
 use flight::profile::StateWeights;
 use protocol::log::record::Record;
@@ -111,13 +112,20 @@ impl Craft for Rocket {
         self.events.push(VehicleEvent::Text { severity, text });
     }
 
-    /// Whether the gate is open is the flight computer's to find at its next frame.
+    /// By the last frame; the flight computer looks again in the next one.
     fn abort_event(&self) -> Event {
-        let above_commit_height = self.air.as_ref().is_some_and(|air| {
-            let outlook = air.sortie.flight().pilot().outlook();
-            outlook.height_m > outlook.commit_height_m
-        });
-        Event::AbortRequested { above_commit_height, gate_open: false }
+        let on_the_pad = Event::AbortRequested { above_commit_height: false, gate_open: false };
+        let flight = self.air.as_ref().map(|air| air.sortie.flight());
+        flight.map_or(on_the_pad, |flight| flight.pilot().abort_event(flight.input()))
+    }
+
+    fn plans_a_landing(&self) -> bool {
+        let pilot = self.air.as_ref().map(|air| air.sortie.flight().pilot());
+        pilot.is_none_or(|pilot| pilot.report().level != ControlLevel::Stabiliser)
+    }
+
+    fn impact_m_s(&self) -> f64 {
+        self.air.as_ref().and_then(|air| air.sortie.flight().pilot().impact_m_s()).unwrap_or(0.0)
     }
 
     fn advance_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {

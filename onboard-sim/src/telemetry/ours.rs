@@ -13,6 +13,7 @@ use crate::craft::{AbortEffect, PATH_POINTS, Snapshot};
 pub(super) fn flight_status(snapshot: &Snapshot) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_ignition_s.map(|since_s| -since_s));
     let locks = snapshot.interlocks;
+    let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
         countdown_ms: seconds.map_or(i32::MAX, |s| (1000.0 * s).round() as i32),
@@ -20,16 +21,24 @@ pub(super) fn flight_status(snapshot: &Snapshot) -> MavMessage {
         checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
         pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| s.ceil() as u16),
         phase: td_phase(snapshot.phase),
-        abort_effect: match snapshot.abort_effect {
-            AbortEffect::None => TdAbortEffect::TD_ABORT_EFFECT_NONE,
-            AbortEffect::SafeOnPad => TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD,
-            AbortEffect::ChuteAtApogee => TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE,
-            AbortEffect::ChuteNow => TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW,
-            AbortEffect::BurnOrInhibit => TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT,
-            AbortEffect::UprightOnly => TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY,
-        },
+        abort_effect,
+        abort_impact_m_s,
         ..TD_FLIGHT_STATUS_DATA::default()
     })
+}
+
+/// What an abort would do, and the speed of the impact it leads to, m/s, or nought.
+fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
+    match effect {
+        AbortEffect::None => (TdAbortEffect::TD_ABORT_EFFECT_NONE, 0),
+        AbortEffect::SafeOnPad => (TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD, 0),
+        AbortEffect::ChuteAtApogee => (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE, 0),
+        AbortEffect::ChuteNow => (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, 0),
+        AbortEffect::Burn => (TdAbortEffect::TD_ABORT_EFFECT_BURN, 0),
+        AbortEffect::Impact { m_s } => (TdAbortEffect::TD_ABORT_EFFECT_IMPACT, m_s),
+        AbortEffect::LandHere => (TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE, 0),
+        AbortEffect::UprightOnly => (TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY, 0),
+    }
 }
 
 fn interlocks(locks: Interlocks) -> TdInterlock {
@@ -39,7 +48,6 @@ fn interlocks(locks: Interlocks) -> TdInterlock {
     bits.set(TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED, locks.landing_motor_inhibited);
     bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
     bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
-    bits.set(TdInterlock::TD_INTERLOCK_DEGRADED, locks.degraded);
     bits
 }
 
@@ -209,6 +217,24 @@ mod tests {
                 "bit {place}: {name} is not {}",
                 check.name
             );
+        }
+    }
+
+    #[test]
+    fn the_speed_of_an_impact_is_told_with_it_and_with_nothing_else() {
+        let told = [
+            (AbortEffect::None, 0, 0),
+            (AbortEffect::SafeOnPad, 1, 0),
+            (AbortEffect::ChuteAtApogee, 2, 0),
+            (AbortEffect::ChuteNow, 3, 0),
+            (AbortEffect::UprightOnly, 5, 0),
+            (AbortEffect::LandHere, 6, 0),
+            (AbortEffect::Burn, 7, 0),
+            (AbortEffect::Impact { m_s: 41 }, 8, 41),
+        ];
+        for (effect, number, m_s) in told {
+            let (td_effect, td_m_s) = td_abort_effect(effect);
+            assert_eq!((td_effect as u32, td_m_s), (number, m_s), "{effect:?}");
         }
     }
 

@@ -4,14 +4,16 @@ use std::time::Duration;
 
 use flight::arming::{self, ArmingInput, Check, arming_checks};
 use flight::controller::ControlLevel;
+use flight::dynamics::PlanarParams;
 use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
 use flight::profile::StateWeights;
 use flight::verdict::LandingVerdict;
+use flight::vertical::fall_ends_m_s;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
 use super::{Severity, Vehicle};
-use crate::craft::{Craft, DEGRADED, Judged, LogState, Snapshot, VehicleEvent, words_of};
+use crate::craft::{Craft, Judged, LogState, Snapshot, VehicleEvent, words_of, words_of_landing_here};
 use crate::streams::{STANDARD, Standard};
 
 impl Craft for Vehicle {
@@ -81,8 +83,8 @@ impl Craft for Vehicle {
         for effect in next.effects.iter() {
             self.take_effect(effect);
         }
-        if self.mode.interlocks.degraded && !from.interlocks.degraded {
-            self.say(Severity::Critical, DEGRADED.to_owned());
+        if let Some((severity, words)) = words_of_landing_here(&from.interlocks, &self.mode.interlocks) {
+            self.say(severity, words);
         }
         if self.mode.phase != from.phase {
             self.events.push(VehicleEvent::PhaseChanged { from: from.phase, to: self.mode.phase });
@@ -98,6 +100,17 @@ impl Craft for Vehicle {
     fn abort_event(&self) -> Event {
         let gate_open = self.mode.phase.in_descent() && arming::all_passed(&self.gate_checks());
         Event::AbortRequested { above_commit_height: false, gate_open }
+    }
+
+    fn plans_a_landing(&self) -> bool {
+        self.output.as_ref().is_none_or(|output| output.level != ControlLevel::Stabiliser)
+    }
+
+    fn impact_m_s(&self) -> f64 {
+        let state = self.plant.state();
+        let params = PlanarParams::from_profile(&self.profile);
+        let terminal_m_s = libm::sqrt(params.gravity_m_s2 / params.drag_per_m);
+        fall_ends_m_s(state.z_m, state.ground_velocity_m_s().1, terminal_m_s, params.gravity_m_s2)
     }
 
     fn advance_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {

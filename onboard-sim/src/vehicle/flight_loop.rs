@@ -124,7 +124,8 @@ impl Vehicle {
             state: self.plant.state(),
             gimbal_applied_rad: self.gimbal_applied_rad,
             thrust_scale: self.thrust.scale(),
-            degraded: self.mode.interlocks.degraded,
+            degraded: false,
+            lands_here: self.mode.interlocks.lands_here,
             deadline_missed: self.misses > 0,
         };
         let began = stopwatch();

@@ -6,6 +6,7 @@ use flight::phase::Phase;
 use flight::profile::Profile;
 
 use flight::controller::ControlLevel;
+use flight::dynamics::PlanarState;
 
 use super::*;
 use crate::craft::{AbortEffect, Craft as _, Request, Result};
@@ -195,22 +196,65 @@ fn an_abort_in_the_countdown_releases_nothing() {
     assert!(vehicle.snapshot().thrust_n.abs() < f64::EPSILON);
 }
 
+fn said(events: &[VehicleEvent], words: &str) -> bool {
+    events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
+}
+
+/// How long an aborted vehicle had been burning, s, and the abort's landing.
+fn aborted_after(burning_s: f64) -> (Vehicle, Vec<VehicleEvent>) {
+    let mut vehicle = in_phase(Phase::Ignition);
+    run_until(&mut vehicle, |v| v.snapshot().since_ignition_s.is_some_and(|since_s| since_s >= burning_s));
+    assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::LandHere);
+    assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+    assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted, "repeated until answered");
+    let events = run_until(&mut vehicle, Vehicle::is_over);
+    (vehicle, events)
+}
+
 #[test]
-fn an_abort_under_thrust_holds_upright_and_never_opens_a_parachute() {
-    for phase in [Phase::Ignition, Phase::Powered] {
-        let mut vehicle = in_phase(phase);
-        assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::UprightOnly);
-        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
-        assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted, "repeated until answered");
-        let events = run_until(&mut vehicle, Vehicle::is_over);
+fn an_abort_under_thrust_lands_and_stays_an_abort() {
+    for burning_s in [0.0, 0.3, 1.5, 3.0] {
+        let (vehicle, events) = aborted_after(burning_s);
         assert!(!phases(&events).contains(&Phase::Chute));
-        assert!(events.iter().any(|event| matches!(
-            event,
-            VehicleEvent::Tick(tick) if tick.output.level == ControlLevel::Stabiliser
-        )));
-        // Full upright thrust from here climbs and falls back: recorded as what it is.
-        assert!(!vehicle.judged().unwrap().landed);
+        assert!(said(&events, "no cut-off exists; landing on the ground below"), "{events:?}");
+        let judged = vehicle.judged().unwrap();
+        assert!(judged.landed, "{burning_s} s: {judged:?}");
+        assert!(vehicle.aborted(), "the verdict stands beside the abort");
     }
+}
+
+/// Where no landing can be planned, an abort can only hold it upright, and that is said before.
+#[test]
+fn without_a_plan_an_abort_under_thrust_holds_upright() {
+    let mut vehicle = in_phase(Phase::Powered);
+    // Burns on its back: no landing from here.
+    let thrown = PlanarState { theta_rad: -1.0, z_m: 4.0, w_m_s: 8.0, ..vehicle.plant.state() };
+    vehicle.plant.release(thrown);
+    run_until(&mut vehicle, |v| v.output.as_ref().unwrap().level == ControlLevel::Stabiliser);
+    assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::UprightOnly);
+    assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+    run_until(&mut vehicle, Vehicle::is_over);
+    assert!(!vehicle.judged().unwrap().landed);
+}
+
+/// Before the gate has opened nothing is left but the fall: 5 m/s at 15 m, and then hardly any drag.
+#[test]
+fn an_abort_with_the_gate_shut_says_how_hard_it_hits() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    profile.gate.tilt_max_deg = 1.0;
+    profile.dispersion.pitch_deg = 20.0;
+    let mut vehicle = vehicle_of(&profile);
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    vehicle.request(Request::Arm);
+    vehicle.request(Request::Start);
+    run_until(&mut vehicle, |v| v.phase() == Phase::LandArmed);
+    let AbortEffect::Impact { m_s } = vehicle.snapshot().abort_effect else {
+        panic!("{:?}", vehicle.snapshot().abort_effect)
+    };
+    assert_eq!(vehicle.request(Request::Abort).result, Result::Accepted);
+    run_until(&mut vehicle, Vehicle::is_over);
+    let found_m_s = vehicle.judged().unwrap().impact.state.speed_m_s();
+    assert!((f64::from(m_s) - 1.0..=f64::from(m_s)).contains(&found_m_s), "{m_s} said, {found_m_s} found");
 }
 
 #[test]

@@ -62,6 +62,7 @@ pub fn input_to_log(input: &ControllerInput) -> v1::ControllerInput {
         gimbal_applied_rad: input.gimbal_applied_rad,
         thrust_scale: input.thrust_scale,
         degraded: input.degraded,
+        lands_here: Some(input.lands_here),
         deadline_missed: input.deadline_missed,
     }
 }
@@ -82,6 +83,8 @@ pub fn input_from_log(input: &v1::ControllerInput) -> Result<ControllerInput, Ti
         gimbal_applied_rad: input.gimbal_applied_rad,
         thrust_scale: input.thrust_scale,
         degraded: input.degraded,
+        // Earlier flights did not: an abort under thrust flew upright, which `degraded` says.
+        lands_here: input.lands_here.unwrap_or(false),
         deadline_missed: input.deadline_missed,
     })
 }
@@ -178,6 +181,7 @@ mod tests {
             input.gimbal_applied_rad.to_bits(),
             input.thrust_scale.to_bits(),
             u64::from(input.degraded),
+            u64::from(input.lands_here),
             u64::from(input.deadline_missed),
         ]);
         bits
@@ -189,8 +193,7 @@ mod tests {
             tick: u64,
             phase in 0..Phase::ALL.len(),
             numbers in prop::array::uniform10(any_bits()),
-            degraded: bool,
-            deadline_missed: bool,
+            [degraded, lands_here, deadline_missed]: [bool; 3],
         ) {
             let [x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s, time_s, since, gimbal, scale] = numbers;
             let input = ControllerInput {
@@ -202,12 +205,23 @@ mod tests {
                 gimbal_applied_rad: gimbal,
                 thrust_scale: scale,
                 degraded,
+                lands_here,
                 deadline_missed,
             };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = v1::ControllerInput::decode(bytes.as_slice()).unwrap();
             prop_assert_eq!(bits(&input_from_log(&read).unwrap()), bits(&input));
         }
+    }
+
+    /// Before there was such a thing as landing here, an abort under thrust flew upright.
+    #[test]
+    fn an_input_of_an_earlier_flight_does_not_land_here() {
+        let earlier = v1::ControllerInput { degraded: true, ..v1::ControllerInput::default() };
+        let read = v1::ControllerInput::decode(earlier.encode_to_vec().as_slice()).unwrap();
+        assert_eq!(read.lands_here, None);
+        let input = input_from_log(&read).unwrap();
+        assert!(input.degraded && !input.lands_here);
     }
 
     #[test]

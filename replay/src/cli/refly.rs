@@ -67,7 +67,7 @@ enum Origin {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Controller {
-    /// The landing controller, or the upright law if an abort under thrust was latched.
+    /// The landing controller, with an abort that was latched; the upright law if it flew alone.
     AsRecorded,
     /// The upright law alone; of planar landings.
     Stabiliser,

@@ -45,10 +45,10 @@ const RUN_PLANT_SETTINGS: &str = "plant_settings";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// As recorded: the landing controller, or the upright law if an abort under thrust was latched.
+    /// As recorded: the landing controller, with an abort that was latched; the upright law if it flew alone.
     #[default]
     AsRecorded,
-    /// The upright law alone, as after an abort under thrust; of the planar landing.
+    /// The upright law alone; of the planar landing.
     Stabiliser,
     /// The pilot itself; of a flight from apogee, as those below.
     Nmpc,

@@ -59,6 +59,7 @@ pub(super) struct Simulation<'a> {
     controller: LoggedController,
     law: Law,
     degraded: bool,
+    lands_here: bool,
     frame_s: f64,
     frames_per_sample: u64,
     sample: u64,
@@ -114,6 +115,7 @@ impl<'a> Simulation<'a> {
             controller,
             law,
             degraded: input.degraded || law == Law::Stabiliser,
+            lands_here: input.lands_here,
             frame_s,
             frames_per_sample: (sample_s / frame_s).round().max(1.0) as u64,
             sample,
@@ -170,6 +172,7 @@ impl<'a> Simulation<'a> {
             gimbal_applied_rad: self.gimbal_applied_rad,
             thrust_scale: self.thrust.scale(),
             degraded: self.degraded,
+            lands_here: self.lands_here,
             deadline_missed: false,
         };
         let output = self.controller.step(&input);

@@ -30,10 +30,11 @@ pub(crate) struct Flight {
 }
 
 /// The landing every test starts from, flown once.
-pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(fly);
+pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| fly(|_| ()));
 
-/// Pad, release and landing burn to the ground; the plant is the controller's own model, stepped at 1 ms.
-fn fly() -> Flight {
+/// Pad, release and landing burn to the ground; the plant is the controller's own model, stepped at 1 ms. What the
+/// controller is told may be changed.
+pub(crate) fn fly(tell: impl Fn(&mut ControllerInput)) -> Flight {
     let profile = Profile::builtin(PROFILE).unwrap();
     let config = ControllerConfig::from_profile(&profile);
     let model = PlanarModel::from_profile(&profile);
@@ -51,7 +52,7 @@ fn fly() -> Flight {
             (_, Some(0)) => Phase::Ignition,
             _ => Phase::Powered,
         };
-        let input = ControllerInput {
+        let mut input = ControllerInput {
             tick,
             time_s: tick as f64 * config.sample_time_s(),
             phase,
@@ -60,8 +61,10 @@ fn fly() -> Flight {
             gimbal_applied_rad: held_rad,
             thrust_scale: 1.0,
             degraded: false,
+            lands_here: false,
             deadline_missed: false,
         };
+        tell(&mut input);
         let output = step(&mut controller, &input);
         let solve_time_s = 0.001 * (tick % 7 + 1) as f64;
         ticks.push(tick_to_log(&input, &output, controller.digest(), solve_time_s, DEADLINE_S));

@@ -22,8 +22,11 @@ pub(crate) struct Logged {
 }
 
 /// Flight 3 of the campaign with field dispersions and seed 1; it lands.
-pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| {
-    let order = order();
+pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| fly(&[]));
+
+/// The same flight with faults.
+pub(crate) fn fly(faults: &[&str]) -> Logged {
+    let order = Order { faults: faults.iter().map(|fault| fault.parse().unwrap()).collect(), ..order() };
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("apogee.mcap");
     let mut sortie = Sortie::new(&order, NUMBER).unwrap();
@@ -45,7 +48,7 @@ pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| {
     writer.write(&Record::LandingVerdict(verdict), from_apogee::time_ns(sortie.flight())).unwrap();
     writer.finish().unwrap();
     Logged { directory, log, landed: sortie.row().legs }
-});
+}
 
 fn order() -> Order {
     let toml = |texts: &[(&str, &str)], name: &str| {

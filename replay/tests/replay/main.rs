@@ -1,6 +1,7 @@
 //! Logs of a flown landing, whole, changed, cut and broken, through the library and through the command.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+mod aborted;
 mod another_build;
 mod apogee;
 mod asked;

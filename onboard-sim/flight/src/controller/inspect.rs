@@ -45,6 +45,7 @@ mod tests {
             gimbal_applied_rad: 0.0,
             thrust_scale: 1.0,
             degraded: false,
+            lands_here: false,
             deadline_missed: false,
         };
         step(&mut controller, &input);

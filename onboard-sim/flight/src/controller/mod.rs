@@ -149,8 +149,10 @@ pub struct ControllerInput {
     pub gimbal_applied_rad: f64,
     /// Estimated thrust over nominal thrust.
     pub thrust_scale: f64,
-    /// An abort under thrust is latched: only the upright law flies.
+    /// Only the upright law flies.
     pub degraded: bool,
+    /// An abort with the motor lit is latched: the vehicle lands on the ground below it, wherever the pad is.
+    pub lands_here: bool,
     /// The previous tick's output came too late and was not applied.
     pub deadline_missed: bool,
 }

@@ -7,6 +7,7 @@ use super::{
 use crate::dynamics::PlanarState;
 use crate::nmpc::{Solution, SolveStatus, solve_into};
 use crate::phase::Phase;
+use crate::powered::here_m;
 
 /// Largest miss of an end or path condition that still counts as a plan that lands, m, rad, m/s or rad/s.
 const LANDING_MISS: f64 = 1e-3;
@@ -105,6 +106,9 @@ fn land(state: &mut ControllerState, input: &ControllerInput) -> Decision {
     }
     let ControllerState { config, flown, room } = state;
     moment.pose(config, predicted, input.thrust_scale, room);
+    if input.lands_here {
+        room.problem.target.x_m = moment.here_m(&predicted);
+    }
     if input.deadline_missed {
         room.problem.solver.max_iterations = room.problem.solver.max_iterations_after_miss;
     }
@@ -163,9 +167,16 @@ impl Moment {
         }
     }
 
-    /// Writes the landing from the predicted state into the room.
+    /// Writes the landing at the pad, from the predicted state, into the room.
     fn pose(&self, config: &ControllerConfig, predicted: PlanarState, thrust_scale: f64, room: &mut Room) {
         room.problem.pose(&config.profile, predicted, self.starts_s, self.intervals, thrust_scale);
+        room.problem.target.x_m = 0.0;
+    }
+
+    /// The ground below a state at this moment, m from the pad.
+    fn here_m(&self, predicted: &PlanarState) -> f64 {
+        let (along_m_s, _) = predicted.ground_velocity_m_s();
+        here_m(predicted.x_m, along_m_s, self.intervals as f64 * self.sample_time_s)
     }
 
     /// Solves the problem in the room, from the flown plan shifted to this moment if it reaches this far.

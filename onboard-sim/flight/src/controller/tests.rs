@@ -20,6 +20,7 @@ fn input(phase: Phase, time_since_ignition_s: f64) -> ControllerInput {
         gimbal_applied_rad: 0.0,
         thrust_scale: 1.0,
         degraded: false,
+        lands_here: false,
         deadline_missed: false,
     }
 }
@@ -73,7 +74,23 @@ fn the_printed_profile_is_refused_with_its_bound() {
 }
 
 #[test]
-fn an_abort_under_thrust_flies_upright() {
+fn an_abort_with_the_motor_lit_plans_a_landing_on_the_ground_below() {
+    let away = PlanarState { x_m: 60.0, ..profile().start.planar_state() };
+    let far = ControllerInput { state: away, ..input(Phase::Powered, 0.1) };
+    let homing = step(&mut flying(), &far);
+    assert!(homing.level != ControlLevel::Converged, "60 m to the pad are too far: {:?}", homing.level);
+    let mut state = flying();
+    let here = step(&mut state, &ControllerInput { lands_here: true, ..far });
+    assert_eq!(here.level, ControlLevel::Converged, "{:?}", here.solver);
+    let landed = here.predicted_touchdown.state;
+    assert!((landed.x_m - 60.0).abs() < 10.0, "{landed:?}");
+    // Afterwards the pad is the pad again.
+    let again = step(&mut state, &far);
+    assert!(again.level != ControlLevel::Converged, "{:?}", again.level);
+}
+
+#[test]
+fn the_upright_law_flies_alone_when_asked() {
     let mut state = flying();
     let tilted = PlanarState { theta_rad: 1.2, ..profile().start.planar_state() };
     let output =

@@ -4,7 +4,14 @@ use super::{Interlocks, Mode, Phase};
 use crate::memory::{Memory, Remembers, remembers};
 
 remembers!(Mode { phase, interlocks, entered_at_s, countdown_end_s });
-remembers!(Interlocks { pin_out, armed, landing_motor_inhibited, abort_latched, no_light_latched, degraded });
+remembers!(Interlocks {
+    pin_out,
+    armed,
+    landing_motor_inhibited,
+    abort_latched,
+    no_light_latched,
+    lands_here
+});
 
 impl Remembers for Phase {
     fn remember(&self, memory: &mut Memory) {

@@ -131,8 +131,8 @@ pub struct Interlocks {
     pub abort_latched: bool,
     /// The landing motor was commanded and gave no thrust in time.
     pub no_light_latched: bool,
-    /// Abort under thrust: the upright stabiliser flies instead of the planner.
-    pub degraded: bool,
+    /// Aborted with the landing motor lit, which has no cut-off: the vehicle lands on the ground below it.
+    pub lands_here: bool,
 }
 
 /// Phase and latches: all the state the table has.

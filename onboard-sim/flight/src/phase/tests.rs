@@ -248,11 +248,17 @@ fn an_abort_while_rising_ends_under_the_parachute_at_apogee() {
 }
 
 #[test]
-fn an_abort_under_thrust_degrades_the_controller_and_keeps_the_phase() {
+fn an_abort_under_thrust_lands_here_and_keeps_the_phase() {
     let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
     assert_eq!(aborted.mode.phase, Phase::Powered);
-    assert!(aborted.mode.interlocks.degraded && aborted.effects.is_empty());
+    assert!(aborted.mode.interlocks.lands_here && aborted.effects.is_empty());
     assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
+    let burns = Event::AbortRequested { above_commit_height: false, gate_open: true };
+    let lit = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
+    assert!(
+        lit.phase == Phase::Ignition && lit.interlocks.lands_here,
+        "lit by an abort, it lands here likewise"
+    );
 }
 
 #[test]

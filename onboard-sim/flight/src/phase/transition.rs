@@ -189,10 +189,10 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
         P::Chute => {
             Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
         }
-        // The motor has been lit and cannot be stopped; a parachute under thrust would burn or tangle.
-        P::Ignition | P::Powered if locks.degraded => Row::Refuse(Refusal::AlreadyAborted),
+        // The motor has been lit and cannot be stopped; a parachute under thrust would burn or tangle. So it lands.
+        P::Ignition | P::Powered if locks.lands_here => Row::Refuse(Refusal::AlreadyAborted),
         P::Ignition | P::Powered => {
-            let interlocks = Interlocks { abort_latched: true, degraded: true, ..locks };
+            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
         }
         P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
@@ -216,7 +216,7 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
         }
         // Too low for the parachute: landing on the motor is the safest way down that is left.
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
-            let interlocks = Interlocks { abort_latched: true, ..locks };
+            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, P::Ignition, Effects::of(&[Effect::IgniteLandingMotor]))
         }
         P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(

@@ -59,7 +59,8 @@ impl Pilot {
 
         let burning_s = self.known.burning_s(time_s);
         let mass = self.known.mass_now(burning_s);
-        let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3 });
+        let lands_here = self.mode.interlocks.lands_here;
+        let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3, lands_here });
         let flying = self.mode.phase.in_landing_burn();
         self.gimbal_rad = match &situation {
             Some(situation) if flying => {
@@ -160,9 +161,9 @@ impl Pilot {
 
     fn move_through_phases(&mut self, input: &PilotInput, estimate: &Estimate) {
         let time_s = input.time_s;
-        let above_commit_height = self.outlook.height_m > self.outlook.commit_height_m;
         if input.abort {
             let gate_open = self.gate_open(input, estimate);
+            let above_commit_height = self.above_commit_height();
             self.happen(Event::AbortRequested { above_commit_height, gate_open }, time_s);
         }
         if self.gate_will_not_open(input, estimate) {
@@ -214,7 +215,24 @@ impl Pilot {
         }
     }
 
+    /// An abort in the next frame, as far as the last one tells, if there was one.
+    pub fn abort_event(&self, last: Option<&PilotInput>) -> Event {
+        let found = last.zip(self.estimate.as_ref());
+        let gate_open = found.is_some_and(|(input, estimate)| self.gate_shut_by(input, estimate).is_none());
+        Event::AbortRequested { above_commit_height: self.above_commit_height(), gate_open }
+    }
+
+    fn above_commit_height(&self) -> bool {
+        self.outlook.height_m > self.outlook.commit_height_m
+    }
+
     fn gate_open(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
+        self.gate_refusal = self.gate_shut_by(input, estimate);
+        self.gate_refusal.is_none()
+    }
+
+    /// The first check that keeps the gate shut.
+    fn gate_shut_by(&self, input: &PilotInput, estimate: &Estimate) -> Option<&'static str> {
         let state = &estimate.state;
         let ignition = &self.outlook.ignition;
         let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
@@ -235,8 +253,7 @@ impl Pilot {
             estimator_healthy: estimate.health.is_good(),
         };
         let checks = gate_checks(&self.known.mission.gate, &gate);
-        self.gate_refusal = checks.iter().find(|check| !check.passed).map(|check| check.name);
-        self.gate_refusal.is_none()
+        checks.iter().find(|check| !check.passed).map(|check| check.name)
     }
 
     pub(super) fn fins_there(&self, fins_rad: &[f64; 4]) -> bool {
@@ -248,9 +265,6 @@ impl Pilot {
         self.mode = outcome.mode;
         if outcome.effects.contains(Effect::IgniteLandingMotor) {
             self.ignited_at_s = Some(time_s);
-        }
-        if self.mode.interlocks.degraded {
-            self.powered.degrade();
         }
     }
 
@@ -268,9 +282,6 @@ impl Pilot {
             height_m,
             self.known.mission.fin_place,
         );
-        if self.mode.interlocks.degraded {
-            return;
-        }
         let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
         self.powered.plan(time_s, state, &preferred, fallback.as_ref());
     }

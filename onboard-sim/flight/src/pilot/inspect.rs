@@ -50,16 +50,15 @@ impl Pilot {
 
     /// What `before` planned at this frame, seen from behind it.
     fn landing_planned(&self, before: &Self, input: &PilotInput) -> Option<LandingSolved> {
-        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN)
-            && self.mode.phase.in_landing_burn()
-            && !self.mode.interlocks.degraded;
+        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && self.mode.phase.in_landing_burn();
         let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
         let estimate = self.estimate.as_ref()?;
         // As in the frame itself.
         let density_kg_m3 =
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         let mass = self.known.mass_now(Some(burning_s));
-        let burning = Burning { burning_s, mass, density_kg_m3 };
+        let lands_here = self.mode.interlocks.lands_here;
+        let burning = Burning { burning_s, mass, density_kg_m3, lands_here };
         let (preferred, fallback) = self.known.situations_to_plan(estimate, &burning, &input.fins_rad);
         before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
     }

@@ -25,6 +25,8 @@ pub(super) struct Burning {
     pub(super) burning_s: f64,
     pub(super) mass: MassProperties,
     pub(super) density_kg_m3: f64,
+    /// After an abort: on the ground below, wherever the pad is.
+    pub(super) lands_here: bool,
 }
 
 impl Known {
@@ -127,6 +129,7 @@ impl Known {
             crossflow_area_m2: self.crossflow_area_m2(),
             fin_drag_area_m2: self.motor.air_scale() * fin_drag_area_m2,
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
+            lands_here: situation.lands_here,
         }
     }
 }

@@ -2,7 +2,10 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use super::Pilot;
+use crate::atmosphere::Air;
 use crate::ignition::IgnitionOutlook;
+use crate::vertical::fall_ends_m_s;
 
 /// Room the parachute needs, times this, is left above the ground.
 const COMMIT_MARGIN: f64 = 1.5;
@@ -37,11 +40,25 @@ pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m
     (place_m + velocity_m_s * to_ground_s).xy()
 }
 
+impl Pilot {
+    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, falling positive;
+    /// `None` before the first frame.
+    pub fn impact_m_s(&self) -> Option<f64> {
+        let state = self.estimate.as_ref()?.state;
+        let known = &self.known;
+        let density_kg_m3 = Air::at_height_m(known.mission.pad_altitude_m + state.position_m.z).density_kg_m3;
+        let column = known.column(density_kg_m3, known.mission.soft_tilt_deg);
+        let terminal_m_s = column.terminal_speed_m_s(column.hard.fin_drag_area_m2);
+        let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
+        Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s, known.mission.gravity_m_s2))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pilot::PilotInput;
     use crate::pilot::sample::{falling, input};
-    use crate::pilot::{Pilot, PilotInput};
 
     /// Whether an abort in the very next frame releases the parachute.
     fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {

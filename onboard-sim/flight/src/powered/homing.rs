@@ -15,11 +15,16 @@ pub struct Homing {
 impl Homing {
     /// Where to land along the plane, m from the pad, moving at `along_m_s` with `left_s` to go.
     pub(super) fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
-        // Where an even deceleration ends.
-        let free_m = x_m + 0.5 * along_m_s * left_s;
+        let free_m = here_m(x_m, along_m_s, left_s);
         let reach_m = self.reach_m_s2 * left_s * left_s;
         free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)
     }
+}
+
+/// The ground below, m from the pad: where an even deceleration ends, moving at `along_m_s` with `left_s` to go. It is
+/// the place that takes the least leaning to stop at.
+pub(crate) fn here_m(x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+    x_m + 0.5 * along_m_s * left_s
 }
 
 #[cfg(test)]

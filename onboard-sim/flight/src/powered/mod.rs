@@ -20,6 +20,7 @@ mod situation;
 
 use flown::{Flown, largest_tilt_rad};
 pub use homing::Homing;
+pub(crate) use homing::here_m;
 pub use inspect::LandingSolved;
 pub use plane::Plane;
 pub use report::PoweredReport;
@@ -186,7 +187,11 @@ impl PoweredGuidance {
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
         let step_s = horizon_s / intervals as f64;
-        let target_x_m = settings.homing.target_m(initial.x_m, along_m_s, horizon_s);
+        let target_x_m = if situation.lands_here {
+            here_m(initial.x_m, along_m_s, horizon_s)
+        } else {
+            settings.homing.target_m(initial.x_m, along_m_s, horizon_s)
+        };
         let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
         let landing = Problem {
             model: situation.model(),
@@ -296,8 +301,9 @@ impl PoweredGuidance {
         if left_s < self.settings.quiet_s {
             return Aim::at(state.nose_in_world());
         }
-        // Across the plane the pad is approached while there is time.
-        let homing = self.settings.across_homing_per_s2
+        // Across the plane the pad is approached while there is time, if it is to be.
+        let homing_per_s2 = if situation.lands_here { 0.0 } else { self.settings.across_homing_per_s2 };
+        let homing = homing_per_s2
             * ((left_s - HOMING_ENDS_S) / HOMING_ENDS_S).clamp(0.0, 1.0)
             * state.position_m.dot(&plane.across).clamp(-HOMING_MOST_M, HOMING_MOST_M);
         let along = &plane.along;
@@ -317,11 +323,5 @@ impl PoweredGuidance {
             rate_in_world_rad_s: plane.turning(q_rad_s),
             acceleration_in_world_rad_s2: plane.turning(turning_rad_s2),
         }
-    }
-
-    /// From now on only the upright law flies.
-    pub fn degrade(&mut self) {
-        self.flown = None;
-        self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
     }
 }

@@ -36,6 +36,8 @@ pub struct PoweredSituation<'a> {
     pub fin_drag_area_m2: f64,
     /// Largest gimbal angle, rad.
     pub gimbal_limit_rad: f64,
+    /// After an abort: lands on the ground below, wherever the pad is.
+    pub lands_here: bool,
 }
 
 impl PoweredSituation<'_> {

@@ -170,10 +170,36 @@ impl Column {
     }
 }
 
+/// Speed at the ground, m/s, falling positive, after a fall from a height with a vertical velocity (up positive) towards
+/// a terminal speed: `v^2` nears its square by a factor of e in each `V_t^2 / (2 g)` fallen. What rises at first is
+/// taken to fall from where it is.
+pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64, gravity_m_s2: f64) -> f64 {
+    let [begins, terminal] = [(-vertical_m_s).max(0.0), terminal_m_s].map(|speed_m_s| speed_m_s * speed_m_s);
+    let left = libm::exp(-2.0 * gravity_m_s2 * height_m.max(0.0) / terminal);
+    libm::sqrt(terminal + (begins - terminal) * left)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::motors;
+
+    /// Against the fall in small steps.
+    #[test]
+    fn val_a_fall_ends_as_fast_as_its_steps_say() {
+        let column = column();
+        let fins_m2 = column.hard.fin_drag_area_m2;
+        let terminal_m_s = column.terminal_speed_m_s(fins_m2);
+        for vertical_m_s in [0.0, -20.0, -60.0] {
+            let (mut height_m, mut speed_m_s) = (70.0, vertical_m_s);
+            while height_m > 0.0 {
+                (height_m, speed_m_s) = column.fallen(height_m, speed_m_s, fins_m2, 1e-3);
+            }
+            let found_m_s = fall_ends_m_s(70.0, vertical_m_s, terminal_m_s, column.gravity_m_s2);
+            assert!((found_m_s + speed_m_s).abs() < 0.02, "{found_m_s} for {speed_m_s}");
+        }
+        assert!((fall_ends_m_s(-0.1, -3.0, terminal_m_s, 9.81) - 3.0).abs() < 1e-12, "on the ground already");
+    }
 
     fn column() -> Column {
         Column {

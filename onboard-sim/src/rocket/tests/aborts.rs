@@ -42,32 +42,58 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
     }
 }
 
+/// Too low for the parachute: with the gate shut it falls as fast as was said, with the gate open it burns and lands.
 #[test]
-fn an_abort_too_low_for_the_parachute_burns_or_inhibits() {
+fn an_abort_too_low_for_the_parachute_does_what_is_said_beside_the_key() {
     let flight = flight_of("none", &[]);
     let mut rocket = in_phase(&flight, Phase::LandArmed);
-    run_until(&mut rocket, |rocket| rocket.snapshot().abort_effect == AbortEffect::BurnOrInhibit);
+    let falls = |rocket: &Rocket| matches!(rocket.snapshot().abort_effect, AbortEffect::Impact { .. });
+    run_until(&mut rocket, falls);
+    let AbortEffect::Impact { m_s } = rocket.snapshot().abort_effect else { panic!("it fell") };
     assert_eq!(rocket.phase(), Phase::LandArmed);
     assert_eq!(rocket.request(Request::Abort).result, Result::Accepted);
     let events = run_until(&mut rocket, Rocket::is_over);
-    assert!(!phases(&events).contains(&Phase::Chute));
-    let lit = phases(&events).contains(&Phase::Ignition);
-    assert_eq!(said(&events, "vehicle will be lost"), !lit, "{events:?}");
-    assert!(rocket.aborted());
+    assert!(!phases(&events).contains(&Phase::Chute) && !phases(&events).contains(&Phase::Ignition));
+    assert!(said(&events, "vehicle will be lost"), "{events:?}");
+    let found_m_s = -rocket.judged().unwrap().impact.state.u_m_s;
+    assert!((f64::from(m_s) - 2.0..=f64::from(m_s)).contains(&found_m_s), "{m_s} said, {found_m_s} found");
+
+    let mut rocket = in_phase(&flight, Phase::LandArmed);
+    run_until(&mut rocket, |rocket| rocket.snapshot().abort_effect == AbortEffect::Burn);
+    assert_eq!(rocket.phase(), Phase::LandArmed);
+    assert_eq!(rocket.request(Request::Abort).result, Result::Accepted);
+    let events = run_until(&mut rocket, Rocket::is_over);
+    assert_eq!(phases(&events), [Phase::Ignition, Phase::Powered, Phase::Touchdown, Phase::Safed]);
+    assert!(said(&events, "landing on the ground below"), "{events:?}");
+    assert!(rocket.aborted() && rocket.judged().unwrap().landed, "the verdict stands beside the abort");
 }
 
 #[test]
-fn an_abort_under_thrust_holds_upright_and_never_opens_a_parachute() {
+fn an_abort_under_thrust_lands_and_never_opens_a_parachute() {
     let flight = flight_of("none", &[]);
     for phase in [Phase::Ignition, Phase::Powered] {
         let mut rocket = in_phase(&flight, phase);
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::UprightOnly);
+        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::LandHere);
         assert_eq!(rocket.request(Request::Abort).result, Result::Accepted);
         let events = run_until(&mut rocket, Rocket::is_over);
-        assert!(said(&events, "no cut-off exists"));
+        assert!(said(&events, "no cut-off exists; landing on the ground below"));
         assert!(!phases(&events).contains(&Phase::Chute));
-        assert!(said(&events, "controller level"), "{events:?}");
+        assert!(rocket.aborted() && rocket.judged().unwrap().landed, "{:?}", rocket.judged());
     }
+}
+
+/// The motor was commanded and has not lit: nothing lands then, and nothing else is claimed.
+#[test]
+fn without_light_an_abort_is_a_fall() {
+    let flight = flight_of("none", &["no-light@0"]);
+    let mut rocket = in_phase(&flight, Phase::Ignition);
+    run_until(&mut rocket, |rocket| rocket.snapshot().interlocks.no_light_latched);
+    let AbortEffect::Impact { m_s } = rocket.snapshot().abort_effect else { panic!("it does not burn") };
+    assert_eq!(rocket.request(Request::Abort).result, Result::Accepted);
+    let events = run_until(&mut rocket, Rocket::is_over);
+    assert!(said(&events, "the landing motor has not lit") && !said(&events, "landing on the ground"));
+    let found_m_s = -rocket.judged().unwrap().impact.state.u_m_s;
+    assert!((f64::from(m_s) - 2.0..=f64::from(m_s)).contains(&found_m_s), "{m_s} said, {found_m_s} found");
 }
 
 #[test]

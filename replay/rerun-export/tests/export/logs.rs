@@ -51,6 +51,7 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
             gimbal_applied_rad: held_rad,
             thrust_scale: 1.0,
             degraded: false,
+            lands_here: false,
             deadline_missed: false,
         };
         let output = step(&mut controller, &input);

@@ -65,7 +65,7 @@ impl Recipe {
         let by_fault = faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);
         let aborts = crews.map(|tick| tick.input.frame).collect();
-        let rerun = Rerun { flight, injector: Injector::new(&faults), schedule: None, aborts };
+        let rerun = Rerun { flight, injector: Injector::new(&faults, seed, number), schedule: None, aborts };
         Ok(Self { dispersion, number, rerun })
     }
 }

@@ -1,0 +1,60 @@
+//! Flights with an abort under thrust are executed again from their logs like any other.
+
+use flight::controller::ControllerInput;
+use flight::phase::Phase;
+use protocol::log::v1;
+use replay::log::Recording;
+use replay::refly::{ReflyOptions, StartAt, refly_flight};
+use replay::verify::{Outcome, verify};
+
+use crate::flown::{self, Recipe, write_log};
+use crate::from_apogee;
+
+#[test]
+fn from_apogee_an_aborted_flight_verifies_and_flies_the_same_again() {
+    let aborted = from_apogee::fly(&["abort@powered+0..3"]);
+    let recording = Recording::open(&aborted.log).unwrap();
+    assert_eq!(recording.frames.iter().filter(|tick| tick.input.abort).count(), 1);
+    let report = verify(&aborted.log).unwrap();
+    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+    let landing = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..ReflyOptions::default() };
+    let (report, again) = refly_flight(&recording, &landing).unwrap();
+    assert_eq!(report.commands_identical, report.ticks, "the moment that was drawn is drawn again");
+    assert_eq!(again.verdict, recording.verdict);
+    assert!(aborted.landed);
+}
+
+/// The ticks of a planar landing whose controller is told something, verified through a file.
+fn verified(tell: impl Fn(&mut ControllerInput)) -> (Vec<v1::ControllerTick>, Outcome) {
+    let ticks = flown::fly(tell).ticks;
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("aborted.mcap");
+    std::fs::write(&log, write_log(&ticks, &Recipe::default()).bytes).unwrap();
+    let outcome = verify(&log).unwrap().outcome;
+    (ticks, outcome)
+}
+
+#[test]
+fn a_planar_landing_with_an_abort_verifies() {
+    let (ticks, outcome) = verified(|input| input.lands_here = input.tick >= 20);
+    assert_eq!(outcome, Outcome::Identical);
+    let undisturbed = &flown::FLIGHT.ticks;
+    assert_eq!(ticks[..20], undisturbed[..20]);
+    assert_ne!(
+        ticks[20].state_digest, undisturbed[20].state_digest,
+        "it is the abort that is executed again"
+    );
+}
+
+/// Earlier flights flew upright after an abort, and their logs say nothing of landing here.
+#[test]
+fn a_planar_flight_of_an_earlier_build_with_an_abort_verifies() {
+    let (mut ticks, _) = verified(|input| input.degraded = input.tick >= 20);
+    for tick in &mut ticks {
+        assert_eq!(tick.input.lands_here.take(), Some(false));
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("earlier.mcap");
+    std::fs::write(&log, write_log(&ticks, &Recipe::default()).bytes).unwrap();
+    assert_eq!(verify(&log).unwrap().outcome, Outcome::Identical);
+}
