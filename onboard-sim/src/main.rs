@@ -73,6 +73,9 @@ struct LandabilityArguments {
     /// Write the map as a picture.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Replace files that are there.
+    #[arg(long)]
+    force: bool,
     /// Cells computed at the same time; the map does not depend on it.
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
@@ -107,6 +110,9 @@ fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode>
     let profile = load_planar(&arguments.profile)?.profile;
     let (x, y) = (arguments.x, arguments.y);
     anyhow::ensure!(x.quantity != y.quantity, "both axes vary {}; choose two quantities", x.quantity.name());
+    for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
+        refuse_loss(path, arguments.force)?;
+    }
     let jobs =
         arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
     let count = x.count * y.count;
@@ -123,22 +129,40 @@ fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode>
     });
     map.write_table(&mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
-        write_file(path, |out| map.write_csv(out))?;
+        write_file(path, arguments.force, |out| map.write_csv(out))?;
     }
     if let Some(path) = &arguments.svg {
-        write_file(path, |out| landability::write_svg(&map, &profile.name, out))?;
+        write_file(path, arguments.force, |out| landability::write_svg(&map, &profile.name, out))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
+/// A file that is there is replaced only if that is asked for; a pipe or a device holds nothing that could be lost.
+fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
+    let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
+    let is_device = std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir());
+    anyhow::ensure!(force || is_device || !there, "{} exists already; --force replaces it", path.display());
+    Ok(())
+}
+
+/// Under another name first, so that a file of this name is always whole.
 fn write_file(
     path: &Path,
+    force: bool,
     write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
 ) -> anyhow::Result<()> {
-    let written = File::create(path).and_then(|file| {
+    refuse_loss(path, force)?;
+    let is_device = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
+    let unfinished = if is_device { path.to_owned() } else { path.with_added_extension("unfinished") };
+    let written = File::create(&unfinished).and_then(|file| {
         let mut out = BufWriter::new(file);
         write(&mut out)?;
-        out.flush()
+        out.flush()?;
+        if is_device {
+            Ok(())
+        } else {
+            out.get_ref().sync_all().and_then(|()| std::fs::rename(&unfinished, path))
+        }
     });
     written.with_context(|| format!("cannot write {}", path.display()))
 }

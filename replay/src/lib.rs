@@ -11,6 +11,7 @@
 //! * [`mod@sweep`]: many settings over many flights, ranked; and the smallest change that turns a verdict.
 //! * [`mod@tick`]: one tick solved again alone.
 //! * [`mod@compare`]: flights side by side, signal by signal; [`table`]: a log as tables.
+//! * [`output`]: files that appear whole and overwrite nothing unasked.
 //! * [`export`], [`import`] and [`mod@recover`]: into other formats and from them, and whole again out of a damaged log.
 //! * [`mod@report`]: a flight as one page of HTML.
 //! * [`mod@print`]: all of it as text for people, JSON for programs and JUnit XML for build servers.
@@ -25,6 +26,7 @@ pub mod export;
 pub mod import;
 pub mod info;
 pub mod log;
+pub mod output;
 pub mod print;
 pub mod recover;
 pub mod refly;

@@ -1,6 +1,6 @@
 //! The run loop of a replay: a screen and a film, no link and no log.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::cli::{Cli, ReplayFrom};
 use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::{Role, Settings, words};
-use crate::replay::film::Film;
+use crate::replay::film::{Film, Progress};
 use crate::replay::player::Player;
 use crate::update::Msg;
 
@@ -27,7 +27,8 @@ const STEP: Duration = Duration::from_millis(100);
 /// # Errors
 /// The log cannot be read, the terminal failed, or the film has no such phase.
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
-    let film = Film::load(path)?;
+    let mut told = 0;
+    let film = Film::load(path, &mut |progress| tell(path, progress, &mut told))?;
     let damage = film.damage.clone();
     let name = path.display().to_string();
     let settings =
@@ -64,6 +65,19 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
     }
     lines::closing(&player.model, interactive, Ok(&None));
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
+}
+
+/// Of a log that takes more than a moment says at every tenth how far its reading is.
+fn tell(path: &Path, Progress { read, total }: Progress, told: &mut u64) {
+    const LARGE_BYTES: u64 = 32_000_000;
+    const MEGABYTE: u64 = 1_000_000;
+    let tenths = (10 * read).checked_div(total).unwrap_or(0);
+    if total > LARGE_BYTES && tenths > *told {
+        *told = tenths;
+        let (name, read, total) = (path.display(), read / MEGABYTE, total / MEGABYTE);
+        // Talk goes to standard error; nobody may be listening.
+        let _ = writeln!(std::io::stderr(), "ground: reading {name}: {read} of {total} MB");
+    }
 }
 
 async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {

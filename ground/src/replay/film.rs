@@ -1,22 +1,26 @@
-//! The frames of a log, with their times: from MCAP, or from a `.tlog`.
+//! A recorded flight, from MCAP or from a `.tlog`: how long it is and which phases it has. Its scenes stay in the file and
+//! are read as they are played, so that memory does not grow with the log.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use protocol::dialect::{MavCmd, MavMessage, TdPhase};
-use protocol::frame::{Frame, Framer};
-use protocol::identity::{GROUND, VEHICLE};
-use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
-use protocol::log::tlog::frame_length;
+use protocol::dialect::{MavMessage, TdPhase};
+use protocol::frame::Frame;
 
-use crate::model::command::CommandKind;
+pub use super::footage::Scene;
+use super::footage::{Footage, Side};
 use crate::model::telemetry::phase_from_number;
 
-/// Frames held at most: some forty hours of a 57,600-baud radio.
-const FRAMES_MAX: usize = 8_000_000;
+/// How far the reading of a log is, is told this often.
+const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
+/// Times that fall by more than this are a clock that was set back, and not frames of two links in the wrong order.
+const CLOCK_SET_BACK_NS: i128 = 1_000_000_000;
+/// A log that was appended to on another day, or a stamp with a wrong bit, does not stand still for as long.
+const LEFT_OUT_NS: i128 = 3_600 * 1_000_000_000;
+/// Changes of phase kept; a flight has about ten.
+const PHASES_MAX: usize = 10_000;
 
 /// Why a log could not be played.
 #[derive(Debug, thiserror::Error)]
@@ -27,7 +31,7 @@ pub enum FilmError {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// There is nothing to show.
     #[error("{}: holds no frames of a vehicle; a log that `ground` or `onboard-sim` wrote has them", path.display())]
@@ -35,30 +39,27 @@ pub enum FilmError {
         /// The file.
         path: PathBuf,
     },
-    /// There is too much to show.
-    #[error("{}: holds more than {FRAMES_MAX} frames; cut it into parts", path.display())]
-    TooLong {
-        /// The file.
-        path: PathBuf,
-    },
 }
 
-/// What happened at one time.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Scene {
-    /// A frame arrived from the vehicle.
-    Heard(Frame),
-    /// The crew asked for something.
-    Commanded(CommandKind),
-    /// The ground sent something else, of so many bytes.
-    Sent(usize),
+/// How far the reading of a log is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Bytes read.
+    pub read: u64,
+    /// Size of the file.
+    pub total: u64,
 }
 
 /// A whole flight.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug)]
 pub struct Film {
-    /// In the order of their times, which count from the first.
-    pub scenes: Vec<(Duration, Scene)>,
+    path: PathBuf,
+    /// Held open: the file may be renamed while it is played.
+    file: File,
+    side: Side,
+    /// A log that is still being written grows behind these; what is behind them is not played.
+    scenes: u64,
+    length: Duration,
     /// When each phase began.
     pub phases: Vec<(TdPhase, Duration)>,
     /// Why reading ended early, if it did.
@@ -66,27 +67,47 @@ pub struct Film {
 }
 
 impl Film {
-    /// Reads a log; a `.tlog` by its name, everything else as MCAP.
+    /// Looks through a log from its beginning to its end; a `.tlog` by its name, everything else as MCAP.
     ///
     /// # Errors
-    /// The file cannot be read, holds nothing to show, or too much.
-    pub fn load(path: &Path) -> Result<Self, FilmError> {
+    /// The file cannot be read, or holds nothing to show.
+    pub fn load(path: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Self, FilmError> {
         let read = |source| FilmError::Read { path: path.to_owned(), source };
-        let file = BufReader::new(File::open(path).map_err(read)?);
-        let is_tlog = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
-        let film = if is_tlog { from_tlog(file) } else { from_mcap(file) }.map_err(read)?;
-        if film.scenes.is_empty() {
+        let file = File::open(path).map_err(read)?;
+        let total = file.metadata().map_err(read)?.len();
+        let mut footage = Footage::begin(&file, path).map_err(read)?;
+        // What the ground heard; else what the vehicle said.
+        let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
+        let mut told = 0;
+        while let Some(stamped) = footage.next_scene().map_err(read)? {
+            let survey = match stamped.side {
+                Side::Ground => &mut ground,
+                Side::Vehicle => &mut vehicle,
+            };
+            survey.note(stamped.stamp_ns, &stamped.scene);
+            if footage.bytes_read() >= told + PROGRESS_BYTES {
+                told = footage.bytes_read();
+                progress(Progress { read: told, total });
+            }
+        }
+        let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
+        let Some((side, survey)) = found.into_iter().find(|(_, survey)| survey.has_vehicle) else {
             return Err(FilmError::Empty { path: path.to_owned() });
-        }
-        if film.scenes.len() > FRAMES_MAX {
-            return Err(FilmError::TooLong { path: path.to_owned() });
-        }
-        Ok(film)
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            damage: footage.damage(),
+            file,
+            side,
+            scenes: survey.scenes,
+            length: survey.length,
+            phases: survey.phases,
+        })
     }
 
     /// The time of the last scene.
     pub fn length(&self) -> Duration {
-        self.scenes.last().map_or(Duration::ZERO, |(at, _)| *at)
+        self.length
     }
 
     /// When a phase began first.
@@ -94,112 +115,88 @@ impl Film {
         self.phases.iter().find(|(known, _)| *known == phase).map(|(_, at)| *at)
     }
 
-    fn of(mut stamped: Vec<(u64, Scene)>, damage: Option<String>) -> Self {
-        // Stable: what has the same time keeps its order in the file.
-        stamped.sort_by_key(|(at_ns, _)| *at_ns);
-        let first_ns = stamped.first().map_or(0, |(at_ns, _)| *at_ns);
-        let mut phases: Vec<(TdPhase, Duration)> = Vec::new();
-        let mut scenes = Vec::with_capacity(stamped.len());
-        for (at_ns, scene) in stamped {
-            let at = Duration::from_nanos(at_ns - first_ns);
-            if let Scene::Heard(frame) = &scene
-                && let Some(phase) = phase_of(frame)
-                && phases.last().is_none_or(|(last, _)| *last != phase)
+    /// Its scenes from the first on.
+    ///
+    /// # Errors
+    /// The file cannot be read any more.
+    pub fn reel(&self) -> io::Result<Reel> {
+        let footage = Footage::begin(&self.file, &self.path)?;
+        Ok(Reel { footage, side: self.side, clock: FilmClock::default(), left: self.scenes })
+    }
+}
+
+/// What a first look through a log finds on one of its sides.
+#[derive(Default)]
+struct Survey {
+    clock: FilmClock,
+    scenes: u64,
+    has_vehicle: bool,
+    length: Duration,
+    phases: Vec<(TdPhase, Duration)>,
+}
+
+impl Survey {
+    fn note(&mut self, stamp_ns: u64, scene: &Scene) {
+        self.length = self.clock.at(stamp_ns);
+        self.scenes += 1;
+        if let Scene::Heard(frame) = scene {
+            self.has_vehicle = true;
+            if let Some(phase) = phase_of(frame)
+                && self.phases.last().is_none_or(|(last, _)| *last != phase)
+                && self.phases.len() < PHASES_MAX
             {
-                phases.push((phase, at));
+                self.phases.push((phase, self.length));
             }
-            scenes.push((at, scene));
-        }
-        Self { scenes, phases, damage }
-    }
-}
-
-fn from_mcap(file: impl Read) -> std::io::Result<Film> {
-    let mut reader = LogReader::new(file);
-    // What the ground heard; else what the vehicle said.
-    let (mut heard, mut said) = (Vec::new(), Vec::new());
-    while let Some(item) = reader.next_item()? {
-        let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
-        let Some(channel) = reader.channel(channel_id) else { continue };
-        let endpoint = channel.metadata.get("endpoint").map(String::as_str);
-        match (channel.topic.as_str(), endpoint) {
-            (TOPIC_RAW_RX, Some("ground")) => {
-                heard.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
-            }
-            (TOPIC_RAW_TX, Some("ground")) => {
-                heard.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
-            }
-            (TOPIC_RAW_TX | TOPIC_RAW_RX, Some("vehicle")) => {
-                said.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
-            }
-            _ => {}
-        }
-        if heard.len().max(said.len()) > FRAMES_MAX {
-            break;
         }
     }
-    let of_vehicle = |(_, scene): &(u64, Scene)| matches!(scene, Scene::Heard(_));
-    let scenes = if heard.iter().any(of_vehicle) { heard } else { said };
-    let scenes = if scenes.iter().any(of_vehicle) { scenes } else { Vec::new() };
-    Ok(Film::of(scenes, reader.damage().map(ToString::to_string)))
 }
 
-/// Microseconds since the Unix epoch, big-endian, then a frame; again and again.
-fn from_tlog(mut file: impl Read) -> std::io::Result<Film> {
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
-    let mut scenes = Vec::new();
-    let mut rest = bytes.as_slice();
-    let mut damage = None;
-    while !rest.is_empty() {
-        let whole = rest.split_first_chunk::<8>().and_then(|(stamp, behind)| {
-            let (len, frame) = tlog_frame(behind)?;
-            Some((u64::from_be_bytes(*stamp), len, frame))
-        });
-        let Some((stamp_us, len, frame)) = whole else {
-            damage = Some(format!("unreadable {} bytes before the end", rest.len()));
-            break;
-        };
-        scenes.extend(frame.and_then(|frame| scene(stamp_us.saturating_mul(1_000), frame)));
-        rest = &rest[8 + len..];
+/// The scenes of a film, one after the other.
+pub struct Reel {
+    footage: Footage,
+    side: Side,
+    clock: FilmClock,
+    left: u64,
+}
+
+impl Reel {
+    /// The next scene and its time.
+    ///
+    /// # Errors
+    /// The file cannot be read any more.
+    pub fn next_scene(&mut self) -> io::Result<Option<(Duration, Scene)>> {
+        while self.left > 0 {
+            let Some(stamped) = self.footage.next_scene()? else { break };
+            if stamped.side == self.side {
+                self.left -= 1;
+                return Ok(Some((self.clock.at(stamped.stamp_ns), stamped.scene)));
+            }
+        }
+        Ok(None)
     }
-    Ok(Film::of(scenes, damage))
 }
 
-/// The length of the frame that the bytes begin with, and the frame if its checksum holds.
-fn tlog_frame(bytes: &[u8]) -> Option<(usize, Option<Frame>)> {
-    // Of MAVLink 1 nothing is shown.
-    let len = frame_length(bytes)?;
-    let bytes = bytes.get(..len)?;
-    Some((len, frames(bytes).pop()))
+/// Times of a film from the stamps in its file: from nil on, never falling, without the stretches in which nothing was
+/// recorded for long.
+#[derive(Debug, Clone, Copy, Default)]
+struct FilmClock {
+    last_ns: u64,
+    /// What a stamp of time nil would have; `None` before the first.
+    nil_ns: Option<i128>,
 }
 
-fn frames(bytes: &[u8]) -> Vec<Frame> {
-    let mut framer = Framer::new();
-    framer.push_datagram(bytes);
-    std::iter::from_fn(|| framer.next_frame()).collect()
-}
-
-/// What a frame shows: the vehicle's own; the crew's command, for the first time it was sent; or that the ground sent
-/// something.
-fn scene(at_ns: u64, frame: Frame) -> Option<(u64, Scene)> {
-    if frame.source() == VEHICLE {
-        return Some((at_ns, Scene::Heard(frame)));
+impl FilmClock {
+    fn at(&mut self, stamp_ns: u64) -> Duration {
+        let stamp_ns = i128::from(stamp_ns);
+        let nil_ns = *self.nil_ns.get_or_insert(stamp_ns);
+        let (at_ns, last_ns) = (stamp_ns - nil_ns, i128::from(self.last_ns));
+        if (last_ns - CLOCK_SET_BACK_NS..=last_ns + LEFT_OUT_NS).contains(&at_ns) {
+            self.last_ns = self.last_ns.max(u64::try_from(at_ns).unwrap_or(0));
+        } else {
+            self.nil_ns = Some(stamp_ns - last_ns);
+        }
+        Duration::from_nanos(self.last_ns)
     }
-    if frame.source() != GROUND {
-        return None;
-    }
-    let sent = Some((at_ns, Scene::Sent(frame.as_bytes().len())));
-    let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return sent };
-    let kind = match command.command {
-        _ if command.confirmation > 0 => return sent,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 => CommandKind::Arm,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => CommandKind::Disarm,
-        MavCmd::MAV_CMD_MISSION_START => CommandKind::Start,
-        MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => CommandKind::Abort,
-        _ => return sent,
-    };
-    Some((at_ns, Scene::Commanded(kind)))
 }
 
 fn phase_of(frame: &Frame) -> Option<TdPhase> {
@@ -207,5 +204,22 @@ fn phase_of(frame: &Frame) -> Option<TdPhase> {
         MavMessage::HEARTBEAT(data) => phase_from_number(data.custom_mode),
         MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_films_time_never_falls_and_goes_on_when_the_clock_is_set() {
+        let seconds = |stamps: &[u64]| -> Vec<u64> {
+            let mut clock = FilmClock::default();
+            stamps.iter().map(|second| clock.at(second * 1_000_000_000).as_secs()).collect()
+        };
+        assert_eq!(seconds(&[100, 101, 104, 103, 50, 51, 52]), [0, 1, 4, 4, 4, 5, 6]);
+        assert_eq!(seconds(&[100, 101, 90_000, 90_002]), [0, 1, 1, 3]);
+        let mut clock = FilmClock::default();
+        assert_eq!([u64::MAX, 0, u64::MAX].map(|stamp_ns| clock.at(stamp_ns)), [Duration::ZERO; 3]);
     }
 }

@@ -4,4 +4,5 @@
 //! the same `update` that takes a radio's frames takes a log's. Nothing is sent, nothing is recorded.
 
 pub mod film;
+mod footage;
 pub mod player;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use super::film::{Film, Scene};
+use super::film::{Film, Reel, Scene};
 use crate::key::Key;
 use crate::model::page::Page;
 use crate::model::{Model, Playing, Settings};
@@ -25,7 +25,9 @@ pub struct Player {
     pub model: Model,
     position: Duration,
     next_tick: Duration,
-    next_scene: usize,
+    /// The rest of the film; `None` if its file could not be read any more.
+    reel: Option<Reel>,
+    next_scene: Option<(Duration, Scene)>,
     paused: bool,
     speed_exponent: i32,
 }
@@ -39,10 +41,12 @@ impl Player {
             settings,
             position: Duration::ZERO,
             next_tick: Duration::ZERO,
-            next_scene: 0,
+            reel: None,
+            next_scene: None,
             paused: false,
             speed_exponent: 0,
         };
+        player.rewind();
         player.advance_to(Duration::ZERO);
         player
     }
@@ -77,7 +81,8 @@ impl Player {
             let pages = self.model.pages;
             self.model = Model::new(self.settings.clone());
             self.model.pages = pages;
-            (self.position, self.next_tick, self.next_scene) = (Duration::ZERO, Duration::ZERO, 0);
+            (self.position, self.next_tick) = (Duration::ZERO, Duration::ZERO);
+            self.rewind();
         }
         self.advance_to(to);
     }
@@ -129,25 +134,39 @@ impl Player {
         begins.find(|at| *at > self.position).unwrap_or_else(|| self.film.length())
     }
 
+    fn rewind(&mut self) {
+        match self.film.reel() {
+            Ok(reel) => self.reel = Some(reel),
+            Err(error) => self.break_off(&error),
+        }
+        self.next_scene = self.read_scene();
+    }
+
+    fn read_scene(&mut self) -> Option<(Duration, Scene)> {
+        match self.reel.as_mut()?.next_scene() {
+            Ok(scene) => scene,
+            Err(error) => {
+                self.break_off(&error);
+                None
+            }
+        }
+    }
+
+    fn break_off(&mut self, error: &std::io::Error) {
+        self.reel = None;
+        self.model.warn(self.position, format!("the log cannot be read any more: {error}"));
+    }
+
     fn advance_to(&mut self, to: Duration) {
         loop {
-            let scene_at = self.film.scenes.get(self.next_scene).map(|(at, _)| *at).filter(|at| *at <= to);
+            let scene_at = self.next_scene.as_ref().map(|(at, _)| *at).filter(|at| *at <= to);
             let tick_at = Some(self.next_tick).filter(|at| *at <= to);
             match (scene_at, tick_at) {
                 (None, None) => break,
                 (Some(scene), tick) if tick.is_none_or(|tick| scene <= tick) => {
-                    let msgs = match &self.film.scenes[self.next_scene].1 {
-                        Scene::Heard(frame) => {
-                            let (bytes, framing) = (frame.as_bytes().len(), self.model.link.framing);
-                            vec![Msg::Frame(frame.clone()), Msg::Received { bytes, framing }]
-                        }
-                        Scene::Commanded(kind) => vec![Msg::Commanded(*kind)],
-                        Scene::Sent(bytes) => vec![Msg::Sent { bytes: *bytes, drops: 0 }],
-                    };
-                    self.next_scene += 1;
-                    for msg in msgs {
-                        // What the ground did then is in the film; nothing is done again.
-                        drop(update(&mut self.model, msg, scene));
+                    let next = self.read_scene();
+                    if let Some((_, shown)) = std::mem::replace(&mut self.next_scene, next) {
+                        self.show(shown, scene);
                     }
                 }
                 (_, tick) => {
@@ -159,6 +178,21 @@ impl Player {
         }
         self.position = to;
         self.tell();
+    }
+
+    fn show(&mut self, scene: Scene, at: Duration) {
+        let msgs = match scene {
+            Scene::Heard(frame) => {
+                let (bytes, framing) = (frame.as_bytes().len(), self.model.link.framing);
+                vec![Msg::Frame(frame), Msg::Received { bytes, framing }]
+            }
+            Scene::Commanded(kind) => vec![Msg::Commanded(kind)],
+            Scene::Sent(bytes) => vec![Msg::Sent { bytes, drops: 0 }],
+        };
+        for msg in msgs {
+            // What the ground did then is in the film; nothing is done again.
+            drop(update(&mut self.model, msg, at));
+        }
     }
 
     fn tell(&mut self) {

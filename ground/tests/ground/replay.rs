@@ -1,5 +1,7 @@
 //! A recorded flight on the same screens: seeking, speed, and that nothing is ever commanded.
 
+use std::path::Path;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use ground::key::Key;
@@ -18,23 +20,37 @@ use crate::hand::ladder;
 const S: fn(u64) -> Duration = Duration::from_secs;
 
 /// A heartbeat a second for a minute: on the pad, falling from second 20, under thrust from 40, down at 50.
-fn film() -> Film {
+static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let mut encoder = Encoder::new(VEHICLE);
-    let phase_at = |second: u64| match second {
-        0..20 => TdPhase::TD_PHASE_PAD_ARMED,
-        20..40 => TdPhase::TD_PHASE_AERO_DESCENT,
-        40..50 => TdPhase::TD_PHASE_POWERED,
-        _ => TdPhase::TD_PHASE_TOUCHDOWN,
-    };
-    let scenes = (0..=60)
-        .map(|second| {
-            let heartbeat =
-                HEARTBEAT_DATA { custom_mode: phase_at(second) as u32, ..HEARTBEAT_DATA::default() };
-            (S(second), Scene::Heard(encoder.encode(&MavMessage::HEARTBEAT(heartbeat))))
-        })
-        .collect();
-    let phases = [0, 20, 40, 50].map(|second| (phase_at(second), S(second))).to_vec();
-    Film { scenes, phases, damage: None }
+    let mut bytes = Vec::new();
+    for second in 0..=60_u64 {
+        let phase = match second {
+            0..20 => TdPhase::TD_PHASE_PAD_ARMED,
+            20..40 => TdPhase::TD_PHASE_AERO_DESCENT,
+            40..50 => TdPhase::TD_PHASE_POWERED,
+            _ => TdPhase::TD_PHASE_TOUCHDOWN,
+        };
+        let heartbeat = HEARTBEAT_DATA { custom_mode: phase as u32, ..HEARTBEAT_DATA::default() };
+        bytes.extend((1_000_000 * second).to_be_bytes());
+        bytes.extend(encoder.encode(&MavMessage::HEARTBEAT(heartbeat)).as_bytes());
+    }
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("heartbeats.tlog"), bytes).unwrap();
+    directory
+});
+
+fn film() -> Film {
+    load(&HEARTBEATS.path().join("heartbeats.tlog")).unwrap()
+}
+
+fn load(path: &Path) -> Result<Film, FilmError> {
+    Film::load(path, &mut |_| {})
+}
+
+/// Every scene of a film with its time.
+fn scenes(film: &Film) -> Vec<(Duration, Scene)> {
+    let mut reel = film.reel().unwrap();
+    std::iter::from_fn(|| reel.next_scene().unwrap()).collect()
 }
 
 fn player() -> Player {
@@ -154,10 +170,11 @@ fn a_tlog_is_played_up_to_its_damage() {
     }
     bytes.extend([1, 2, 3]);
     std::fs::write(&path, &bytes).unwrap();
-    let film = Film::load(&path).unwrap();
+    let film = load(&path).unwrap();
     let at_400_ms = Duration::from_millis(400);
-    assert_eq!(film.scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
-    assert!(matches!(film.scenes[1].1, Scene::Sent(21)), "our own heartbeat: {:?}", film.scenes[1]);
+    let scenes = scenes(&film);
+    assert_eq!(scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
+    assert!(matches!(scenes[1].1, Scene::Sent(21)), "our own heartbeat: {:?}", scenes[1]);
     assert_eq!(film.damage.as_deref(), Some("unreadable 3 bytes before the end"));
     assert_eq!(film.begin_of(TdPhase::TD_PHASE_POWERED), Some(S(0)));
 }
@@ -167,7 +184,57 @@ fn what_is_no_log_is_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("notes.mcap");
     std::fs::write(&path, "not a log").unwrap();
-    let refused = Film::load(&path).unwrap_err();
+    let refused = load(&path).unwrap_err();
     assert!(matches!(refused, FilmError::Empty { .. }) && refused.to_string().contains("notes.mcap"));
-    assert!(matches!(Film::load(&directory.path().join("gone")), Err(FilmError::Read { .. })));
+    assert!(matches!(load(&directory.path().join("gone")), Err(FilmError::Read { .. })));
+}
+
+/// The most memory that a process has held, kB, as Linux says it while it runs.
+#[cfg(target_os = "linux")]
+fn peak_kb(process: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
+/// A log of 36 MB is shown in little more memory than one of a few bytes, and says how far the reading is.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_long_tlog_is_played_in_bounded_memory() {
+    // Measured: 11 MB for a log of one frame, and 12 MB for this one; holding the frames takes 130 MB.
+    const MOST_KB: u64 = 40_000;
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("long.tlog");
+    let mut encoder = Encoder::new(VEHICLE);
+    let frames: Vec<_> = (0..=u8::MAX)
+        .map(|_| {
+            encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                custom_mode: 9,
+                ..HEARTBEAT_DATA::default()
+            }))
+        })
+        .collect();
+    let mut bytes = Vec::new();
+    for (number, frame) in (0..1_240_000_u64).zip(frames.iter().cycle()) {
+        bytes.extend((1_760_000_000_000_000 + 10_000 * number).to_be_bytes());
+        bytes.extend(frame.as_bytes());
+    }
+    assert!(bytes.len() > 35_000_000, "{}", bytes.len());
+    std::fs::write(&path, bytes).unwrap();
+    let mut process = std::process::Command::new(env!("CARGO_BIN_EXE_ground"))
+        .arg("--replay")
+        .arg(&path)
+        .stdin(std::process::Stdio::null())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut most_kb = 0;
+    while process.try_wait().unwrap().is_none() {
+        most_kb = most_kb.max(peak_kb(process.id()).unwrap_or(0));
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let said = String::from_utf8(process.wait_with_output().unwrap().stderr).unwrap();
+    assert!(0 < most_kb && most_kb < MOST_KB, "{most_kb} kB; {said}");
+    assert!(said.contains("long.tlog: 16 of 3") && said.matches("ground: reading").count() >= 8, "{said}");
 }

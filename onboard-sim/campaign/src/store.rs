@@ -8,11 +8,15 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::order::{Manifest, Order, Shard};
+use crate::picture::PICTURES;
 use crate::row::Row;
 use crate::table;
 
 /// Flights of a chunk.
 pub const CHUNK_FLIGHTS: u64 = 10;
+
+/// Files of results, but for the pictures.
+const RESULTS: [&str; 5] = ["flights.csv", "flights.parquet", "summary.json", "summary.md", "cost.json"];
 
 /// Why a directory cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +45,12 @@ pub enum StoreError {
         path: PathBuf,
         /// In what they differ.
         difference: String,
+    },
+    /// A new campaign would overwrite what is there.
+    #[error("{path} exists already and is of no campaign; give another directory")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
     },
     /// Another process is at work in it.
     #[error("{path} is in use by another process")]
@@ -98,6 +108,7 @@ impl Store {
                 return Err(StoreError::OtherOrder { path: path.to_owned(), difference });
             }
         } else {
+            refuse_loss(path, order)?;
             write_whole(&path.join("mission.toml"), order.mission_toml.as_bytes())?;
             write_whole(&path.join("dispersion.toml"), order.dispersion_toml.as_bytes())?;
             let text = serde_json::to_string_pretty(manifest).map_err(|error| StoreError::Content {
@@ -173,6 +184,24 @@ impl Store {
     pub fn publish(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
         write_whole(&self.path.join(name), bytes)
     }
+}
+
+/// What stands in a directory without a manifest was not made by a campaign, but for the texts of one that was stopped
+/// before its manifest was written.
+fn refuse_loss(directory: &Path, order: &Order) -> Result<(), StoreError> {
+    let texts = [("mission.toml", &order.mission_toml), ("dispersion.toml", &order.dispersion_toml)];
+    let is_own = |name: &str, path: &Path| {
+        let text = texts.iter().find(|(known, _)| *known == name).map(|(_, text)| text.as_bytes());
+        text.is_some() && fs::read(path).ok().as_deref() == text
+    };
+    let pictures = PICTURES.iter().map(|(name, _)| *name);
+    for name in texts.iter().map(|(name, _)| *name).chain(RESULTS).chain(pictures) {
+        let path = directory.join(name);
+        if path.symlink_metadata().is_ok() && !is_own(name, &path) {
+            return Err(StoreError::Foreign { path });
+        }
+    }
+    Ok(())
 }
 
 fn chunk_path(directory: &Path, chunk: u64) -> PathBuf {

@@ -150,6 +150,26 @@ fn a_directory_of_other_flights_or_in_use_is_refused_with_the_reason() {
     assert!(message.contains("text of the mission"), "{message}");
 }
 
+/// A directory in which somebody keeps files of the same names.
+#[test]
+fn files_of_no_campaign_are_never_overwritten() {
+    let order = order(1);
+    let manifest = order.manifest("test", Shard::WHOLE);
+    let picture = campaign::picture::PICTURES[0].0;
+    for name in ["mission.toml", "flights.csv", "summary.md", picture] {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(name);
+        std::fs::write(&path, "notes").unwrap();
+        let refused = Store::open(root.path(), &order, &manifest);
+        assert!(matches!(refused, Err(StoreError::Foreign { .. })), "{name}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "notes", "{name}");
+    }
+    // A campaign that was stopped before its manifest was written goes on.
+    let root = tempfile::tempdir().unwrap();
+    std::fs::write(root.path().join("mission.toml"), &order.mission_toml).unwrap();
+    assert!(Store::open(root.path(), &order, &manifest).is_ok());
+}
+
 #[test]
 fn parts_of_other_campaigns_and_gaps_are_refused() {
     let root = tempfile::tempdir().unwrap();

@@ -127,6 +127,11 @@ impl<R: Read> LogReader<R> {
         self.channels.iter().map(|(id, channel)| (*id, channel))
     }
 
+    /// Bytes read from the input so far: how far the reading is.
+    pub fn bytes_read(&self) -> u64 {
+        self.bytes_read
+    }
+
     /// What ended the reading early; `None` for a whole log, once the items are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()

@@ -10,7 +10,7 @@ use replay::refly::StartAt;
 use replay::sweep::{BisectOptions, bisect};
 
 use super::refly::FlownHow;
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -45,6 +45,7 @@ impl Ask {
         let range = (self.lowest, self.highest);
         ensure!(range.0 < range.1, "--lowest {} must be below --highest {}", range.0, range.1);
         let recording = Recording::open(&self.file)?;
+        warn_of_what_is_missing(&recording);
         let options = BisectOptions {
             path: self.path,
             plant_alone: self.of_plant,
@@ -56,7 +57,6 @@ impl Ask {
         };
         let report = bisect(&recording, &options)?;
         answer(|output| if self.json { print_json(&report, output) } else { print_bisect(&report, output) })?;
-        warn_of_damage(&recording.name, recording.damage.as_deref());
         Ok(Answer::Given)
     }
 }

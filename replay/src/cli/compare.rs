@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use replay::compare::{Align, Comparison, Flown, Tolerances, compare};
 use replay::print::{compare_cases, print_compare, print_json, print_junit};
 
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_cut, warn_of_damage};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -22,8 +22,10 @@ pub(super) struct Ask {
     /// Tolerances, a TOML file.
     ///
     /// [signals."NAME"] with rms and max in the signal's own unit, where a * at the end of NAME fits any rest; and
-    /// before that `verdict = false` to let the verdicts differ, `missing = N` and `added = N` to limit how many
-    /// signals only one flight may have.
+    /// before that `verdict = false` to let the verdicts differ, `missing = N` and `added = N` for how many signals only
+    /// one flight may have, `samples_missing = SHARE` and `samples_added = SHARE` for the samples of each signal (also of
+    /// one, behind its max), and `damaged = true` for logs that are damaged or end before their flight did. What is left
+    /// out is not tolerated.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.
@@ -72,6 +74,7 @@ impl Ask {
 fn open(path: &Path) -> Result<Flown> {
     let flown = Flown::open(path)?;
     warn_of_damage(&flown.name, flown.damage.as_deref());
+    warn_of_cut(&flown.name, flown.cut.as_ref());
     Ok(flown)
 }
 

@@ -28,13 +28,13 @@ pub(super) struct Ask {
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         let recording = Recording::open(&self.file)?;
+        warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;
         answer(|output| match () {
             () if self.json => print_json(&report, output),
             () if self.csv => print_evaluate_csv(&report, output),
             () => print_evaluate(&report, output),
         })?;
-        warn_of_what_is_missing(&recording);
         Ok(Answer::Given)
     }
 }

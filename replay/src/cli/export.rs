@@ -7,6 +7,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::log::FlightLog;
+use replay::output::{Destination, Overwrite};
 
 use super::{Answer, answer, warn_of_damage};
 
@@ -23,6 +24,9 @@ pub(super) struct Ask {
     /// For tlog: whose frames, if the log has those of several; the ground's unless this says otherwise.
     #[arg(long, value_name = "vehicle|ground")]
     endpoint: Option<String>,
+    /// Replace files that are there.
+    #[arg(long)]
+    force: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -46,7 +50,7 @@ impl Ask {
             Format::Rrd => return self.rerun(),
         };
         let mut log = FlightLog::open(&self.file)?;
-        let files = export_tables(&mut log, format, &self.output)?;
+        let files = export_tables(&mut log, format, self.destination())?;
         answer(|output| {
             use std::io::Write as _;
             files.iter().try_for_each(|file| {
@@ -73,20 +77,27 @@ impl Ask {
             .arg(&self.file)
             .arg("--output")
             .arg(&self.output)
+            .args(self.force.then_some("--force"))
             .status()
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
         Ok(Answer::Given)
     }
 
+    fn destination(&self) -> Destination<'_> {
+        Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) }
+    }
+
     fn tlog(&self) -> Result<Answer> {
-        let written = export_tlog(&|| FlightLog::open(&self.file), self.endpoint.as_deref(), &self.output)?;
+        let open = || FlightLog::open(&self.file);
+        let written = export_tlog(&open, self.endpoint.as_deref(), self.destination())?;
         answer(|output| {
             use std::io::Write as _;
             let path = self.output.display();
             let (received, sent) = (written.received, written.sent);
             writeln!(output, "{path}: {received} frames received and {sent} sent by the {}", written.endpoint)
         })?;
+        warn_of_damage(&self.file.display().to_string(), written.damage.as_deref());
         Ok(Answer::Given)
     }
 }

@@ -5,17 +5,21 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use replay::import::import_tlog;
+use replay::import::{ImportProgress, import_tlog};
+use replay::output::{Destination, Overwrite};
 use replay::print::print_json;
 
-use super::{Answer, answer};
+use super::{Answer, answer, say};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
     /// The telemetry log of a ground station, a .tlog.
     file: PathBuf,
-    /// The flight log to write; the .tlog's name with .mcap if left out. An existing file is not overwritten.
+    /// The flight log to write; the .tlog's name with .mcap if left out.
     output: Option<PathBuf>,
+    /// Replace a file that is there.
+    #[arg(long)]
+    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -24,7 +28,9 @@ pub(super) struct Ask {
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         let path = self.output.clone().unwrap_or_else(|| self.file.with_extension("mcap"));
-        let imported = import_tlog(&self.file, &path)?;
+        let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
+        let mut told = 0;
+        let imported = import_tlog(&self.file, destination, &mut |progress| tell(progress, &mut told))?;
         answer(|output| {
             if self.json {
                 return print_json(&imported, output);
@@ -41,5 +47,16 @@ impl Ask {
             )
         })?;
         Ok(Answer::Given)
+    }
+}
+
+/// Of a file that takes more than a moment says at every tenth how far the import is.
+fn tell(ImportProgress { read, total }: ImportProgress, told: &mut u64) {
+    const LARGE_BYTES: u64 = 32_000_000;
+    const MEGABYTE: u64 = 1_000_000;
+    let tenths = (10 * read).checked_div(total).unwrap_or(0);
+    if total > LARGE_BYTES && tenths > *told {
+        *told = tenths;
+        say(&format!("{} of {} MB", read / MEGABYTE, total / MEGABYTE));
     }
 }

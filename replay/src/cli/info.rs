@@ -7,7 +7,7 @@ use clap::Args;
 use replay::info::info;
 use replay::print::{print_info, print_json};
 
-use super::{Answer, answer, say};
+use super::{Answer, answer, warn_of_completeness};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -22,9 +22,7 @@ impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         let info = info(&self.file)?;
         answer(|output| if self.json { print_json(&info, output) } else { print_info(&info, output) })?;
-        if let Some(damage) = &info.completeness.damage {
-            say(&format!("warning: {} is damaged: {damage}", info.file));
-        }
+        warn_of_completeness(&info.file, &info.completeness);
         Ok(Answer::Given)
     }
 }

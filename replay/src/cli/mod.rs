@@ -18,7 +18,8 @@ use std::io::{self, Write};
 
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
-use replay::log::{Gap, Recording};
+use replay::info::Completeness;
+use replay::log::{Cut, Gap, Recording};
 use replay::verify::Outcome;
 
 /// The answer is no: the controller decides otherwise than recorded, or flights differ by more than is tolerated.
@@ -32,11 +33,14 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///
 /// Exit codes:
 ///   0  the question is answered: the log is described, or every tick that could be read is identical
-///   1  verify: some tick differs; compare: more than is tolerated, or the verdicts differ
+///   1  verify: some tick differs, or with --strict not the whole flight was compared;
+///      compare: more is apart or missing than is tolerated, or the verdicts differ
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
-///      some tick (no ticks, no profile, ticks missing) and none that it could differs
+///      some tick (no ticks, no profile, ticks missing) and none that it could differs;
+///      or a file would be overwritten and --force is not given
 ///
-/// A damaged log is used up to the damage, with a warning and exit code 0.
+/// A damaged log is used up to the damage, with a warning and exit code 0, but for verify --strict (which --junit
+/// is by itself) and for compare.
 #[derive(Debug, Parser)]
 #[command(name = "replay", version, about, long_about, verbatim_doc_comment)]
 pub(crate) struct Cli {
@@ -88,8 +92,8 @@ enum Question {
 pub(crate) enum Answer {
     /// There is an answer.
     Given,
-    /// A comparison by bits.
-    Verified(Outcome),
+    /// A comparison by bits. If `strict`, it must be of the whole flight.
+    Verified { outcome: Outcome, strict: bool },
     /// A comparison within tolerances.
     Compared { within: bool },
 }
@@ -97,11 +101,14 @@ pub(crate) enum Answer {
 impl Answer {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Given
-            | Self::Verified(Outcome::Identical | Outcome::IdenticalReadablePart)
-            | Self::Compared { within: true } => 0,
-            Self::Verified(Outcome::Diverged) | Self::Compared { within: false } => EXIT_NO,
-            Self::Verified(Outcome::NotReplayable) => EXIT_NO_ANSWER,
+            Self::Given | Self::Compared { within: true } => 0,
+            Self::Compared { within: false } => EXIT_NO,
+            Self::Verified { outcome, strict } => match outcome {
+                Outcome::Identical => 0,
+                Outcome::IdenticalReadablePart if !strict => 0,
+                Outcome::IdenticalReadablePart | Outcome::Diverged => EXIT_NO,
+                Outcome::NotReplayable => EXIT_NO_ANSWER,
+            },
         }
     }
 }
@@ -140,7 +147,7 @@ fn say(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {text}");
 }
 
-/// Warns that a log is used up to its damage, or up to a gap in it, only.
+/// Warns that a log is used up to its damage only, that its flight's end is missing, or ticks on the way.
 fn warn_of_what_is_missing(recording: &Recording) {
     if let Some(Gap { after, before }) = recording.gap() {
         let name = &recording.name;
@@ -149,11 +156,25 @@ fn warn_of_what_is_missing(recording: &Recording) {
         ));
     }
     warn_of_damage(&recording.name, recording.damage.as_deref());
+    warn_of_cut(&recording.name, recording.cut.as_ref());
+}
+
+/// The same of a log that was described.
+fn warn_of_completeness(name: &str, found: &Completeness) {
+    warn_of_damage(name, found.damage.as_deref());
+    warn_of_cut(name, found.cut.as_ref());
 }
 
 /// Warns that a log is used up to its damage only.
 fn warn_of_damage(file: &str, damage: Option<&str>) {
     if let Some(damage) = damage {
         say(&format!("warning: {file} is damaged: {damage}; everything before was used"));
+    }
+}
+
+/// Warns that a flight was not recorded to its end.
+fn warn_of_cut(file: &str, cut: Option<&Cut>) {
+    if let Some(cut) = cut {
+        say(&format!("warning: {file}: the flight {cut}"));
     }
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use replay::output::{Destination, Overwrite};
 use replay::print::{print_json, print_recovery};
 use replay::recover::recover;
 
@@ -13,8 +14,11 @@ use super::{Answer, answer};
 pub(super) struct Ask {
     /// The damaged log.
     file: PathBuf,
-    /// The log to write. An existing file is not overwritten.
+    /// The log to write.
     output: PathBuf,
+    /// Replace a file that is there; never the damaged log itself.
+    #[arg(long)]
+    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -22,7 +26,8 @@ pub(super) struct Ask {
 
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
-        let recovery = recover(&self.file, &self.output)?;
+        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let recovery = recover(&self.file, destination)?;
         answer(
             |output| {
                 if self.json { print_json(&recovery, output) } else { print_recovery(&recovery, output) }

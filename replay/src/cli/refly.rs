@@ -6,12 +6,13 @@ use anyhow::{Result, anyhow};
 use clap::{Args, ValueEnum};
 use flight::phase::Phase;
 use replay::log::Recording;
+use replay::output::{Destination, Overwrite};
 use replay::print::{print_json, print_refly};
 use replay::refly::{From, Law, ReflyOptions, StartAt, refly_flight, write_log};
 use replay::settings::Setting;
 
 use super::settings::SettingArguments;
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -28,9 +29,12 @@ pub(super) struct Ask {
     /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; of a flight from apogee any.
     #[arg(long, value_name = "PHASE", value_parser = phase_named)]
     phase: Option<Phase>,
-    /// Write the flight as a log of its own. An existing file is not overwritten.
+    /// Write the flight as a log of its own.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+    /// Replace a file that is there; never the log that is flown again.
+    #[arg(long, requires = "log")]
+    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -110,13 +114,14 @@ impl Ask {
             _ => StartAt::Landing,
         };
         let recording = Recording::open(&self.file)?;
+        warn_of_what_is_missing(&recording);
         let options = self.how.options(start)?;
         let (report, flight) = refly_flight(&recording, &options)?;
         if let Some(path) = &self.log {
-            write_log(path, &recording, &options, &report, &flight)?;
+            let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
+            write_log(destination, &recording, &options, &report, &flight)?;
         }
         answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
-        warn_of_damage(&recording.name, recording.damage.as_deref());
         Ok(Answer::Given)
     }
 }

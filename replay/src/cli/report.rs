@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
+use replay::output::{Destination, NewFile, Overwrite};
 use replay::report::report;
 
-use super::{Answer, answer};
+use super::{Answer, answer, warn_of_completeness};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -15,19 +16,31 @@ pub(super) struct Ask {
     /// The page to write, or - for standard output; the log's name with .html if left out.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Replace a file that is there; never the log.
+    #[arg(long)]
+    force: bool,
 }
 
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         use std::io::Write as _;
         let page = report(&self.file)?;
+        let html = page.html;
         let path = self.output.clone().unwrap_or_else(|| self.file.with_extension("html"));
         if path.as_os_str() == "-" {
-            answer(|output| output.write_all(page.as_bytes()))?;
+            answer(|output| output.write_all(html.as_bytes()))?;
+            warn_of_completeness(&page.name, &page.completeness);
             return Ok(Answer::Given);
         }
-        std::fs::write(&path, page).with_context(|| format!("{}: cannot be written", path.display()))?;
+        let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
+        NewFile::create(destination, &self.file)
+            .and_then(|mut file| {
+                file.write_all(html.as_bytes())?;
+                file.commit()
+            })
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
         answer(|output| writeln!(output, "{}", path.display()))?;
+        warn_of_completeness(&page.name, &page.completeness);
         Ok(Answer::Given)
     }
 }

@@ -12,7 +12,7 @@ use replay::refly::StartAt;
 use replay::sweep::{Choice, Progress, State, Vary, grid, random, sweep};
 
 use super::refly::FlownHow;
-use super::{Answer, answer, warn_of_damage};
+use super::{Answer, answer, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -65,7 +65,7 @@ impl Ask {
         let mut flights = Vec::new();
         for file in &self.files {
             let flight = Recording::open(file)?;
-            warn_of_damage(&flight.name, flight.damage.as_deref());
+            warn_of_what_is_missing(&flight);
             flights.push(flight);
         }
         let all_jobs = points.len() * flights.len();

@@ -24,9 +24,9 @@ pub(super) struct Ask {
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         let recording = Recording::open(&self.file)?;
+        warn_of_what_is_missing(&recording);
         let report = tick(&recording, self.tick)?;
         answer(|output| if self.json { print_json(&report, output) } else { print_tick(&report, output) })?;
-        warn_of_what_is_missing(&recording);
         Ok(Answer::Given)
     }
 }

@@ -10,7 +10,7 @@ use replay::log::LogError;
 use replay::print::{JunitCase, JunitOutcome, print_json, print_junit, print_verify, verify_case};
 use replay::verify::{Outcome, VerifyReport, verify};
 
-use super::{Answer, answer, say, warn_of_damage};
+use super::{Answer, answer, say, warn_of_cut, warn_of_damage};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -20,13 +20,18 @@ pub(super) struct Ask {
     /// Answer in JSON: a report, or of several logs a list of them.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
-    /// Answer in JUnit XML.
+    /// Answer in JUnit XML; strict unless --strict=false.
     #[arg(long)]
     junit: bool,
+    /// Exit code 1 unless all of each flight was compared: a damaged log fails, and one that ends before its flight did.
+    #[arg(
+        long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
+    )]
+    strict: Option<bool>,
 }
 
 /// What became of one log.
-type Verified<'a> = (&'a Path, Result<VerifyReport, LogError>);
+type Verified<'a> = (&'a Path, Result<Vec<VerifyReport>, LogError>);
 
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
@@ -37,10 +42,13 @@ impl Ask {
             let verified = verify(file);
             let took = started.elapsed();
             match &verified {
-                Ok(report) => {
-                    warn_of_damage(&report.file, report.damage.as_deref());
-                    warn_of_build(report);
-                    say_speed(report, took);
+                Ok(reports) => {
+                    for report in reports {
+                        warn_of_damage(&report.file, report.damage.as_deref());
+                        warn_of_cut(&report.file, report.cut.as_ref());
+                        warn_of_build(report);
+                    }
+                    say_speed(reports, took);
                 }
                 // One log that cannot be read must not hide what the others say.
                 Err(error) if self.files.len() > 1 => say(&format!("{error}")),
@@ -54,15 +62,21 @@ impl Ask {
             return Err(error.into());
         }
         answer(|output| self.print(&answers, output))?;
-        Ok(Answer::Verified(worst(&answers)))
+        Ok(Answer::Verified { outcome: worst(&answers), strict: self.is_strict() })
+    }
+
+    /// A build server looks at nothing but the colour.
+    fn is_strict(&self) -> bool {
+        self.strict.unwrap_or(self.junit)
     }
 
     fn print(&self, answers: &[Verified], output: &mut impl Write) -> std::io::Result<()> {
         if self.junit {
-            return print_junit("verify", answers.iter().map(case).collect(), output);
+            let cases = answers.iter().flat_map(|verified| cases(verified, self.is_strict()));
+            return print_junit("verify", cases.collect(), output);
         }
         let reports: Vec<&VerifyReport> =
-            answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).collect();
+            answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).flatten().collect();
         match reports.as_slice() {
             [report] if self.json && answers.len() == 1 => print_json(report, output),
             _ if self.json => print_json(&reports, output),
@@ -71,28 +85,28 @@ impl Ask {
     }
 }
 
-fn case((path, verified): &Verified) -> JunitCase {
+fn cases((path, verified): &Verified, strict: bool) -> Vec<JunitCase> {
     match verified {
-        Ok(report) => verify_case(report),
-        Err(error) => JunitCase {
+        Ok(reports) => reports.iter().map(|report| verify_case(report, strict)).collect(),
+        Err(error) => vec![JunitCase {
             name: format!("verify {}", path.display()),
             outcome: JunitOutcome::Error { message: error.to_string() },
-        },
+        }],
     }
 }
 
-/// A difference found outweighs a log that gives no answer, and that an identical one.
+/// A difference found outweighs a flight of which there is no answer, and that an identical one.
 fn worst(answers: &[Verified]) -> Outcome {
-    let outcome = |verified: &Result<VerifyReport, LogError>| {
-        verified.as_ref().map_or(Outcome::NotReplayable, |report| report.outcome)
-    };
     let rank = |outcome: Outcome| match outcome {
         Outcome::Identical => 0,
         Outcome::IdenticalReadablePart => 1,
         Outcome::NotReplayable => 2,
         Outcome::Diverged => 3,
     };
-    let outcomes = answers.iter().map(|(_, verified)| outcome(verified));
+    let outcomes = answers.iter().flat_map(|(_, verified)| match verified {
+        Ok(reports) => reports.iter().map(|report| report.outcome).collect(),
+        Err(_) => vec![Outcome::NotReplayable],
+    });
     outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Outcome::NotReplayable)
 }
 
@@ -104,15 +118,13 @@ fn warn_of_build(report: &VerifyReport) {
     }
 }
 
-fn say_speed(report: &VerifyReport, took: Duration) {
+fn say_speed(reports: &[VerifyReport], took: Duration) {
     let seconds = took.as_secs_f64();
-    match report.flight_s {
-        Some(flight_s) if flight_s > 0.0 && seconds > 0.0 => {
-            say(&format!(
-                "{flight_s:.1} s of flight in {seconds:.2} s, {:.0} times real time",
-                flight_s / seconds
-            ));
-        }
-        _ => {}
+    let flight_s: f64 = reports.iter().filter_map(|report| report.flight_s).sum();
+    if flight_s > 0.0 && seconds > 0.0 {
+        say(&format!(
+            "{flight_s:.1} s of flight in {seconds:.2} s, {:.0} times real time",
+            flight_s / seconds
+        ));
     }
 }

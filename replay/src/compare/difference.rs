@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Series, Tolerance};
+use super::{Samples, Series, Tolerance};
 
 /// How far a signal of two flights is apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -13,6 +13,9 @@ pub struct SignalDifference {
     pub samples: usize,
     /// Times of the baseline at which the other has no value.
     pub samples_outside: usize,
+    /// Samples that only one of the two has.
+    #[serde(flatten)]
+    pub samples_of_both: Samples,
     /// Root mean square of the difference, in the signal's unit.
     pub rms: f64,
     /// The largest difference.
@@ -39,6 +42,7 @@ impl SignalDifference {
             signal: signal.to_owned(),
             samples: 0,
             samples_outside: 0,
+            samples_of_both: Samples::of(a, b, shift_s),
             rms: 0.0,
             max: 0.0,
             max_at_s: None,

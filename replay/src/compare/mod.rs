@@ -2,17 +2,22 @@
 //!
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`controller_tick.output.…`). The
 //! second flight is shifted so that an event falls together with the first's, and read at the first's times: linearly
-//! between its samples, whole numbers held. Measured solve times are no signals.
+//! between its samples, whole numbers held. Measured solve times are no signals. Samples that only one of the two has are
+//! counted by themselves, because what is read between its neighbours does not show that a record is lost.
 
 mod align;
 mod difference;
+mod samples;
 mod series;
 mod tolerance;
 
 pub use align::{Align, Anchors};
 pub use difference::SignalDifference;
+pub use samples::Samples;
 pub use series::{Flown, Series};
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
@@ -92,7 +97,9 @@ pub fn compare(
             signals.push(SignalDifference::of(name, a, b, shift_s, tolerances.of(name)));
         }
     }
-    let mut failures: Vec<String> = signals.iter().filter_map(SignalDifference::failure).collect();
+    let mut failures = tolerances.record_failures([baseline, other]);
+    failures.extend(samples_failures(&signals, tolerances));
+    failures.extend(signals.iter().filter_map(SignalDifference::failure));
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
     if signals.is_empty() {
@@ -121,4 +128,28 @@ pub fn compare(
         added,
         failures,
     })
+}
+
+/// Samples that are missing or added beyond what is tolerated: a line for each table, of its worst signal.
+fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Vec<String> {
+    let mut worst: BTreeMap<(&str, bool), (f64, String)> = BTreeMap::new();
+    for signal in signals {
+        let (table, samples) = (signal.signal.split('.').next().unwrap_or_default(), signal.samples_of_both);
+        let (missing, added) = tolerances.samples_of(&signal.signal);
+        let all = samples.expected - samples.missing + samples.added;
+        for (word, share, limit, count, of) in [
+            ("missing", samples.missing_share(), missing, samples.missing, samples.expected),
+            ("added", samples.added_share(), added, samples.added, all),
+        ] {
+            let known = worst.get(&(table, word == "added")).map_or(0.0, |(share, _)| *share);
+            if share > limit && share > known {
+                let words = format!(
+                    "{table}: {count} of {of} samples are {word} (tolerated {} %)",
+                    libm::round(1e6 * limit) / 1e4
+                );
+                worst.insert((table, word == "added"), (share, words));
+            }
+        }
+    }
+    worst.into_values().map(|(_, words)| words).collect()
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::Anchors;
 use crate::info::VerdictFacts;
-use crate::log::{Entry, FlightLog, LogError, RecordingError};
+use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError};
 use crate::table::{Cell, Kind, TableReader, TableShape};
 
 /// Numbers held of one log: some minutes of a flight are a few hundred thousand.
@@ -66,29 +66,38 @@ pub struct Flown {
     pub verdict: Option<VerdictFacts>,
     /// What ended the reading early.
     pub damage: Option<String>,
+    /// Where the record ends, if that is before the end of the flight.
+    pub cut: Option<Cut>,
+    /// Numbers whose times fall behind earlier ones; they are in no signal.
+    pub out_of_order: usize,
 }
 
 impl Flown {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read or is longer than any flight.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut anchors = Anchors::default();
         let mut verdict = None;
         let mut log = FlightLog::open(path)?;
+        let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
+            flights.note(&stamped.entry);
             match &stamped.entry {
                 Entry::Verdict(found) => verdict = Some(VerdictFacts::of(found)),
                 entry => anchors.note(entry),
             }
         }
         let name = log.name().to_owned();
+        if flights.flown() > 1 {
+            return Err(RecordingError::SeveralFlights { name, flights: flights.flown() });
+        }
         let damage = log.damage().map(ToString::to_string);
         anchors.touchdown_s = verdict.as_ref().map(|verdict: &VerdictFacts| verdict.time_s);
 
         let mut signals: BTreeMap<String, Series> = BTreeMap::new();
-        let mut held = 0_usize;
+        let (mut held, mut out_of_order) = (0_usize, 0_usize);
         let mut first_ns = None;
         let mut reader = TableReader::new();
         reader
@@ -102,12 +111,14 @@ impl Flown {
                         continue;
                     };
                     let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
-                    // Records that come late would make the times fall; what is out of order is left out.
+                    // Records that come late would make the times fall; what is out of order is left out, and counted.
                     if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
                         series.whole = column.kind == Kind::Integer;
                         series.times_s.push(time_s);
                         series.values.push(value);
                         held += 1;
+                    } else {
+                        out_of_order += 1;
                     }
                 }
                 if held > VALUES_MAX { Err(Stopped::TooLong) } else { Ok(()) }
@@ -118,7 +129,7 @@ impl Flown {
             })?;
         // Rows of several kinds in one table, and texts, are no signals over time.
         signals.retain(|name, _| !name.starts_with("verdict") && !name.starts_with("events."));
-        Ok(Self { name, signals, anchors, verdict, damage })
+        Ok(Self { name, signals, anchors, verdict, damage, cut: flights.cut(), out_of_order })
     }
 }
 

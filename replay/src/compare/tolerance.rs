@@ -2,8 +2,11 @@
 //!
 //! ```toml
 //! verdict = true          # the verdicts must agree; the default
-//! missing = 0             # signals of the baseline that the other may lack; any number if left out
-//! added = 0               # signals that the other may have besides
+//! missing = 0             # signals of the baseline that the other may lack; none if left out
+//! added = 0               # signals that the other may have besides; none if left out
+//! samples_missing = 0.01  # share of a signal's samples that the other may lack; none if left out
+//! samples_added = 0.01    # share of the other's samples that the baseline may lack; none if left out
+//! damaged = true          # damaged logs, and logs that end before their flight did, may be compared; not if left out
 //!
 //! [signals."vehicle_truth.state.x_m"]
 //! rms = 0.01              # in the signal's own unit
@@ -17,6 +20,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::Flown;
+
 /// How much one signal may differ, in its own unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -25,6 +30,10 @@ pub struct Tolerance {
     pub rms: Option<f64>,
     /// Largest difference.
     pub max: Option<f64>,
+    /// Share of the baseline's samples that the other may lack.
+    pub samples_missing: Option<f64>,
+    /// Share of the other's samples that the baseline may lack.
+    pub samples_added: Option<f64>,
 }
 
 /// How much two flights may differ.
@@ -34,6 +43,10 @@ pub struct Tolerances {
     verdict: Option<bool>,
     missing: Option<usize>,
     added: Option<usize>,
+    samples_missing: Option<f64>,
+    samples_added: Option<f64>,
+    #[serde(default)]
+    damaged: bool,
     #[serde(default)]
     signals: BTreeMap<String, Tolerance>,
 }
@@ -57,6 +70,14 @@ pub enum ToleranceError {
         /// The signal most like it.
         nearest: String,
     },
+    /// A share that is none.
+    #[error("{given} = {found}: must be a share from 0 to 1")]
+    Share {
+        /// Which.
+        given: String,
+        /// What was found.
+        found: f64,
+    },
     /// A limit that nothing can keep.
     #[error("tolerance of `{given}`: {found} must be a number, 0 or more")]
     Value {
@@ -77,7 +98,17 @@ impl Tolerances {
             origin: origin.to_owned(),
             reason: error.to_string(),
         })?;
+        let shares = |of: &str, missing: Option<f64>, added: Option<f64>| {
+            for (name, share) in [("samples_missing", missing), ("samples_added", added)] {
+                if let Some(found) = share.filter(|share| !(0.0..=1.0).contains(share)) {
+                    return Err(ToleranceError::Share { given: format!("{of}{name}"), found });
+                }
+            }
+            Ok(())
+        };
+        shares("", tolerances.samples_missing, tolerances.samples_added)?;
         for (given, tolerance) in &tolerances.signals {
+            shares(&format!("{given}: "), tolerance.samples_missing, tolerance.samples_added)?;
             let limits = tolerance.rms.into_iter().chain(tolerance.max);
             for found in limits {
                 if found.is_nan() || found < 0.0 {
@@ -99,14 +130,45 @@ impl Tolerances {
     }
 
     pub(super) fn count_failures(&self, missing: usize, added: usize) -> Vec<String> {
-        let exceeded = |count: usize, limit: Option<usize>| limit.filter(|limit| count > *limit);
+        let exceeded =
+            |count: usize, limit: Option<usize>| Some(limit.unwrap_or(0)).filter(|limit| count > *limit);
         let mut failures = Vec::new();
         if let Some(limit) = exceeded(missing, self.missing) {
-            failures.push(format!("{missing} signals are missing (tolerated {limit})"));
+            failures.push(format!("{} missing (tolerated {limit})", signals_are(missing)));
         }
         if let Some(limit) = exceeded(added, self.added) {
-            failures.push(format!("{added} signals are added (tolerated {limit})"));
+            failures.push(format!("{} added (tolerated {limit})", signals_are(added)));
         }
+        failures
+    }
+
+    /// Shares of a signal's samples that may be missing and added.
+    pub(super) fn samples_of(&self, signal: &str) -> (f64, f64) {
+        let own = self.of(signal).unwrap_or_default();
+        let limit = |own: Option<f64>, all: Option<f64>| own.or(all).unwrap_or(0.0);
+        (limit(own.samples_missing, self.samples_missing), limit(own.samples_added, self.samples_added))
+    }
+
+    /// What of the flights was not compared because of how they were recorded.
+    pub(super) fn record_failures(&self, flights: [&Flown; 2]) -> Vec<String> {
+        let mut failures = Vec::new();
+        for Flown { name, damage, cut, out_of_order, .. } in flights {
+            if *out_of_order > 0 {
+                failures.push(format!(
+                    "{name}: {out_of_order} numbers stand behind later ones and were not compared"
+                ));
+            }
+            if self.damaged {
+                continue;
+            }
+            failures.extend(
+                damage.as_ref().map(|damage| {
+                    format!("{name} is damaged: {damage}; what is behind that was not compared")
+                }),
+            );
+            failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
+        }
+        failures.dedup();
         failures
     }
 
@@ -127,6 +189,10 @@ impl Tolerances {
         }
         Ok(())
     }
+}
+
+fn signals_are(count: usize) -> String {
+    if count == 1 { "1 signal is".to_owned() } else { format!("{count} signals are") }
 }
 
 /// A `*` at the end fits any rest.

@@ -1,24 +1,25 @@
 //! A table as comma-separated values.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::ExportError;
+use crate::output::NewFile;
 use crate::table::{Cell, Row, TableShape};
 
 pub(super) struct CsvTable {
     path: PathBuf,
-    output: BufWriter<File>,
+    output: BufWriter<NewFile>,
 }
 
 impl CsvTable {
-    pub(super) fn create(path: &Path, shape: &TableShape) -> Result<Self, ExportError> {
-        let write = |source| ExportError::Write { path: path.to_owned(), source };
-        let mut output = BufWriter::new(File::create(path).map_err(write)?);
+    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+        let path = file.path().to_owned();
+        let write = |source| ExportError::Write { path: path.clone(), source };
+        let mut output = BufWriter::new(file);
         let names: Vec<String> = shape.columns.iter().map(|column| quoted(&column.name)).collect();
         writeln!(output, "{}", names.join(",")).map_err(write)?;
-        Ok(Self { path: path.to_owned(), output })
+        Ok(Self { path, output })
     }
 
     pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
@@ -26,8 +27,10 @@ impl CsvTable {
         writeln!(self.output, "{}", cells.join(",")).map_err(|source| self.failed(source))
     }
 
-    pub(super) fn finish(mut self) -> Result<(), ExportError> {
-        self.output.flush().map_err(|source| self.failed(source))
+    /// The file, whole but for its name.
+    pub(super) fn finish(self) -> Result<NewFile, ExportError> {
+        let Self { path, output } = self;
+        output.into_inner().map_err(|error| ExportError::Write { path, source: error.into_error() })
     }
 
     fn failed(&self, source: std::io::Error) -> ExportError {

@@ -1,7 +1,6 @@
 //! A table as Apache Parquet, written column by column without Arrow.
 
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
@@ -12,6 +11,7 @@ use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::Type;
 
 use super::ExportError;
+use crate::output::NewFile;
 use crate::table::{Cell, Column, Kind, Row, TableShape};
 
 /// Rows that are held before they are written as a group.
@@ -20,20 +20,19 @@ const GROUP_ROWS: usize = 16_384;
 pub(super) struct ParquetTable {
     path: PathBuf,
     columns: Vec<Column>,
-    writer: SerializedFileWriter<File>,
+    writer: SerializedFileWriter<NewFile>,
     held: Vec<Vec<Cell>>,
 }
 
 impl ParquetTable {
-    pub(super) fn create(path: &Path, shape: &TableShape) -> Result<Self, ExportError> {
-        let file =
-            File::create(path).map_err(|source| ExportError::Write { path: path.to_owned(), source })?;
-        let failed = |source| ExportError::Parquet { path: path.to_owned(), source };
+    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+        let path = file.path().to_owned();
+        let failed = |source| ExportError::Parquet { path: path.clone(), source };
         let schema = schema_of(shape).map_err(failed)?;
         let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
         let writer =
             SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
-        Ok(Self { path: path.to_owned(), columns: shape.columns.clone(), writer, held: Vec::new() })
+        Ok(Self { path, columns: shape.columns.clone(), writer, held: Vec::new() })
     }
 
     pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
@@ -41,10 +40,11 @@ impl ParquetTable {
         if self.held.len() >= GROUP_ROWS { self.write_group() } else { Ok(()) }
     }
 
-    pub(super) fn finish(mut self) -> Result<(), ExportError> {
+    /// The file, whole but for its name.
+    pub(super) fn finish(mut self) -> Result<NewFile, ExportError> {
         self.write_group()?;
-        let path = self.path.clone();
-        self.writer.close().map(|_| ()).map_err(|source| ExportError::Parquet { path, source })
+        let path = self.path;
+        self.writer.into_inner().map_err(|source| ExportError::Parquet { path, source })
     }
 
     fn write_group(&mut self) -> Result<(), ExportError> {
@@ -58,7 +58,7 @@ impl ParquetTable {
 }
 
 fn group(
-    writer: &mut SerializedFileWriter<File>,
+    writer: &mut SerializedFileWriter<NewFile>,
     columns: &[Column],
     rows: &[Vec<Cell>],
 ) -> Result<(), ParquetError> {

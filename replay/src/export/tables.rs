@@ -10,6 +10,7 @@ use super::ExportError;
 use super::csv::CsvTable;
 use super::parquet::ParquetTable;
 use crate::log::FlightLog;
+use crate::output::{Destination, NewFile};
 use crate::table::{Row, TableReader, TableShape};
 
 /// A format for tables.
@@ -37,30 +38,35 @@ enum Table {
     Parquet(Box<ParquetTable>),
 }
 
-/// Writes every table of a log into `directory`, which is made if it is not there. Memory does not grow with the log.
+/// Writes every table of a log into a directory, which is made if it is not there. Memory does not grow with the log. The
+/// files take their names when all of them are whole.
 ///
 /// # Errors
-/// The log cannot be read or a file cannot be written. Files of the same names are replaced.
-pub fn export_tables<R: Read>(
+/// The log cannot be read, a file cannot be written, or one of its name is there and may not be replaced.
+pub fn export_tables<'a, R: Read>(
     log: &mut FlightLog<R>,
     format: TableFormat,
-    directory: &Path,
+    directory: impl Into<Destination<'a>>,
 ) -> Result<Vec<ExportedFile>, ExportError> {
+    let directory = directory.into();
+    let input = PathBuf::from(log.name());
     let mut open: BTreeMap<usize, (ExportedFile, Table)> = BTreeMap::new();
     let mut reader = TableReader::new();
     reader.read::<R, ExportError>(log, |shape, row| {
         let (file, table) = match open.entry(row.table) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(create(format, directory, shape)?)
+                entry.insert(create(format, directory, &input, shape)?)
             }
         };
         file.rows += 1;
         table.write(&row)
     })?;
+    let finished = open.into_values().map(|(file, table)| Ok((file, table.finish()?)));
+    let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     let mut files = Vec::new();
-    for (file, table) in open.into_values() {
-        table.finish()?;
+    for (file, written) in whole {
+        written.commit().map_err(|source| ExportError::Write { path: file.path.clone(), source })?;
         files.push(file);
     }
     Ok(files)
@@ -68,7 +74,8 @@ pub fn export_tables<R: Read>(
 
 fn create(
     format: TableFormat,
-    directory: &Path,
+    Destination { path: directory, overwrite }: Destination,
+    input: &Path,
     shape: &TableShape,
 ) -> Result<(ExportedFile, Table), ExportError> {
     let suffix = match format {
@@ -79,9 +86,11 @@ fn create(
     std::fs::create_dir_all(directory)
         .map_err(|source| ExportError::Write { path: directory.to_owned(), source })?;
     let path = directory.join(format!("{}.{suffix}", shape.name));
+    let file = NewFile::create(Destination { path: &path, overwrite }, input)
+        .map_err(|source| ExportError::Write { path: path.clone(), source })?;
     let table = match format {
-        TableFormat::Csv => Table::Csv(CsvTable::create(&path, shape)?),
-        TableFormat::Parquet => Table::Parquet(Box::new(ParquetTable::create(&path, shape)?)),
+        TableFormat::Csv => Table::Csv(CsvTable::create(file, shape)?),
+        TableFormat::Parquet => Table::Parquet(Box::new(ParquetTable::create(file, shape)?)),
     };
     Ok((ExportedFile { path, rows: 0, columns: shape.columns.len() }, table))
 }
@@ -94,7 +103,7 @@ impl Table {
         }
     }
 
-    fn finish(self) -> Result<(), ExportError> {
+    fn finish(self) -> Result<NewFile, ExportError> {
         match self {
             Self::Csv(table) => table.finish(),
             Self::Parquet(table) => table.finish(),

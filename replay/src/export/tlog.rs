@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::ExportError;
 use crate::log::{Entry, FlightLog};
+use crate::output::{Destination, NewFile};
 
 /// What was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -24,6 +25,8 @@ pub struct ExportedTlog {
     pub sent: u64,
     /// Frames that other endpoints of the log had written down; they are the same frames at the other end of a link.
     pub left_out: u64,
+    /// What ended the reading of the log early.
+    pub damage: Option<String>,
 }
 
 /// Writes the frames of one endpoint as a `.tlog`: of the ground's if the log has them, else the vehicle's, unless
@@ -31,10 +34,10 @@ pub struct ExportedTlog {
 ///
 /// # Errors
 /// The log cannot be read or has no frames of that endpoint, or the file cannot be written.
-pub fn export_tlog(
+pub fn export_tlog<'a>(
     open: &dyn Fn() -> Result<FlightLog<std::io::BufReader<File>>, crate::log::LogError>,
     endpoint: Option<&str>,
-    path: &Path,
+    output: impl Into<Destination<'a>>,
 ) -> Result<ExportedTlog, ExportError> {
     let mut log = open()?;
     while log.next_entry()?.is_some() {}
@@ -59,17 +62,19 @@ pub fn export_tlog(
         let wanted = format!("a .tlog needs frames of {wanted}");
         return Err(ExportError::Nothing { name: log.name().to_owned(), found, wanted });
     }
-    write_frames(&mut open()?, wanted, path)
+    write_frames(&mut open()?, wanted, output.into())
 }
 
 fn write_frames<R: Read>(
     log: &mut FlightLog<R>,
     endpoint: &str,
-    path: &Path,
+    destination: Destination,
 ) -> Result<ExportedTlog, ExportError> {
-    let failed = |source| ExportError::Write { path: path.to_owned(), source };
-    let mut output = BufWriter::new(File::create(path).map_err(failed)?);
-    let mut written = ExportedTlog { endpoint: endpoint.to_owned(), received: 0, sent: 0, left_out: 0 };
+    let failed = |source| ExportError::Write { path: destination.path.to_owned(), source };
+    let file = NewFile::create(destination, Path::new(log.name())).map_err(failed)?;
+    let mut output = BufWriter::new(file);
+    let mut written =
+        ExportedTlog { endpoint: endpoint.to_owned(), received: 0, sent: 0, left_out: 0, damage: None };
     while let Some(stamped) = log.next_entry()? {
         if stamped.entry != Entry::RawFrame {
             continue;
@@ -89,6 +94,8 @@ fn write_frames<R: Read>(
         output.write_all(&(stamped.log_time_ns / 1000).to_be_bytes()).map_err(failed)?;
         output.write_all(&stamped.data).map_err(failed)?;
     }
-    output.flush().map_err(failed)?;
+    let file = output.into_inner().map_err(|error| failed(error.into_error()))?;
+    file.commit().map_err(failed)?;
+    written.damage = log.damage().map(ToString::to_string);
     Ok(written)
 }

@@ -7,4 +7,4 @@
 mod fold;
 mod tlog;
 
-pub use tlog::{ImportError, ImportedTlog, import_tlog};
+pub use tlog::{ImportError, ImportProgress, ImportedTlog, import_tlog};

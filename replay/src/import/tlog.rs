@@ -12,9 +12,12 @@ use serde::Serialize;
 
 use super::fold::Fold;
 use crate::log::{NewLog, NewLogError};
+use crate::output::Destination;
 
 /// A ground station's system number, by convention.
 const GROUND_SYSTEM: u8 = 255;
+/// How far an import is, is told this often.
+const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
 
 /// Why a `.tlog` could not be imported.
 #[derive(Debug, thiserror::Error)]
@@ -66,13 +69,30 @@ pub struct ImportedTlog {
     pub telemetry: u64,
 }
 
-/// Imports a `.tlog` into a new flight log. An existing file is not overwritten.
+/// How far an import is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImportProgress {
+    /// Bytes read.
+    pub read: u64,
+    /// Size of the `.tlog`.
+    pub total: u64,
+}
+
+/// Imports a `.tlog` into a new flight log. Memory does not grow with its size.
 ///
 /// # Errors
 /// See [`ImportError`].
-pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportError> {
+pub fn import_tlog<'a>(
+    input: &Path,
+    output: impl Into<Destination<'a>>,
+    progress: &mut dyn FnMut(ImportProgress),
+) -> Result<ImportedTlog, ImportError> {
+    let destination = output.into();
+    let output = destination.path;
     let read = |source| ImportError::Read { path: input.to_owned(), source };
-    let mut frames = TlogReader::new(File::open(input).map_err(read)?);
+    let file = File::open(input).map_err(read)?;
+    let total = file.metadata().map_err(read)?.len();
+    let mut frames = TlogReader::new(file);
     let Some(first) = frames.next_frame().map_err(read)? else {
         return Err(ImportError::NoFrames { path: input.to_owned() });
     };
@@ -87,11 +107,12 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
         NewLogError::Create(source) => ImportError::Create { path: output.to_owned(), source },
         NewLogError::Write(source) => ImportError::Write { path: output.to_owned(), source },
     };
-    let mut log = NewLog::create(output, &header).map_err(failed)?;
+    let mut log = NewLog::create(destination, input, &header).map_err(failed)?;
     let link = format!("file:{}", input.file_name().unwrap_or_default().to_string_lossy());
     let mut imported = ImportedTlog::default();
     let mut fold = Fold::default();
     let mut next = Some(first);
+    let mut told = 0;
     while let Some(TlogFrame { time_us, bytes }) = next {
         let since_us = time_us.saturating_sub(start_us);
         let time_ns = since_us.saturating_mul(1000);
@@ -109,6 +130,10 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
             }
         }
         next = frames.next_frame().map_err(read)?;
+        if frames.bytes_read() >= told + PROGRESS_BYTES {
+            told = frames.bytes_read();
+            progress(ImportProgress { read: told, total });
+        }
     }
     imported.mavlink1 = frames.mavlink1();
     imported.garbage_bytes = frames.garbage_bytes();

@@ -9,7 +9,7 @@ use protocol::log::v1;
 use serde::Serialize;
 
 use super::{ChannelFacts, FrameFacts, PhaseTimeline, TickFacts};
-use crate::log::{AttachmentFacts, BuildComparison, Head, SummaryFacts};
+use crate::log::{AttachmentFacts, BuildComparison, Cut, Flights, Head, SummaryFacts};
 
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -165,7 +165,7 @@ impl Span {
 /// Whether anything is missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Completeness {
-    /// The log was ended properly, nothing in it is broken and nothing is missing.
+    /// The log was ended properly, nothing in it is broken and nothing is missing, to the end of its flight.
     pub complete: bool,
     /// What ended the reading early.
     pub damage: Option<String>,
@@ -177,6 +177,10 @@ pub struct Completeness {
     pub ticks_missing: u64,
     /// Messages missing before the last of their channel.
     pub messages_lost: u64,
+    /// Flights that have ticks: more than one in a log that was joined.
+    pub flights: usize,
+    /// Where a flight's record ends, if that is before its end.
+    pub cut: Option<Cut>,
 }
 
 impl Completeness {
@@ -200,7 +204,15 @@ impl Completeness {
             missing_s,
             ticks_missing,
             messages_lost,
+            flights: 0,
+            cut: None,
         }
+    }
+
+    /// The same, knowing the log's flights.
+    pub(super) fn with_flights(self, flights: &Flights) -> Self {
+        let cut = flights.cut();
+        Self { complete: self.complete && cut.is_none(), flights: flights.flown(), cut, ..self }
     }
 }
 

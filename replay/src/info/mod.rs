@@ -19,7 +19,7 @@ use std::path::Path;
 
 use protocol::log::v1;
 
-use crate::log::{Entry, FlightLog, LogError, SummaryFacts, summary_of};
+use crate::log::{Entry, FlightLog, Flights, LogError, SummaryFacts, summary_of};
 use channels::ChannelCounter;
 use frames::FrameCounter;
 use phases::PhaseTracker;
@@ -51,6 +51,7 @@ pub fn info_of<R: Read>(
             None => (stamped.log_time_ns, stamped.log_time_ns),
             Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
         });
+        seen.flights.note(&stamped.entry);
         seen.take(stamped.entry, stamped.sequence);
     }
     Ok(seen.into_info(log, summary))
@@ -60,6 +61,7 @@ pub fn info_of<R: Read>(
 #[derive(Default)]
 struct Seen {
     channels: ChannelCounter,
+    flights: Flights,
     span: Option<(u64, u64)>,
     ticks: TickCounter,
     vehicle_phases: PhaseTracker,
@@ -104,6 +106,7 @@ impl Seen {
         let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
         let channels = self.channels.into_facts(log.channels());
         let completeness = Completeness::new(log.damage(), span.as_ref(), ticks.as_ref(), &channels, summary);
+        let completeness = completeness.with_flights(&self.flights);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
         Info {

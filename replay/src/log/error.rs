@@ -25,8 +25,9 @@ pub enum LogError {
     },
     /// The file is of another kind.
     #[error(
-        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a",
-        hex(found)
+        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a{}",
+        hex(found),
+        hint(name)
     )]
     NotMcap {
         /// The file.
@@ -56,6 +57,13 @@ pub enum LogError {
         /// Its topics.
         topics: Vec<String>,
     },
+}
+
+/// What helps with a file of a known other kind.
+fn hint(name: &str) -> &'static str {
+    let is_tlog =
+        std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+    if is_tlog { "; `replay import` makes a log of a .tlog" } else { "" }
 }
 
 fn hex(bytes: &[u8]) -> String {

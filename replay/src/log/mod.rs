@@ -5,6 +5,7 @@
 
 mod entry;
 mod error;
+mod flights;
 mod frame_order;
 mod head;
 mod new_log;
@@ -16,6 +17,7 @@ mod tick_ranges;
 
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
+pub use flights::{Cut, FlightKind, Flights, LoggedFlight};
 pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 pub(crate) use new_log::{NewLog, NewLogError};

@@ -1,15 +1,16 @@
 //! A new log file, for what is flown again or imported.
 
-use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 
-/// A log being written; an existing file is never overwritten.
+use crate::output::{Destination, NewFile};
+
+/// A log being written; see [`NewFile`].
 pub(crate) struct NewLog {
-    writer: LogWriter<BufWriter<File>>,
+    writer: LogWriter<BufWriter<NewFile>>,
 }
 
 /// Why a new log is not there.
@@ -21,8 +22,12 @@ pub(crate) enum NewLogError {
 }
 
 impl NewLog {
-    pub(crate) fn create(path: &Path, header: &LogHeader) -> Result<Self, NewLogError> {
-        let file = File::options().write(true).create_new(true).open(path).map_err(NewLogError::Create)?;
+    pub(crate) fn create(
+        destination: Destination,
+        input: &Path,
+        header: &LogHeader,
+    ) -> Result<Self, NewLogError> {
+        let file = NewFile::create(destination, input).map_err(NewLogError::Create)?;
         let writer = LogWriter::new(BufWriter::new(file), header).map_err(NewLogError::Write)?;
         Ok(Self { writer })
     }
@@ -32,7 +37,10 @@ impl NewLog {
     }
 
     pub(crate) fn finish(self) -> Result<(), NewLogError> {
+        let failed = |error| NewLogError::Write(mcap::McapError::from(error).into());
         let mut file = self.writer.finish().map_err(NewLogError::Write)?;
-        file.flush().map_err(|error| NewLogError::Write(mcap::McapError::from(error).into()))
+        file.flush().map_err(failed)?;
+        let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
+        file.commit().map_err(failed)
     }
 }

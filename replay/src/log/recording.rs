@@ -9,7 +9,7 @@ use flight::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::{Entry, FlightLog, FrameOrder, Gap, Head, LogError};
+use super::{Cut, Entry, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
 
 /// Most records of one kind that are held: five hours of ticks at 10 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -62,6 +62,16 @@ pub enum RecordingError {
         /// The first frame there is.
         first: u64,
     },
+    /// Joined from several logs.
+    #[error(
+        "{name}: holds {flights} flights, and this question is about one; `replay verify` tells each of them"
+    )]
+    SeveralFlights {
+        /// The file.
+        name: String,
+        /// How many.
+        flights: usize,
+    },
     /// Nothing to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile {
@@ -109,6 +119,8 @@ pub struct Recording {
     pub verdict: Option<v1::LandingVerdict>,
     /// What ended the reading early.
     pub damage: Option<String>,
+    /// Where the record ends, if that is before the end of the flight.
+    pub cut: Option<Cut>,
     /// Why the first record that this build cannot read could not be read.
     pub unreadable: Option<String>,
 }
@@ -117,7 +129,8 @@ impl Recording {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read, or is longer than any flight. Damage is not an error.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight. Damage is not an
+    /// error.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::read(&mut FlightLog::open(path)?)
     }
@@ -128,9 +141,11 @@ impl Recording {
     /// As [`open`](Self::open).
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
         let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
+        let mut flights = Flights::default();
         let (mut first_ns, mut frame_order, mut frames_lost) = (None, FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
             let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
+            flights.note(&stamped.entry);
             match stamped.entry {
                 Entry::Tick(mut tick) => {
                     tick.output.plan.states = Vec::new();
@@ -146,17 +161,24 @@ impl Recording {
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
-                Entry::PilotStart(start) => recording.pilot_start = Some(*start),
+                // Of a start with no frames behind it nothing is known.
+                Entry::PilotStart(start) if recording.frames.is_empty() => {
+                    recording.pilot_start = Some(*start);
+                }
                 Entry::PilotTick(tick) => {
                     if frame_order.note(tick.input.frame, stamped.sequence).is_some() {
                         frames_lost.get_or_insert(recording.frames.len());
                     }
                     recording.frames.push(*tick);
                 }
-                Entry::RawFrame | Entry::Operator | Entry::Other => {}
+                Entry::PilotStart(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {}
             }
             recording.check_length()?;
         }
+        if flights.flown() > 1 {
+            return Err(RecordingError::SeveralFlights { name: recording.name, flights: flights.flown() });
+        }
+        recording.cut = flights.cut();
         recording.head = log.head().clone();
         recording.damage = log.damage().map(ToString::to_string);
         recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());

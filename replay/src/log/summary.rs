@@ -5,6 +5,7 @@ use std::io::{Read as _, Seek as _};
 use std::path::Path;
 
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK};
 
 /// A summary larger than this is taken for damage.
 const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
@@ -14,14 +15,28 @@ const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
 pub struct SummaryFacts {
     /// Messages in the file.
     pub message_count: u64,
+    /// Of these, ticks of a controller and frames of a flight computer.
+    pub ticks: u64,
     /// Time of the last message, ns since the Unix epoch.
     pub last_log_time_ns: u64,
 }
 
 /// What the summary at the end of a file says, if it has one that can be read.
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
-    let stats = read_summary(path)?.stats?;
-    Some(SummaryFacts { message_count: stats.message_count, last_log_time_ns: stats.message_end_time })
+    let summary = read_summary(path)?;
+    let stats = summary.stats?;
+    let is_tick = |id: &u16| {
+        let channel = summary.channels.get(id);
+        channel.is_some_and(|channel| {
+            [TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK].contains(&channel.topic.as_str())
+        })
+    };
+    let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_tick(id));
+    Some(SummaryFacts {
+        message_count: stats.message_count,
+        ticks: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
+        last_log_time_ns: stats.message_end_time,
+    })
 }
 
 /// Where the chunks of a file begin, in order, as its summary says; empty without one.

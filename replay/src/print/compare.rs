@@ -124,7 +124,7 @@ pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
                 .unwrap_or_default();
             of_signals.push(message.clone());
             let outcome = if signal.passed {
-                JunitOutcome::Passed
+                JunitOutcome::Passed { said: String::new() }
             } else {
                 JunitOutcome::Failed { details: message.clone(), message }
             };
@@ -133,7 +133,7 @@ pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
         let others: Vec<String> =
             comparison.failures.iter().filter(|failure| !of_signals.contains(failure)).cloned().collect();
         let outcome = if others.is_empty() {
-            JunitOutcome::Passed
+            JunitOutcome::Passed { said: String::new() }
         } else {
             JunitOutcome::Failed { message: others.join("; "), details: others.join("\n") }
         };

@@ -20,6 +20,9 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "{}{size}", shown(&info.file))?;
     row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
     row(output, "complete", &completeness(info))?;
+    if info.completeness.flights > 1 {
+        row(output, "flights", &format!("{}, told apart by `replay verify`", info.completeness.flights))?;
+    }
     print_origin(info, output)?;
     if let Some(span) = &info.span {
         let (first, last) = (utc(span.first_ns), utc(span.last_ns));
@@ -74,6 +77,7 @@ fn completeness(info: &Info) -> String {
     if found.messages_lost > 0 {
         faults.push(format!("{} lost", counted(found.messages_lost, "message")));
     }
+    faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
     format!("NO: {}", faults.join("; "))
 }
 

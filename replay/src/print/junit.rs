@@ -17,7 +17,10 @@ pub struct JunitCase {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum JunitOutcome {
     /// Yes.
-    Passed,
+    Passed {
+        /// What there is to say all the same.
+        said: String,
+    },
     /// No, and why in a line and in full.
     Failed {
         /// One line.
@@ -40,8 +43,12 @@ pub fn print_junit(suite: &str, cases: Vec<JunitCase>, output: &mut impl Write) 
     let mut report = Report::new("replay");
     let mut test_suite = TestSuite::new(suite);
     for case in cases {
+        let mut said = String::new();
         let status = match case.outcome {
-            JunitOutcome::Passed => TestCaseStatus::success(),
+            JunitOutcome::Passed { said: words } => {
+                said = words;
+                TestCaseStatus::success()
+            }
             JunitOutcome::Failed { message, details } => {
                 let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
                 status.set_message(message).set_description(details);
@@ -53,7 +60,11 @@ pub fn print_junit(suite: &str, cases: Vec<JunitCase>, output: &mut impl Write) 
                 status
             }
         };
-        test_suite.add_test_case(TestCase::new(case.name, status));
+        let mut test_case = TestCase::new(case.name, status);
+        if !said.is_empty() {
+            test_case.set_system_out(said);
+        }
+        test_suite.add_test_case(test_case);
     }
     report.add_test_suite(test_suite);
     let text = report.to_string().map_err(io::Error::other)?;

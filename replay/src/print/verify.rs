@@ -13,16 +13,18 @@ const FIELDS_SHOWN: usize = 5;
 /// # Errors
 /// The output failed.
 pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
-    let file = shown(&report.file);
+    let name = name_of(report);
     let VerifyReport { ticks_identical, ticks_compared, ticks_recorded, .. } = report;
     match report.outcome {
         Outcome::Identical => {
-            writeln!(output, "{file}: {ticks_identical} of {ticks_compared} ticks identical")?;
+            writeln!(output, "{name}: {ticks_identical} of {ticks_compared} ticks identical")?;
         }
         Outcome::IdenticalReadablePart => {
+            let of = if report.damage.is_some() { " of the readable part" } else { "" };
+            let what_is_missing = what_is_missing(report);
             writeln!(
                 output,
-                "{file}: {ticks_identical} of {ticks_compared} ticks identical of the readable part"
+                "{name}: {ticks_identical} of {ticks_compared} ticks identical{of}{what_is_missing}"
             )?;
         }
         Outcome::Diverged => {
@@ -30,13 +32,16 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
             let fields = counted(*fields_different, "field");
             writeln!(
                 output,
-                "{file}: DIVERGED: {ticks_different} of {ticks_compared} ticks differ, in {fields}"
+                "{name}: DIVERGED: {ticks_different} of {ticks_compared} ticks differ, in {fields}"
             )?;
         }
-        Outcome::NotReplayable if *ticks_compared == 0 => writeln!(output, "{file}: not replayable")?,
+        Outcome::NotReplayable if *ticks_compared == 0 => {
+            let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
+            writeln!(output, "{name}: nothing was compared: {}", reason.unwrap_or_default())?;
+        }
         Outcome::NotReplayable => writeln!(
             output,
-            "{file}: not replayable as a whole: the first {ticks_identical} of {ticks_recorded} ticks are identical"
+            "{name}: not replayable as a whole: the first {ticks_identical} of {ticks_recorded} ticks are identical"
         )?,
     }
     if let Some(first) = &report.first_divergence {
@@ -48,10 +53,39 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     if let Some(consequence) = &report.consequence {
         print_consequence(consequence, output)?;
     }
-    if let Some(obstacle) = &report.obstacle {
+    if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *ticks_compared > 0) {
         writeln!(output, "not every tick was compared: {}", shown(&obstacle.to_string()))?;
     }
+    if report.outcome != Outcome::IdenticalReadablePart {
+        let what_is_missing = what_is_missing(report);
+        if !what_is_missing.is_empty() {
+            writeln!(output, "what was compared is{what_is_missing}")?;
+        }
+    }
     Ok(())
+}
+
+/// The file, and which of its flights if it holds several.
+fn name_of(report: &VerifyReport) -> String {
+    let file = shown(&report.file);
+    report
+        .flight
+        .map_or_else(|| file.clone(), |flight| format!("{file}: flight {} of {}", flight.number, flight.of))
+}
+
+/// What of the flight is not in the part that was read.
+fn what_is_missing(report: &VerifyReport) -> String {
+    let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
+    let unread = report.damage.as_ref().map(|damage| {
+        let ticks = match report.unread.and_then(|unread| unread.ticks) {
+            Some((unread, all)) => format!("{unread} of {all} ticks were not read"),
+            None => "how many ticks were not read is not known".to_owned(),
+        };
+        let seconds = report.unread.and_then(|unread| unread.seconds);
+        let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
+        format!("; {ticks}{seconds}: {}", shown(damage))
+    });
+    [cut, unread].into_iter().flatten().collect()
 }
 
 fn print_divergence(first: &Divergence, output: &mut impl Write) -> io::Result<()> {
@@ -130,17 +164,18 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     )
 }
 
-/// A verification as a case for a build server.
-pub fn verify_case(report: &VerifyReport) -> JunitCase {
+/// A verification as a case for a build server. `strict`: what is identical passes only if it is the whole flight.
+pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
     let mut text = Vec::new();
     // Writing into memory cannot fail.
     let _ = print_verify(report, &mut text);
     let details = String::from_utf8_lossy(&text).into_owned();
     let message = details.lines().next().unwrap_or_default().to_owned();
     let outcome = match report.outcome {
-        Outcome::Identical | Outcome::IdenticalReadablePart => JunitOutcome::Passed,
+        Outcome::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
+        Outcome::Identical | Outcome::IdenticalReadablePart => JunitOutcome::Passed { said: details },
         Outcome::Diverged => JunitOutcome::Failed { message, details },
         Outcome::NotReplayable => JunitOutcome::Error { message: details },
     };
-    JunitCase { name: format!("verify {}", shown(&report.file)), outcome }
+    JunitCase { name: format!("verify {}", name_of(report)), outcome }
 }

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::log::LogError;
+use crate::output::Destination;
 use walk::{Piece, Walk};
 use write::Rescue;
 
@@ -73,13 +74,15 @@ pub struct Recovery {
     pub ended: bool,
 }
 
-/// Recovers a log into a new file. An existing file is not overwritten.
+/// Recovers a log into a new file.
 ///
 /// # Errors
-/// The input is not an MCAP file or cannot be read; the output exists or cannot be written.
-pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
+/// The input is not an MCAP file or cannot be read; the output exists and may not be replaced, or cannot be written.
+pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<Recovery, RecoverError> {
+    let destination = output.into();
+    let output = destination.path;
     let mut walk = Walk::open(input)?;
-    let mut rescue = Rescue::create(output)?;
+    let mut rescue = Rescue::create(destination, input)?;
     let mut lost = Vec::new();
     let mut ended = false;
     while let Some(piece) = walk.next_piece()? {

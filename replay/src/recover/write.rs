@@ -1,20 +1,20 @@
 //! What was kept, as a whole log.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record};
 
 use super::{RecoverError, Recovery};
+use crate::output::{Destination, NewFile};
 
 /// Name of the metadata record that says that a log was recovered.
 const METADATA_RECOVERY: &str = "recovery";
 /// Small chunks, as in the recorder's own logs.
 const CHUNK_BYTES: u64 = 64 * 1024;
 
-type Writer = mcap::Writer<BufWriter<File>>;
+type Writer = mcap::Writer<BufWriter<NewFile>>;
 
 pub(super) struct Rescue {
     path: PathBuf,
@@ -30,17 +30,15 @@ pub(super) struct Rescue {
 }
 
 enum State {
-    Waiting(File),
+    Waiting(NewFile),
     Writing(Box<Writer>),
     Gone,
 }
 
 impl Rescue {
-    pub(super) fn create(path: &Path) -> Result<Self, RecoverError> {
-        let file = File::options()
-            .write(true)
-            .create_new(true)
-            .open(path)
+    pub(super) fn create(destination: Destination, input: &Path) -> Result<Self, RecoverError> {
+        let path = destination.path;
+        let file = NewFile::create(destination, input)
             .map_err(|source| RecoverError::Create { path: path.to_owned(), source })?;
         Ok(Self {
             path: path.to_owned(),
@@ -158,7 +156,8 @@ impl Rescue {
         writer.write_metadata(&Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts })?;
         writer.finish()?;
         if let State::Writing(writer) = std::mem::replace(&mut self.state, State::Gone) {
-            writer.into_inner().flush()?;
+            let file = writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
+            file.commit()?;
         }
         Ok(())
     }

@@ -8,13 +8,14 @@ use protocol::log::writer::{LogHeader, LogWriteError};
 
 use super::{Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
 use crate::log::{NewLog, NewLogError, Recording};
+use crate::output::Destination;
 use crate::settings::{Setting, profile_toml_with};
 
 /// Why a log could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReflyLogError {
     /// The file exists or cannot be made.
-    #[error("cannot create the log {}", path.display())]
+    #[error("{}: cannot be created", path.display())]
     Create {
         /// The file.
         path: PathBuf,
@@ -22,7 +23,7 @@ pub enum ReflyLogError {
         source: std::io::Error,
     },
     /// Writing failed.
-    #[error("cannot write the log {}", path.display())]
+    #[error("{}: cannot be written", path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -31,23 +32,25 @@ pub enum ReflyLogError {
     },
 }
 
-/// Writes a flight flown again as a log that every question about logs can be asked of. An existing file is not
-/// overwritten.
+/// Writes a flight flown again as a log that every question about logs can be asked of.
 ///
 /// # Errors
-/// The file exists, or cannot be made or written.
-pub fn write_log(
-    path: &Path,
+/// The file exists and may not be replaced, or cannot be made or written.
+pub fn write_log<'a>(
+    destination: impl Into<Destination<'a>>,
     recording: &Recording,
     options: &ReflyOptions,
     report: &ReflyReport,
     flight: &ReflownFlight,
 ) -> Result<(), ReflyLogError> {
+    let destination = destination.into();
+    let path = destination.path;
     let failed = |error| match error {
         NewLogError::Create(source) => ReflyLogError::Create { path: path.to_owned(), source },
         NewLogError::Write(source) => ReflyLogError::Write { path: path.to_owned(), source },
     };
-    let mut log = NewLog::create(path, &header(recording, options, report, flight)).map_err(failed)?;
+    let header = header(recording, options, report, flight);
+    let mut log = NewLog::create(destination, Path::new(&recording.name), &header).map_err(failed)?;
     for (time_s, record) in records(report, flight) {
         log.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(failed)?;
     }

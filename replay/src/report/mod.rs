@@ -13,15 +13,26 @@ mod track;
 
 use std::path::Path;
 
-use crate::info::{Info, info};
+use crate::info::{Completeness, Info, info};
 use crate::log::{Recording, RecordingError};
 use track::{Flight, plans_of};
+
+/// A flight's page.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The log.
+    pub name: String,
+    /// The page.
+    pub html: String,
+    /// Whether anything of the log is missing; the page says so too.
+    pub completeness: Completeness,
+}
 
 /// Builds the page of a log file.
 ///
 /// # Errors
 /// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
-pub fn report(path: &Path) -> Result<String, RecordingError> {
+pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
     let flight = if recording.is_from_apogee() {
@@ -29,5 +40,6 @@ pub fn report(path: &Path) -> Result<String, RecordingError> {
     } else {
         Flight::new(recording, plans_of(path)?)
     };
-    Ok(page::page(&flight, &info, &section::all(&flight, &info)))
+    let html = page::page(&flight, &info, &section::all(&flight, &info));
+    Ok(Report { name: info.file, html, completeness: info.completeness })
 }

@@ -7,16 +7,17 @@ use super::consequence::Consequence;
 use super::difference::FieldDifference;
 use super::growth::Growth;
 use super::tally::Tally;
+use super::unread::Unread;
 use crate::controller::FrameError;
-use crate::log::BuildComparison;
+use crate::log::{BuildComparison, Cut};
 
 /// The answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// Every tick of a whole log is identical.
+    /// There are ticks, and every one of a whole flight is identical.
     Identical,
-    /// Every tick is identical that could be read of a damaged log.
+    /// Every tick is identical that could be read of a damaged log, or of a flight whose record ends before it did.
     IdenticalReadablePart,
     /// Some tick differs.
     Diverged,
@@ -73,6 +74,9 @@ pub enum Obstacle {
         /// Why.
         reason: String,
     },
+    /// A flight computer was let go, and nothing of it follows.
+    #[error("it has a record /pilot/start and no frame of the flight computer behind it")]
+    NoFrames,
     /// Frames of a flight computer, and nothing that says how it was let go.
     #[error("it has frames of the flight computer and no record /pilot/start before them to begin from")]
     NoStart,
@@ -106,11 +110,31 @@ pub struct Divergence {
     pub fields: Vec<FieldDifference>,
 }
 
-/// What a verification found.
+/// Which flight of a log that holds several.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FlightPlace {
+    /// Its number, from 1 on.
+    pub number: usize,
+    /// How many there are.
+    pub of: usize,
+}
+
+/// What is known of a flight's record besides its ticks.
+pub(super) struct FileFacts {
+    pub(super) file: String,
+    pub(super) flight: Option<FlightPlace>,
+    pub(super) cut: Option<Cut>,
+    pub(super) damage: Option<String>,
+    pub(super) build: BuildComparison,
+}
+
+/// What a verification found of one flight.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerifyReport {
     /// The log.
     pub file: String,
+    /// Which of its flights, if it holds several.
+    pub flight: Option<FlightPlace>,
     /// The answer.
     pub outcome: Outcome,
     /// Ticks that could be read.
@@ -135,34 +159,37 @@ pub struct VerifyReport {
     pub consequence: Option<Consequence>,
     /// Why not every tick was compared.
     pub obstacle: Option<Obstacle>,
+    /// Where the record ends, if that is before the end of the flight.
+    pub cut: Option<Cut>,
     /// What ended the reading of the log early.
     pub damage: Option<String>,
+    /// What was not read because of that; of files only.
+    pub unread: Option<Unread>,
     /// The build that wrote the log against this one.
     pub build: BuildComparison,
 }
 
 impl VerifyReport {
     pub(super) fn new(
-        file: String,
+        facts: FileFacts,
         ticks_recorded: u64,
-        tally: Option<Tally>,
+        counts: Tally,
         obstacle: Option<Obstacle>,
-        damage: Option<String>,
-        build: BuildComparison,
     ) -> Self {
-        let counts = tally.unwrap_or_default();
         let (first_divergence, growth) = (counts.divergence, counts.growth);
+        let FileFacts { file, flight, cut, damage, build } = facts;
         let outcome = if first_divergence.is_some() {
             Outcome::Diverged
         } else if obstacle.is_some() {
             Outcome::NotReplayable
-        } else if damage.is_some() {
+        } else if damage.is_some() || cut.is_some() {
             Outcome::IdenticalReadablePart
         } else {
             Outcome::Identical
         };
         Self {
             file,
+            flight,
             outcome,
             ticks_recorded,
             ticks_compared: counts.ticks,
@@ -175,7 +202,9 @@ impl VerifyReport {
             first_divergence,
             consequence: None,
             obstacle,
+            cut,
             damage,
+            unread: None,
             build,
         }
     }

@@ -16,6 +16,7 @@ use replay::verify::{Outcome, verify};
 
 use crate::asked::{settings, with, with_plant};
 use crate::command_line::{replay, run};
+use crate::flown::only;
 use crate::from_apogee::LANDED;
 
 fn recording() -> Recording {
@@ -25,7 +26,7 @@ fn recording() -> Recording {
 #[test]
 fn it_landed_and_verifies() {
     assert!(LANDED.landed && recording().verdict.unwrap().landed);
-    let report = verify(&LANDED.log).unwrap();
+    let report = only(verify(&LANDED.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
 }
 
@@ -187,7 +188,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
         let path = LANDED.beside(name);
         write_log(&path, &recording, &options, &report, &flown).unwrap();
-        let verified = verify(&path).unwrap();
+        let verified = only(verify(&path).unwrap());
         assert_eq!((verified.outcome, verified.first_divergence), (Outcome::Identical, None), "{name}");
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict, "{name}");

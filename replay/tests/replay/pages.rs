@@ -36,7 +36,7 @@ fn check(page: &str) {
 #[test]
 fn the_report_says_the_verdict_first_and_then_why() {
     for flight in [&*NOMINAL, &*DISPERSED, &*WITH_FRAMES] {
-        let page = report(&flight.log).unwrap();
+        let page = report(&flight.log).unwrap().html;
         check(&page);
         let order = [
             "LANDED at",
@@ -58,13 +58,13 @@ fn the_report_says_the_verdict_first_and_then_why() {
         assert!(page.matches("<svg").count() > 15);
         assert!(page.contains("prefers-color-scheme: dark"));
     }
-    assert!(report(&WITH_FRAMES.log).unwrap().contains("/mavlink/tx/raw"));
+    assert!(report(&WITH_FRAMES.log).unwrap().html.contains("/mavlink/tx/raw"));
 }
 
 /// A flight from apogee is seen in the plane of its landing; its plans are those that the flight computer makes again.
 #[test]
 fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
-    let page = report(&LANDED.log).unwrap();
+    let page = report(&LANDED.log).unwrap().html;
     check(&page);
     let order = [
         "LANDED at",
@@ -95,7 +95,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let page_of = |name: &str, bytes: &[u8]| {
         let path = directory.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let page = report(&path).unwrap();
+        let page = report(&path).unwrap().html;
         check(&page);
         page
     };
@@ -121,8 +121,8 @@ fn telemetry_alone_makes_a_page() {
     let (tlog, log) = (WITH_FRAMES.beside("page.tlog"), WITH_FRAMES.beside("page.mcap"));
     let open = || replay::log::FlightLog::open(&WITH_FRAMES.log);
     replay::export::export_tlog(&open, None, &tlog).unwrap();
-    replay::import::import_tlog(&tlog, &log).unwrap();
-    let page = report(&log).unwrap();
+    replay::import::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
+    let page = report(&log).unwrap().html;
     check(&page);
     assert!(page.contains("From what a ground station heard") && page.contains("LANDED at"));
 }

@@ -47,7 +47,7 @@ fn a_foreign_file_exports_to_no_folder() {
 fn telemetry_only() -> PathBuf {
     let (tlog, log) = (WITH_FRAMES.beside("only.tlog"), WITH_FRAMES.beside("only.mcap"));
     replay::export::export_tlog(&|| FlightLog::open(&WITH_FRAMES.log), None, &tlog).unwrap();
-    import_tlog(&tlog, &log).unwrap();
+    import_tlog(&tlog, &log, &mut |_| {}).unwrap();
     log
 }
 

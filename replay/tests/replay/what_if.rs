@@ -11,6 +11,7 @@ use replay::tick::tick;
 use replay::verify::{Outcome, verify};
 
 use crate::asked::{settings, with, with_plant};
+use crate::flown::only;
 use crate::simulated::{DISPERSED, NOMINAL, Simulated};
 
 #[test]
@@ -127,7 +128,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
         let path = DISPERSED.beside(name);
         write_log(&path, &recording, &options, &report, &flown).unwrap();
-        let verified = verify(&path).unwrap();
+        let verified = only(verify(&path).unwrap());
         assert_eq!(verified.outcome, Outcome::Identical, "{name}");
         assert_eq!(verified.ticks_identical as usize, flown.before.len() + flown.ticks.len());
         let again = Recording::open(&path).unwrap();

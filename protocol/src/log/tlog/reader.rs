@@ -27,12 +27,19 @@ pub struct TlogReader<R> {
     buffer: Vec<u8>,
     mavlink1: u64,
     garbage_bytes: u64,
+    bytes_read: u64,
 }
 
 impl<R: Read> TlogReader<R> {
     /// Reads from the beginning.
     pub fn new(input: R) -> Self {
-        Self { input: BufReader::new(input), buffer: Vec::new(), mavlink1: 0, garbage_bytes: 0 }
+        Self {
+            input: BufReader::new(input),
+            buffer: Vec::new(),
+            mavlink1: 0,
+            garbage_bytes: 0,
+            bytes_read: 0,
+        }
     }
 
     /// Frames of MAVLink 1 so far; they are left out.
@@ -43,6 +50,11 @@ impl<R: Read> TlogReader<R> {
     /// Bytes so far that belong to no frame.
     pub fn garbage_bytes(&self) -> u64 {
         self.garbage_bytes
+    }
+
+    /// Bytes read from the input so far: how far the reading is.
+    pub fn bytes_read(&self) -> u64 {
+        self.bytes_read
     }
 
     /// The next frame of MAVLink 2.
@@ -81,7 +93,9 @@ impl<R: Read> TlogReader<R> {
     /// Reads until the buffer has room for the longest frame, or to the end.
     fn fill(&mut self) -> std::io::Result<()> {
         let missing = (TIME_BYTES + FRAME_MAX_BYTES).saturating_sub(self.buffer.len());
-        self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer).map(|_| ())
+        let read = self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)?;
+        self.bytes_read += read as u64;
+        Ok(())
     }
 }
 

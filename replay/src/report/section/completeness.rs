@@ -18,6 +18,7 @@ pub(super) fn html(info: &Info) -> String {
         rows.extend(value.map(|value| vec![name.to_owned(), escaped(&value)]));
     };
     row("damage", found.damage.clone());
+    row("the flight", found.cut.as_ref().map(ToString::to_string));
     let readable_s = found.readable_until_s.filter(|_| found.damage.is_some());
     row("readable until", readable_s.map(|until_s| format!("{until_s:.3} s after the first record")));
     row("lost behind that", found.missing_s.map(|missing_s| format!("{missing_s:.3} s")));

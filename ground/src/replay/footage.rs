@@ -1,0 +1,182 @@
+//! A log's frames in file order, one at a time: what a film is made of. Holds one frame, whatever the file's size.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek as _};
+use std::path::Path;
+
+use protocol::dialect::{MavCmd, MavMessage};
+use protocol::frame::{Frame, Framer};
+use protocol::identity::{GROUND, VEHICLE};
+use protocol::log::reader::{LogItem, LogReader};
+use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
+use protocol::log::tlog::frame_length;
+
+use crate::model::command::CommandKind;
+
+/// Read at once: some thousand frames.
+const BUFFER_BYTES: usize = 256 * 1024;
+/// A time in a `.tlog`, and the part of a frame that says how long it is.
+const TLOG_TIME_BYTES: usize = 8;
+const LENGTH_BYTES: usize = 3;
+
+/// What happened at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scene {
+    /// A frame arrived from the vehicle.
+    Heard(Frame),
+    /// The crew asked for something.
+    Commanded(CommandKind),
+    /// The ground sent something else, of so many bytes.
+    Sent(usize),
+}
+
+/// Who recorded a frame: a log of the demonstration holds both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    Ground,
+    Vehicle,
+}
+
+/// A scene as the file has it.
+pub(super) struct Stamped {
+    pub(super) side: Side,
+    pub(super) stamp_ns: u64,
+    pub(super) scene: Scene,
+}
+
+/// A log being read from its beginning.
+pub(super) struct Footage {
+    kind: Kind,
+    bytes_read: u64,
+}
+
+enum Kind {
+    Mcap { reader: Box<LogReader<BufReader<File>>>, waiting: VecDeque<Stamped> },
+    Tlog { file: BufReader<File>, damage: Option<String> },
+}
+
+impl Footage {
+    /// From the beginning of an open file; a `.tlog` by its name, everything else as MCAP.
+    pub(super) fn begin(file: &File, path: &Path) -> io::Result<Self> {
+        let mut file = file.try_clone()?;
+        file.rewind()?;
+        let file = BufReader::with_capacity(BUFFER_BYTES, file);
+        let is_tlog = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+        let kind = if is_tlog {
+            Kind::Tlog { file, damage: None }
+        } else {
+            Kind::Mcap { reader: Box::new(LogReader::new(file)), waiting: VecDeque::new() }
+        };
+        Ok(Self { kind, bytes_read: 0 })
+    }
+
+    /// Bytes of records read so far: how far the reading is.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.bytes_read
+    }
+
+    /// Why reading ended early, if it did; known at the end.
+    pub(super) fn damage(&self) -> Option<String> {
+        match &self.kind {
+            Kind::Mcap { reader, .. } => reader.damage().map(ToString::to_string),
+            Kind::Tlog { damage, .. } => damage.clone(),
+        }
+    }
+
+    /// The next scene in the file's order.
+    pub(super) fn next_scene(&mut self) -> io::Result<Option<Stamped>> {
+        match &mut self.kind {
+            Kind::Mcap { reader, waiting } => loop {
+                if let Some(scene) = waiting.pop_front() {
+                    return Ok(Some(scene));
+                }
+                let Some(item) = reader.next_item()? else { return Ok(None) };
+                let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
+                self.bytes_read = reader.bytes_read();
+                let Some(channel) = reader.channel(channel_id) else { continue };
+                let side = match channel.metadata.get("endpoint").map(String::as_str) {
+                    Some("ground") => Side::Ground,
+                    Some("vehicle") => Side::Vehicle,
+                    _ => continue,
+                };
+                if [TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) {
+                    let scenes = frames(&data).into_iter().filter_map(scene);
+                    waiting.extend(scenes.map(|scene| Stamped { side, stamp_ns: log_time_ns, scene }));
+                }
+            },
+            Kind::Tlog { file, damage } => loop {
+                match next_of_tlog(file, &mut self.bytes_read)? {
+                    TlogPiece::End => return Ok(None),
+                    TlogPiece::Unreadable { bytes } => {
+                        *damage = Some(format!("unreadable {bytes} bytes before the end"));
+                        return Ok(None);
+                    }
+                    TlogPiece::Frame { stamp_us, bytes } => {
+                        // Of MAVLink 1 nothing is shown, nor of a frame whose checksum does not hold.
+                        if let Some(scene) = frames(&bytes).pop().and_then(scene) {
+                            let stamp_ns = stamp_us.saturating_mul(1_000);
+                            return Ok(Some(Stamped { side: Side::Ground, stamp_ns, scene }));
+                        }
+                    }
+                }
+            },
+        }
+    }
+}
+
+enum TlogPiece {
+    End,
+    Frame { stamp_us: u64, bytes: Vec<u8> },
+    Unreadable { bytes: u64 },
+}
+
+/// Microseconds since the Unix epoch, big-endian, then a frame.
+fn next_of_tlog(file: &mut impl Read, bytes_read: &mut u64) -> io::Result<TlogPiece> {
+    let mut head = Vec::with_capacity(TLOG_TIME_BYTES + LENGTH_BYTES);
+    file.by_ref().take((TLOG_TIME_BYTES + LENGTH_BYTES) as u64).read_to_end(&mut head)?;
+    if head.is_empty() {
+        return Ok(TlogPiece::End);
+    }
+    let stamp_us = head.first_chunk().map(|stamp| u64::from_be_bytes(*stamp));
+    let mut bytes = head.get(TLOG_TIME_BYTES..).unwrap_or_default().to_vec();
+    let length = frame_length(&bytes).filter(|_| bytes.len() == LENGTH_BYTES);
+    if let Some(length) = length {
+        file.by_ref().take(length.saturating_sub(LENGTH_BYTES) as u64).read_to_end(&mut bytes)?;
+    }
+    if let (Some(stamp_us), true) = (stamp_us, length == Some(bytes.len())) {
+        *bytes_read += (TLOG_TIME_BYTES + bytes.len()) as u64;
+        return Ok(TlogPiece::Frame { stamp_us, bytes });
+    }
+    let read = head.len().min(TLOG_TIME_BYTES) + bytes.len();
+    let rest = io::copy(file, &mut io::sink())?;
+    Ok(TlogPiece::Unreadable { bytes: read as u64 + rest })
+}
+
+fn frames(bytes: &[u8]) -> Vec<Frame> {
+    let mut framer = Framer::new();
+    framer.push_datagram(bytes);
+    std::iter::from_fn(|| framer.next_frame()).collect()
+}
+
+/// What a frame shows: the vehicle's own; the crew's command, for the first time it was sent; or that the ground sent
+/// something.
+fn scene(frame: Frame) -> Option<Scene> {
+    if frame.source() == VEHICLE {
+        return Some(Scene::Heard(frame));
+    }
+    if frame.source() != GROUND {
+        return None;
+    }
+    let sent = Some(Scene::Sent(frame.as_bytes().len()));
+    let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return sent };
+    let kind = match command.command {
+        _ if command.confirmation > 0 => return sent,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 => CommandKind::Arm,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => CommandKind::Disarm,
+        MavCmd::MAV_CMD_MISSION_START => CommandKind::Start,
+        MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => CommandKind::Abort,
+        _ => return sent,
+    };
+    Some(Scene::Commanded(kind))
+}

@@ -1,0 +1,210 @@
+//! New files. A file appears under its name once it is whole, and replaces one that is there only if that is asked for;
+//! the log that is being read is never replaced.
+
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// What to do with a file that is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Overwrite {
+    /// Keep it and fail.
+    #[default]
+    Never,
+    /// Replace it.
+    Always,
+}
+
+impl Overwrite {
+    /// As a flag `--force` says it.
+    pub fn if_forced(force: bool) -> Self {
+        if force { Self::Always } else { Self::Never }
+    }
+}
+
+/// Where a file is to be.
+#[derive(Debug, Clone, Copy)]
+pub struct Destination<'a> {
+    /// Its name.
+    pub path: &'a Path,
+    /// What to do if a file is there.
+    pub overwrite: Overwrite,
+}
+
+impl<'a> From<&'a Path> for Destination<'a> {
+    fn from(path: &'a Path) -> Self {
+        Self { path, overwrite: Overwrite::Never }
+    }
+}
+
+impl<'a> From<&'a PathBuf> for Destination<'a> {
+    fn from(path: &'a PathBuf) -> Self {
+        Self::from(path.as_path())
+    }
+}
+
+/// A file being written, under another name beside its own until it is whole; dropped, it leaves nothing.
+#[derive(Debug)]
+pub struct NewFile {
+    path: PathBuf,
+    overwrite: Overwrite,
+    place: Place,
+}
+
+#[derive(Debug)]
+enum Place {
+    Beside(NamedTempFile),
+    /// A pipe or a device: nothing is there that could be lost.
+    Device(File),
+}
+
+impl NewFile {
+    /// A file to be at a destination; `input` is the file that is read for it.
+    ///
+    /// # Errors
+    /// A file is there and may not be replaced, it is the input, or none can be made in its directory.
+    pub fn create(Destination { path, overwrite }: Destination, input: &Path) -> io::Result<Self> {
+        if same_file(path, input) {
+            let words = "it is the file that is being read, and never overwritten";
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, words));
+        }
+        let place = match std::fs::metadata(path) {
+            Ok(found) if !found.is_file() && !found.is_dir() => {
+                Place::Device(File::options().write(true).open(path)?)
+            }
+            _ => {
+                if overwrite == Overwrite::Never && path.symlink_metadata().is_ok() {
+                    return Err(exists());
+                }
+                Place::Beside(beside(path)?)
+            }
+        };
+        Ok(Self { path: path.to_owned(), overwrite, place })
+    }
+
+    /// The file's own name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The file is whole: it takes its name.
+    ///
+    /// # Errors
+    /// It could not be written to the disk, or a file has appeared there meanwhile that may not be replaced.
+    pub fn commit(self) -> io::Result<()> {
+        let Self { path, overwrite, place } = self;
+        let Place::Beside(file) = place else {
+            return Ok(());
+        };
+        file.as_file().sync_all()?;
+        let persisted = match overwrite {
+            Overwrite::Always => file.persist(&path),
+            Overwrite::Never => file.persist_noclobber(&path),
+        };
+        persisted.map(|_| ()).map_err(|error| match error.error.kind() {
+            io::ErrorKind::AlreadyExists => exists(),
+            _ => error.error,
+        })
+    }
+
+    fn file(&mut self) -> &mut File {
+        match &mut self.place {
+            Place::Beside(file) => file.as_file_mut(),
+            Place::Device(file) => file,
+        }
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file().flush()
+    }
+}
+
+impl Seek for NewFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file().seek(to)
+    }
+}
+
+fn exists() -> io::Error {
+    io::Error::new(io::ErrorKind::AlreadyExists, "it exists already; --force replaces it")
+}
+
+/// By whatever names; a file that is not there is no other.
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+fn beside(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut unfinished = tempfile::Builder::new();
+    unfinished.prefix(".unfinished-");
+    #[cfg(unix)]
+    let unfinished = {
+        use std::os::unix::fs::PermissionsExt as _;
+        // As for any new file: the user's mask decides. Alone, only the owner could read it.
+        unfinished.permissions(std::fs::Permissions::from_mode(0o666))
+    };
+    unfinished.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(path: &Path, text: &str, overwrite: Overwrite) -> io::Result<()> {
+        let mut file = NewFile::create(Destination { path, overwrite }, Path::new("input"))?;
+        file.write_all(text.as_bytes())?;
+        file.commit()
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole_or_not_at_all() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("file");
+        write(&path, "first", Overwrite::Never).unwrap();
+        assert_eq!(
+            write(&path, "second", Overwrite::Never).unwrap_err().kind(),
+            io::ErrorKind::AlreadyExists
+        );
+        let mut half =
+            NewFile::create(Destination { path: &path, overwrite: Overwrite::Always }, Path::new("input"))
+                .unwrap();
+        half.write_all(b"half").unwrap();
+        drop(half);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
+        write(&path, "second", Overwrite::Always).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1, "nothing else is left");
+    }
+
+    /// Somebody else makes the file while it is written.
+    #[test]
+    fn a_file_that_appears_meanwhile_is_kept() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("file");
+        let file = NewFile::create((&path).into(), Path::new("input")).unwrap();
+        std::fs::write(&path, "theirs").unwrap();
+        assert_eq!(file.commit().unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "theirs");
+    }
+
+    #[test]
+    fn the_input_is_never_replaced_by_any_of_its_names() {
+        let directory = tempfile::tempdir().unwrap();
+        let input = directory.path().join("log");
+        std::fs::write(&input, "log").unwrap();
+        let again = directory.path().join(".").join("log");
+        for overwrite in [Overwrite::Never, Overwrite::Always] {
+            let refused = NewFile::create(Destination { path: &again, overwrite }, &input).unwrap_err();
+            assert!(refused.to_string().contains("is being read"), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! A log with a flipped byte: whoever asks is told what was not read, and a build server sees no green pass.
+
+use std::path::{Path, PathBuf};
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
+use crate::simulated::{NOMINAL, WITH_FRAMES};
+use crate::tampered::Held;
+
+/// The log with one byte changed in the middle of a chunk, a quarter of the way in.
+fn flipped(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
+    let mut bytes = std::fs::read(log).unwrap();
+    let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let chunk = &chunks[chunks.len() / 4];
+    bytes[usize::try_from(chunk.chunk_start_offset + chunk.chunk_length / 2).unwrap()] ^= 0xff;
+    let path = directory.path().join("flipped.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// Every element of the XML with its attributes, and that it is well-formed.
+fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String>)> {
+    let mut reader = quick_xml::Reader::from_str(xml);
+    let mut found = Vec::new();
+    loop {
+        match reader.read_event().unwrap() {
+            quick_xml::events::Event::Eof => return found,
+            quick_xml::events::Event::Start(start) | quick_xml::events::Event::Empty(start) => {
+                let attributes = start.attributes().map(|attribute| {
+                    let attribute = attribute.unwrap();
+                    let value = String::from_utf8(attribute.value.to_vec()).unwrap();
+                    (String::from_utf8(attribute.key.as_ref().to_vec()).unwrap(), value)
+                });
+                let name = String::from_utf8(start.name().as_ref().to_vec()).unwrap();
+                found.push((name, attributes.collect()));
+            }
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn a_flipped_byte_is_no_green_pass() {
+    let directory = tempfile::tempdir().unwrap();
+    for log in [&LANDED.log, &NOMINAL.log] {
+        let all = Held::read(log).ticks();
+        let path = flipped(log, &directory);
+        let (code, stdout, _) = run(&mut replay("verify", &path));
+        assert_eq!(code, 0, "{stdout}");
+        let read: usize = stdout.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!(0 < read && read < all / 2, "{stdout}");
+        let unread = format!("{} of {all} ticks were not read", all - read);
+        assert!(stdout.contains(&unread), "{stdout}");
+        let (code, _, _) = run(replay("verify", &path).arg("--strict"));
+        assert_eq!(code, 1);
+
+        let (code, xml, _) = run(replay("verify", &path).arg("--junit"));
+        assert_eq!(code, 1, "{xml}");
+        let elements = elements(&xml);
+        let suite = &elements.iter().find(|(name, _)| name == "testsuite").unwrap().1;
+        assert_eq!((suite["tests"].as_str(), suite["failures"].as_str()), ("1", "1"), "{xml}");
+        let failure = &elements.iter().find(|(name, _)| name == "failure").unwrap().1;
+        assert!(failure["message"].contains(&unread), "{xml}");
+        assert!(xml.contains("unreadable near byte"), "{xml}");
+
+        // Whoever wants the readable part alone says so, and the XML says it too.
+        let (code, xml, _) = run(replay("verify", &path).args(["--junit", "--strict=false"]));
+        assert_eq!(code, 0, "{xml}");
+        assert!(xml.contains("failures=\"0\"") && xml.contains(&unread), "{xml}");
+    }
+}
+
+/// Whatever question reads a damaged log says so.
+#[test]
+fn no_command_is_silent_about_damage() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = flipped(&WITH_FRAMES.log, &directory);
+    let at = |name: &str| directory.path().join(name).display().to_string();
+    let (html, csv, tlog, whole, again) =
+        (at("p.html"), at("csv"), at("f.tlog"), at("whole.mcap"), at("again.mcap"));
+    let questions: [&[&str]; 11] = [
+        &["info"],
+        &["verify"],
+        &["evaluate"],
+        &["refly", "--log", &again],
+        &["tick", "20"],
+        &["sweep", "--vary", "nmpc.weights.w=75,80"],
+        &["bisect", "nmpc.weights.w", "--lowest", "70", "--highest", "80"],
+        &["report", "--output", &html],
+        &["export", "--to", "csv", "--output", &csv],
+        &["export", "--to", "tlog", "--output", &tlog],
+        &["recover", &whole],
+    ];
+    for question in questions {
+        let (_, stdout, stderr) = run(replay(question[0], &path).args(&question[1..]));
+        let told = if question[0] == "recover" { &stdout } else { &stderr };
+        assert!(
+            told.contains("unreadable near byte") || told.contains("lost"),
+            "{question:?}: {stdout}{stderr}"
+        );
+    }
+    let (_, _, stderr) = run(replay("compare", &path).arg(&path));
+    assert!(stderr.contains("unreadable near byte"), "{stderr}");
+}

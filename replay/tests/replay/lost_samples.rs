@@ -1,0 +1,114 @@
+//! Comparisons of flights of which one has lost records: what is missing counts, whichever of the two lost it.
+
+use std::path::PathBuf;
+
+use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_TRUTH_SAMPLE};
+
+use crate::command_line::{replay, run};
+use crate::flown::WHOLE;
+use crate::from_apogee::LANDED;
+use crate::simulated::NOMINAL;
+use crate::tampered::Held;
+
+/// The log with every other tick and two thirds of the truth left out.
+fn thinned(log: &PathBuf, directory: &tempfile::TempDir) -> PathBuf {
+    let mut held = Held::read(log);
+    let (mut ticks, mut truths) = (0, 0);
+    held.keep(|message| match message.topic.as_str() {
+        TOPIC_CONTROLLER_TICK | TOPIC_PILOT_TICK => {
+            ticks += 1;
+            ticks % 2 == 1
+        }
+        TOPIC_PLANT_TRUTH | TOPIC_TRUTH_SAMPLE => {
+            truths += 1;
+            truths % 3 == 1
+        }
+        _ => true,
+    });
+    let path = directory.path().join("thinned.mcap");
+    held.write(&path);
+    path
+}
+
+#[test]
+fn a_flight_that_lost_half_its_ticks_does_not_pass() {
+    let directory = tempfile::tempdir().unwrap();
+    for (log, truth) in [(&NOMINAL.log, "vehicle_truth"), (&LANDED.log, "vehicle_truth3d")] {
+        let (code, stdout, _) = run(replay("compare", log).arg(log));
+        assert_eq!(code, 0, "{stdout}");
+        let thinned = thinned(log, &directory);
+        let (code, stdout, _) = run(replay("compare", log).arg(&thinned));
+        assert_eq!(code, 1, "{stdout}");
+        assert!(stdout.contains(&format!("{truth}: ")) && stdout.contains("samples are missing"), "{stdout}");
+        // The other way round the samples are too many, which is the same loss.
+        let (code, stdout, _) = run(replay("compare", &thinned).arg(log));
+        assert_eq!(code, 1, "{stdout}");
+        assert!(stdout.contains("samples are added"), "{stdout}");
+        let (code, stdout, _) = run(replay("compare", log).arg(&thinned).arg("--junit"));
+        assert!(code == 1 && stdout.contains("samples are missing"), "{stdout}");
+        let (_, stdout, _) = run(replay("compare", log).arg(&thinned).arg("--json"));
+        let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        let signals = found[0]["signals"].as_array().unwrap();
+        let lost = |signal: &serde_json::Value| {
+            let samples = signal["samples_expected"].as_f64().unwrap();
+            signal["samples_missing"].as_f64().unwrap() / samples
+        };
+        let of =
+            |start: &str| signals.iter().find(|signal| signal["signal"].as_str().unwrap().starts_with(start));
+        assert!((lost(of(truth).unwrap()) - 2.0 / 3.0).abs() < 0.02, "{stdout}");
+    }
+}
+
+/// A share of the samples may be missing if the tolerances say so, of all signals or of some.
+#[test]
+fn tolerances_limit_what_may_be_missing() {
+    let directory = tempfile::tempdir().unwrap();
+    let log = &NOMINAL.log;
+    let thinned = thinned(log, &directory);
+    let tolerances = directory.path().join("tolerances.toml");
+    let compared = |text: &str| {
+        std::fs::write(&tolerances, text).unwrap();
+        run(replay("compare", log).arg(&thinned).arg("--tolerances").arg(&tolerances))
+    };
+    let (code, stdout, stderr) = compared("samples_missing = 0.7\n");
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    let (code, stdout, _) = compared("samples_missing = 0.6\n");
+    assert_eq!(code, 1, "{stdout}");
+    assert!(stdout.contains("vehicle_truth") && !stdout.contains("- controller_tick"), "{stdout}");
+    let (code, stdout, _) =
+        compared("samples_missing = 0.6\n[signals.\"vehicle_truth.*\"]\nsamples_missing = 0.7\n");
+    assert_eq!(code, 0, "{stdout}");
+    let (code, _, stderr) = compared("samples_missing = 1.5\n");
+    assert!(code == 2 && stderr.contains("from 0 to 1"), "{stderr}");
+}
+
+/// A signal that one flight has lost altogether.
+#[test]
+fn a_lost_topic_does_not_pass() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut held = Held::read(&NOMINAL.log);
+    held.keep(|message| message.topic != TOPIC_PLANT_TRUTH);
+    let path = directory.path().join("no-truth.mcap");
+    held.write(&path);
+    for (a, b, word) in [(&NOMINAL.log, &path, "missing"), (&path, &NOMINAL.log, "added")] {
+        let (code, stdout, _) = run(replay("compare", a).arg(b));
+        assert_eq!(code, 1, "{stdout}");
+        assert!(stdout.contains(&format!("signals are {word} (tolerated 0)")), "{stdout}");
+    }
+}
+
+/// Two logs with the same damage agree in all that could be read, which is not all there was.
+#[test]
+fn a_damaged_log_does_not_pass_unless_that_is_tolerated() {
+    let directory = tempfile::tempdir().unwrap();
+    let (at, _) = WHOLE.synced[6];
+    let path = directory.path().join("cut.mcap");
+    std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap() + 5]).unwrap();
+    let (code, stdout, _) = run(replay("compare", &path).arg(&path));
+    assert_eq!(code, 1, "{stdout}");
+    assert!(stdout.contains("cut.mcap is damaged: ends after"), "{stdout}");
+    let tolerances = directory.path().join("tolerances.toml");
+    std::fs::write(&tolerances, "damaged = true\n").unwrap();
+    let (code, stdout, _) = run(replay("compare", &path).arg(&path).arg("--tolerances").arg(&tolerances));
+    assert_eq!(code, 0, "{stdout}");
+}

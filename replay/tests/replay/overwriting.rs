@@ -1,0 +1,188 @@
+//! No command overwrites a file that is there, a log least of all, and none leaves half a file under a whole one's name.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::command_line::{Files, replay, run};
+use crate::flown::WHOLE;
+use crate::simulated::{NOMINAL, WITH_FRAMES};
+
+const OTHERS: &[u8] = b"somebody else's bytes";
+
+/// The commands that write a file, with the name of what they write.
+fn writers() -> Vec<(&'static [&'static str], &'static str)> {
+    vec![
+        (&["report", "--output"], "page.html"),
+        (&["export", "--to", "tlog", "--output"], "flight.tlog"),
+        (&["refly", "--log"], "again.mcap"),
+        (&["recover"], "whole.mcap"),
+    ]
+}
+
+/// Every file of a directory and below, by name.
+fn listed(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// A copy of a log in a directory of its own.
+fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("flight.mcap");
+    std::fs::copy(log, &path).unwrap();
+    (directory, path)
+}
+
+#[test]
+fn nothing_that_is_there_is_overwritten_without_force() {
+    for (arguments, name) in writers() {
+        let (directory, log) = copied(&WITH_FRAMES.log);
+        let output = directory.path().join(name);
+        std::fs::write(&output, OTHERS).unwrap();
+        let mut command = replay(arguments[0], &log);
+        let (code, stdout, stderr) = run(command.args(&arguments[1..]).arg(&output));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+        assert!(stderr.contains("exists already") && stderr.contains("--force"), "{arguments:?}: {stderr}");
+        assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
+        let (code, stdout, stderr) = run(command.arg("--force"));
+        assert_eq!(code, 0, "{arguments:?}: {stdout}{stderr}");
+        assert_ne!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
+        let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
+        expected.sort();
+        assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
+    }
+}
+
+/// Not even with --force, by any name that it has.
+#[test]
+fn the_log_that_is_read_is_never_written() {
+    for (arguments, _) in writers() {
+        let (directory, log) = copied(&WITH_FRAMES.log);
+        let before = std::fs::read(&log).unwrap();
+        let linked = directory.path().join("linked.mcap");
+        std::os::unix::fs::symlink(&log, &linked).unwrap();
+        for output in [
+            log.clone(),
+            linked,
+            directory.path().join("../").join(directory.path().file_name().unwrap()).join("flight.mcap"),
+        ] {
+            for force in [None, Some("--force")] {
+                let (code, stdout, stderr) =
+                    run(replay(arguments[0], &log).args(&arguments[1..]).arg(&output).args(force));
+                assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+                assert_eq!(std::fs::read(&log).unwrap(), before, "{arguments:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tables_and_imports_overwrite_nothing_either() {
+    let (directory, log) = copied(&WITH_FRAMES.log);
+    let at = |name: &str| directory.path().join(name);
+    for format in ["csv", "parquet"] {
+        let table = at("tables").join(format!("vehicle_truth.{format}"));
+        std::fs::create_dir_all(at("tables")).unwrap();
+        std::fs::write(&table, OTHERS).unwrap();
+        let before = listed(&at("tables"));
+        let mut command = replay("export", &log);
+        command.args(["--to", format, "--output"]).arg(at("tables"));
+        let (code, _, stderr) = run(&mut command);
+        assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+        assert_eq!(std::fs::read(&table).unwrap(), OTHERS);
+        assert_eq!(listed(&at("tables")), before, "no table stands beside one that was refused");
+        let (code, _, stderr) = run(command.arg("--force"));
+        assert_eq!(code, 0, "{stderr}");
+        assert_ne!(std::fs::read(&table).unwrap(), OTHERS);
+    }
+    let tlog = at("flight.tlog");
+    run(replay("export", &log).args(["--to", "tlog", "--output"]).arg(&tlog));
+    let before = std::fs::read(&log).unwrap();
+    // Its output's name, left out, is that of the flight's own log.
+    let (code, _, stderr) = run(&mut replay("import", &tlog));
+    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    assert_eq!(std::fs::read(&log).unwrap(), before);
+    let (code, _, stderr) = run(replay("import", &tlog).arg(&tlog).arg("--force"));
+    assert!(code == 2 && stderr.contains("is being read"), "{stderr}");
+    let (code, _, stderr) = run(replay("import", &tlog).arg(at("imported.mcap")));
+    assert_eq!(code, 0, "{stderr}");
+}
+
+/// The page of a flight whose name is left out does not replace one that was edited.
+#[test]
+fn a_report_twice_needs_force() {
+    let (_directory, log) = copied(&NOMINAL.log);
+    let (code, ..) = run(&mut replay("report", &log));
+    assert_eq!(code, 0);
+    let (code, _, stderr) = run(&mut replay("report", &log));
+    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    let (code, ..) = run(replay("report", &log).arg("--force"));
+    assert_eq!(code, 0);
+    // A device is no file that could be lost.
+    let (code, stdout, stderr) = run(replay("report", &log).args(["--output", "/dev/stdout"]));
+    assert!(code == 0 && stdout.contains("</html>"), "{stderr}");
+}
+
+/// A command that fails on its way leaves what was there, and nothing half.
+#[test]
+fn what_fails_on_the_way_replaces_nothing() {
+    let files = Files::new();
+    // Cut before its first record.
+    let broken = files.file(&WHOLE.bytes[..8]);
+    let output = files.directory.path().join("output");
+    std::fs::write(&output, OTHERS).unwrap();
+    for (arguments, _) in writers() {
+        if arguments[0] == "recover" {
+            continue;
+        }
+        let (code, _, stderr) =
+            run(replay(arguments[0], &broken).args(&arguments[1..]).arg(&output).arg("--force"));
+        assert_eq!(code, 2, "{arguments:?}: {stderr}");
+        assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
+        assert_eq!(listed(files.directory.path()), ["flight.mcap", "output"], "{arguments:?}");
+    }
+}
+
+/// A disk that is full before the output is whole.
+#[test]
+fn half_an_output_replaces_nothing() {
+    for (arguments, name) in writers() {
+        let (directory, log) = copied(&WITH_FRAMES.log);
+        let output = directory.path().join(name);
+        std::fs::write(&output, OTHERS).unwrap();
+        // Files of a few kilobytes and no more; what is written behind that fails.
+        let mut command = Command::new("sh");
+        command.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_replay")]);
+        command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output).arg("--force");
+        let (code, stdout, stderr) = run(&mut command);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(&format!("{name}: cannot be written")), "{arguments:?}: {stderr}");
+        assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
+        let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
+        expected.sort();
+        assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
+    }
+    let (_directory, log) = copied(&NOMINAL.log);
+    let (code, _, stderr) = run(replay("report", &log).args(["--output", "/dev/full"]));
+    assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
+}
+
+/// Another sweep's state, or any other file, is never continued with.
+#[test]
+fn a_sweeps_state_spares_other_files() {
+    let (directory, log) = copied(&NOMINAL.log);
+    for state in [log.clone(), directory.path().join("notes.txt")] {
+        if state != log {
+            std::fs::write(&state, OTHERS).unwrap();
+        }
+        let before = std::fs::read(&state).unwrap();
+        let (code, _, stderr) =
+            run(replay("sweep", &log).args(["--vary", "nmpc.weights.w=75,80", "--state"]).arg(&state));
+        assert_eq!(code, 2, "{stderr}");
+        assert_eq!(std::fs::read(&state).unwrap(), before);
+    }
+}

@@ -1,0 +1,127 @@
+//! Logs rewritten with some messages left out, changed or taken from another log: whole files whose checksums hold.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use mcap::records::{MessageHeader, Metadata};
+use protocol::log::reader::{LogItem, LogReader};
+use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK};
+
+/// A message of a log, by its topic.
+#[derive(Debug, Clone)]
+pub(crate) struct Kept {
+    pub(crate) topic: String,
+    pub(crate) log_time_ns: u64,
+    pub(crate) sequence: u32,
+    pub(crate) data: Vec<u8>,
+    encoding: String,
+    schema: (String, std::sync::Arc<[u8]>),
+}
+
+impl Kept {
+    /// The same at another time.
+    pub(crate) fn at(&self, log_time_ns: u64) -> Self {
+        Self { log_time_ns, ..self.clone() }
+    }
+
+    /// A tick of the planar controller or a frame of the flight computer.
+    pub(crate) fn is_tick(&self) -> bool {
+        [TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK].contains(&self.topic.as_str())
+    }
+}
+
+/// A log in memory.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Held {
+    library: String,
+    about: Vec<LogItem>,
+    pub(crate) messages: Vec<Kept>,
+}
+
+impl Held {
+    pub(crate) fn read(path: &Path) -> Self {
+        let bytes = std::fs::read(path).unwrap();
+        let mut reader = LogReader::new(bytes.as_slice());
+        let mut held = Self::default();
+        while let Some(item) = reader.next_item().unwrap() {
+            match item {
+                LogItem::Library(library) => held.library = library,
+                LogItem::Message { channel_id, log_time_ns, sequence, data } => {
+                    let channel = reader.channel(channel_id).unwrap();
+                    held.messages.push(Kept {
+                        topic: channel.topic.clone(),
+                        log_time_ns,
+                        sequence,
+                        data,
+                        encoding: channel.message_encoding.clone(),
+                        schema: (channel.schema_name.clone(), channel.schema.clone()),
+                    });
+                }
+                item => held.about.push(item),
+            }
+        }
+        assert_eq!(reader.damage(), None);
+        held
+    }
+
+    /// How many ticks or frames there are.
+    pub(crate) fn ticks(&self) -> usize {
+        self.messages.iter().filter(|message| message.is_tick()).count()
+    }
+
+    /// Leaves out the messages that are not wanted.
+    pub(crate) fn keep(&mut self, wanted: impl FnMut(&Kept) -> bool) {
+        self.messages.retain(wanted);
+    }
+
+    /// Everything of another log behind what is there, that much later.
+    pub(crate) fn append(&mut self, other: &Self, later_ns: u64) {
+        self.about.extend(other.about.iter().cloned());
+        self.messages.extend(other.messages.iter().map(|message| message.at(message.log_time_ns + later_ns)));
+    }
+
+    /// Writes it as a whole log.
+    pub(crate) fn write(&self, path: &Path) {
+        let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
+        let options = mcap::WriteOptions::new().library(&self.library).chunk_size(Some(64 * 1024));
+        let mut writer = options.create(file).unwrap();
+        for item in &self.about {
+            match item {
+                LogItem::Metadata { name, entries } => {
+                    let metadata = Metadata { name: name.clone(), metadata: entries.clone() };
+                    writer.write_metadata(&metadata).unwrap();
+                }
+                LogItem::Attachment { name, data } => {
+                    let attachment = mcap::Attachment {
+                        log_time: 0,
+                        create_time: 0,
+                        name: name.clone(),
+                        media_type: "text/plain".to_owned(),
+                        data: Cow::Borrowed(data),
+                    };
+                    writer.attach(&attachment).unwrap();
+                }
+                _ => {}
+            }
+        }
+        let mut channels: BTreeMap<String, u16> = BTreeMap::new();
+        for message in &self.messages {
+            let id = *channels.entry(message.topic.clone()).or_insert_with(|| {
+                let (name, data) = &message.schema;
+                let encoding = if data.is_empty() { "" } else { "protobuf" };
+                let schema =
+                    if name.is_empty() { 0 } else { writer.add_schema(name, encoding, data).unwrap() };
+                writer.add_channel(schema, &message.topic, &message.encoding, &BTreeMap::new()).unwrap()
+            });
+            let header = MessageHeader {
+                channel_id: id,
+                sequence: message.sequence,
+                log_time: message.log_time_ns,
+                publish_time: message.log_time_ns,
+            };
+            writer.write_to_known_channel(&header, &message.data).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+}

@@ -1,0 +1,226 @@
+//! Verification of logs that look whole and are not, or that hold more than one flight: nothing compared is never
+//! "identical", every flight has a verdict of its own, and a flight without its end is said to be cut.
+
+use std::path::{Path, PathBuf};
+
+use prost::Message as _;
+use protocol::log::flight_v1::PilotTick;
+use protocol::log::record::{TOPIC_PILOT_START, TOPIC_VERDICT};
+use protocol::log::v1::ControllerTick;
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
+use crate::simulated::{DISPERSED, NOMINAL};
+use crate::tampered::{Held, Kept};
+
+/// The same log of a landing from apogee and of a planar one.
+fn logs() -> [&'static Path; 2] {
+    [&LANDED.log, &NOMINAL.log]
+}
+
+fn written(held: &Held, directory: &tempfile::TempDir, name: &str) -> PathBuf {
+    let path = directory.path().join(name);
+    held.write(&path);
+    path
+}
+
+/// Turns a bit of what a tick decided.
+fn tamper(message: &mut Kept) {
+    let turned = |number: f64| f64::from_bits(number.to_bits() ^ 1);
+    if message.topic.starts_with("/pilot") {
+        let mut tick = PilotTick::decode(message.data.as_slice()).unwrap();
+        tick.output.fins_rad[0] = turned(tick.output.fins_rad[0]);
+        message.data = tick.encode_to_vec();
+    } else {
+        let mut tick = ControllerTick::decode(message.data.as_slice()).unwrap();
+        tick.output.gimbal_command_rad = turned(tick.output.gimbal_command_rad);
+        message.data = tick.encode_to_vec();
+    }
+}
+
+fn verify(path: &PathBuf, arguments: &[&str]) -> (i32, String, String) {
+    run(replay("verify", path).args(arguments))
+}
+
+#[test]
+fn a_whole_log_that_was_only_rewritten_is_identical() {
+    let directory = tempfile::tempdir().unwrap();
+    for log in logs() {
+        let held = Held::read(log);
+        let (code, stdout, _) = verify(&written(&held, &directory, "same.mcap"), &["--strict"]);
+        let count = held.ticks();
+        assert_eq!(code, 0, "{stdout}");
+        assert!(stdout.contains(&format!("{count} of {count} ticks identical\n")), "{stdout}");
+    }
+}
+
+/// The start record once more behind all frames, every one of which was changed.
+#[test]
+fn a_start_copied_to_the_end_hides_no_tampered_frame() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut held = Held::read(&LANDED.log);
+    let start = held.messages.iter().find(|message| message.topic == TOPIC_PILOT_START).unwrap().clone();
+    let last_ns = held.messages.last().unwrap().log_time_ns;
+    let honest = {
+        let mut honest = held.clone();
+        honest.messages.push(start.at(last_ns));
+        written(&honest, &directory, "honest.mcap")
+    };
+    held.messages.iter_mut().filter(|message| message.is_tick()).for_each(tamper);
+    held.messages.push(start.at(last_ns));
+    let count = held.ticks();
+    let (code, stdout, _) = verify(&written(&held, &directory, "tampered.mcap"), &[]);
+    assert_eq!(code, 1, "{stdout}");
+    assert!(stdout.contains(&format!("DIVERGED: {count} of {count} ticks differ")), "{stdout}");
+    assert!(!stdout.contains("0 of 0"), "{stdout}");
+
+    // Nothing follows the copy: of that no word "identical" may be said.
+    let (code, stdout, _) = verify(&honest, &[]);
+    assert_eq!(code, 2, "{stdout}");
+    assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} ticks identical")), "{stdout}");
+    assert!(stdout.contains("flight 2 of 2: nothing was compared"), "{stdout}");
+    assert!(!stdout.contains("0 of 0"), "{stdout}");
+    let (_, stdout, _) = verify(&honest, &["--junit"]);
+    assert!(stdout.contains("tests=\"2\"") && stdout.contains("errors=\"1\""), "{stdout}");
+}
+
+/// The start record once more in the middle: what follows begins with no start of its own.
+#[test]
+fn a_start_copied_into_the_middle_is_no_flight() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut held = Held::read(&LANDED.log);
+    let place = held.messages.len() / 2;
+    let start = held.messages.iter().find(|message| message.topic == TOPIC_PILOT_START).unwrap().clone();
+    held.messages.insert(place, start);
+    let (code, stdout, _) = verify(&written(&held, &directory, "middle.mcap"), &[]);
+    assert_eq!(code, 2, "{stdout}");
+    assert!(stdout.contains("flight 1 of 2") && stdout.contains("INCOMPLETE flight: ends at T+"), "{stdout}");
+    assert!(stdout.contains("flight 2 of 2: nothing was compared: it begins with tick"), "{stdout}");
+}
+
+#[test]
+fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
+    let directory = tempfile::tempdir().unwrap();
+    let second = [&LANDED.log, &DISPERSED.log];
+    for (first, second) in logs().into_iter().zip(second) {
+        let (a, mut b) = (Held::read(first), Held::read(second));
+        let (count_a, count_b) = (a.ticks(), b.ticks());
+        let both = |b: &Held, name: &str| {
+            let mut both = a.clone();
+            both.append(b, 100_000_000_000);
+            written(&both, &directory, name)
+        };
+        let path = both(&b, "both.mcap");
+        let (code, stdout, _) = verify(&path, &["--strict"]);
+        // The planar flights are of two profiles, whose attachments stand before both.
+        if first == LANDED.log {
+            assert_eq!(code, 0, "{stdout}");
+            assert!(
+                stdout.contains(&format!("flight 1 of 2: {count_a} of {count_a} ticks identical")),
+                "{stdout}"
+            );
+            assert!(
+                stdout.contains(&format!("flight 2 of 2: {count_b} of {count_b} ticks identical")),
+                "{stdout}"
+            );
+            let (_, stdout, _) = verify(&path, &["--json"]);
+            let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+            assert_eq!(
+                (reports[0]["flight"]["number"].as_u64(), reports[1]["flight"]["of"].as_u64()),
+                (Some(1), Some(2))
+            );
+        }
+        assert!(stdout.contains("flight 2 of 2"), "{stdout}");
+        b.messages.iter_mut().filter(|message| message.is_tick()).skip(30).take(1).for_each(tamper);
+        let (code, stdout, _) = verify(&both(&b, "tampered.mcap"), &[]);
+        assert_eq!(code, 1, "{stdout}");
+        assert!(stdout.contains("flight 2 of 2: DIVERGED"), "{stdout}");
+    }
+}
+
+/// Of the same profile, so that either controller is the right one.
+#[test]
+fn a_planar_flight_twice_in_one_file_is_verified_twice() {
+    let directory = tempfile::tempdir().unwrap();
+    let a = Held::read(&NOMINAL.log);
+    let mut both = a.clone();
+    both.append(&a, 100_000_000_000);
+    let (code, stdout, _) = verify(&written(&both, &directory, "both.mcap"), &["--strict"]);
+    let count = a.ticks();
+    assert_eq!(code, 0, "{stdout}");
+    for flight in ["flight 1 of 2", "flight 2 of 2"] {
+        assert!(stdout.contains(&format!("{flight}: {count} of {count} ticks identical\n")), "{stdout}");
+    }
+}
+
+/// Questions that take a log for one flight refuse two, and do not answer about a mixture.
+#[test]
+fn who_asks_about_one_flight_is_not_given_two() {
+    let directory = tempfile::tempdir().unwrap();
+    for log in logs() {
+        let a = Held::read(log);
+        let mut both = a.clone();
+        both.append(&a, 100_000_000_000);
+        let path = written(&both, &directory, "both.mcap");
+        for arguments in [&["evaluate"][..], &["refly"], &["tick", "1"], &["report", "--output", "-"]] {
+            let (code, stdout, stderr) = run(replay(arguments[0], &path).args(&arguments[1..]));
+            assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+            assert!(stderr.contains("holds 2 flights"), "{arguments:?}: {stderr}");
+        }
+        let (code, _, stderr) = run(replay("compare", &path).arg(&path));
+        assert!(code == 2 && stderr.contains("holds 2 flights"), "{stderr}");
+        let (code, stdout, _) = run(&mut replay("info", &path));
+        assert!(code == 0 && stdout.contains("flights     2"), "{stdout}");
+    }
+}
+
+/// A log rewritten without its last frames: with and without the verdict behind them.
+#[test]
+fn a_log_without_its_last_ticks_is_not_complete() {
+    let directory = tempfile::tempdir().unwrap();
+    for (log, lost) in logs().into_iter().zip([500, 30]) {
+        let whole = Held::read(log);
+        let kept = whole.ticks() - lost;
+        let last_ns =
+            whole.messages.iter().filter(|message| message.is_tick()).nth(kept).unwrap().log_time_ns;
+        let mut ticks_only = whole.clone();
+        let mut seen = 0;
+        ticks_only.keep(|message| {
+            seen += usize::from(message.is_tick());
+            !message.is_tick() || seen <= kept
+        });
+        let mut everything = whole.clone();
+        everything.keep(|message| message.log_time_ns < last_ns);
+        let mut no_verdict = whole.clone();
+        no_verdict.keep(|message| message.topic != TOPIC_VERDICT);
+        for (held, name) in [(ticks_only, "ticks"), (everything, "all"), (no_verdict, "verdict")] {
+            let path = written(&held, &directory, &format!("{name}.mcap"));
+            let count = held.ticks();
+            let (code, stdout, _) = verify(&path, &[]);
+            assert_eq!(code, 0, "{name}: {stdout}");
+            assert!(
+                stdout.contains(&format!(
+                    "{count} of {count} ticks identical of an INCOMPLETE flight: ends at T+"
+                )),
+                "{name}: {stdout}"
+            );
+            assert!(name == "verdict" || stdout.contains(" in POWERED"), "{name}: {stdout}");
+            let (code, stdout, _) = verify(&path, &["--strict"]);
+            assert_eq!(code, 1, "{name}: {stdout}");
+            let (code, stdout, _) = verify(&path, &["--junit"]);
+            assert_eq!(code, 1, "{name}: {stdout}");
+            assert!(
+                stdout.contains("failures=\"1\"") && stdout.contains("INCOMPLETE flight: ends at T+"),
+                "{name}: {stdout}"
+            );
+            let (code, stdout, _) = verify(&path, &["--json"]);
+            let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+            assert_eq!((code, report["outcome"].as_str()), (0, Some("identical-readable-part")), "{name}");
+            assert!(report["cut"]["time_s"].is_number(), "{name}: {stdout}");
+            let (_, stdout, _) = run(&mut replay("info", &path));
+            assert!(stdout.contains("complete    NO: the flight ends at T+"), "{name}: {stdout}");
+            let (_, stdout, _) = run(replay("report", &path).args(["--output", "-"]));
+            assert!(stdout.contains("ends at T+"), "{name}");
+        }
+    }
+}
