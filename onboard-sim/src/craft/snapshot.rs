@@ -2,6 +2,7 @@
 //!
 //! Everything is what the flight computer believes, which in the planar craft is the truth.
 
+use crate::site::Site;
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
 use flight::nmpc::SolveStatus;
@@ -83,6 +84,10 @@ pub struct Snapshot {
     pub estimator: Option<EstimatorFacts>,
     /// What the sensors said last; `None` where none are modelled.
     pub sensors: Option<SensorFacts>,
+    /// Where on the Earth the pad is.
+    pub site: Site,
+    /// Altitude of the pad above the sea, m.
+    pub pad_altitude_m: f64,
 }
 
 /// Position, velocity, attitude and rotation, north-east-down. Body axes: x towards the nose.

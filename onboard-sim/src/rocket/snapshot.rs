@@ -68,6 +68,8 @@ impl Rocket {
             descent: None,
             estimator: None,
             sensors: self.watch.facts(self.frame),
+            site: crate::site::Site::default(),
+            pad_altitude_m: self.flight.order.mission.pad_altitude_m,
         }
     }
 
