@@ -28,7 +28,6 @@ pub mod pilot_log;
 pub mod plant;
 pub mod rocket;
 pub mod scatter;
-pub mod site;
 pub mod solve_times;
 pub mod streams;
 pub mod telemetry;

@@ -2,12 +2,12 @@
 //!
 //! Everything is what the flight computer believes, which in the planar craft is the truth.
 
-use crate::site::Site;
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
 use flight::nmpc::SolveStatus;
 use flight::phase::{Interlocks, Phase};
 use flight::rigid::RigidState;
+use flight::site::Site;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 

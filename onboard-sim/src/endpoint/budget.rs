@@ -1,4 +1,4 @@
-//! How much a link carried in the last second, and what it has room for.
+//! How much a link carried just now, and what it has room for.
 
 use std::collections::VecDeque;
 
@@ -6,30 +6,45 @@ use std::collections::VecDeque;
 /// no second on the wire carries more.
 pub(crate) const WINDOW_S: f64 = 1.02;
 
-/// The bytes of the last second.
+/// In a fifth of a second telemetry may take a fifth of the budget and a tenth of that, answers and texts a sixth of it: after
+/// a burst the whole budget would be spent, and even what the crew lives by would wait.
+pub(super) const BRIEFLY_S: f64 = 0.2;
+
+/// That share for telemetry, bytes.
+pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
+    capacity_bytes_s as usize * 22 / 100
+}
+
+/// That share for answers and texts, bytes.
+pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
+    capacity_bytes_s as usize / 6
+}
+
+/// The bytes of the time just past.
 #[derive(Debug, Clone)]
 pub(super) struct Window {
+    span_s: f64,
     limit: usize,
     sent: VecDeque<(f64, usize)>,
     bytes: usize,
 }
 
 impl Window {
-    /// For this many bytes in any one second.
-    pub(super) fn of(limit: usize) -> Self {
-        Self { limit, sent: VecDeque::new(), bytes: 0 }
+    /// Of this length; it has no room until it is given a limit.
+    pub(super) fn of(span_s: f64) -> Self {
+        Self { span_s, limit: 0, sent: VecDeque::new(), bytes: 0 }
     }
 
-    /// The same history under another limit.
+    /// So many bytes at most in any such time, from now on.
     pub(super) fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 
-    /// What was sent a second ago no longer counts.
+    /// What was sent longer ago no longer counts.
     pub(super) fn move_to(&mut self, now_s: f64) {
         // Times are multiples of a frame; rounding must not keep one of them for a frame more.
         while let Some((sent_s, bytes)) = self.sent.front()
-            && now_s - sent_s >= WINDOW_S - 1e-9
+            && now_s - sent_s >= self.span_s - 1e-9
         {
             self.bytes -= bytes;
             self.sent.pop_front();
@@ -54,7 +69,9 @@ mod tests {
 
     #[test]
     fn what_was_sent_counts_for_a_second_and_no_longer() {
-        let mut window = Window::of(100);
+        let mut window = Window::of(WINDOW_S);
+        assert_eq!(window.room(), 0);
+        window.set_limit(100);
         window.take(60, 0.0);
         window.take(40, 0.5);
         window.move_to(1.0);

@@ -9,10 +9,10 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 
-use super::budget::Window;
+use super::budget::{BRIEFLY_S, WINDOW_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::craft::{Craft, Snapshot};
-use crate::streams::{Streams, kept_free_bytes, share_bytes_s};
+use crate::streams::{Due, Streams, kept_free_bytes, share_bytes_s};
 use crate::{parameters, telemetry};
 
 /// Answers and texts that may wait, each; what comes beyond is dropped, and whoever wants an answer asks again.
@@ -41,6 +41,10 @@ pub(super) struct Lane {
     encoder: Encoder,
     signature_len: usize,
     sent: Window,
+    /// Of that, telemetry of the last moment.
+    telemetry_briefly: Window,
+    /// Of that, answers and texts of the last moment.
+    answers_briefly: Window,
     /// Of that, answers.
     answered: Window,
     /// Of that, texts.
@@ -63,9 +67,11 @@ impl Lane {
             streams,
             encoder,
             signature_len,
-            sent: Window::of(0),
-            answered: Window::of(0),
-            said: Window::of(0),
+            sent: Window::of(WINDOW_S),
+            telemetry_briefly: Window::of(BRIEFLY_S),
+            answers_briefly: Window::of(BRIEFLY_S),
+            answered: Window::of(WINDOW_S),
+            said: Window::of(WINDOW_S),
             aborts: VecDeque::new(),
             abort_answered_s: f64::NEG_INFINITY,
             texts: VecDeque::new(),
@@ -81,6 +87,8 @@ impl Lane {
     pub(super) fn set_capacity(&mut self, capacity_bytes_s: u32) {
         self.streams.set_capacity(capacity_bytes_s);
         self.sent.set_limit(capacity_bytes_s as usize);
+        self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
+        self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
         self.answered.set_limit(share_bytes_s(capacity_bytes_s));
         self.said.set_limit(share_bytes_s(capacity_bytes_s));
     }
@@ -135,11 +143,18 @@ impl Lane {
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
         self.sent.move_to(now_s);
+        self.telemetry_briefly.move_to(now_s);
+        self.answers_briefly.move_to(now_s);
         self.answered.move_to(now_s);
         self.said.move_to(now_s);
         let mut frames = Vec::new();
         let due = self.streams.due(now_s);
-        self.send_due(due.iter().filter(|due| due.vital), 0, context, vehicle, snapshot, &mut frames);
+        for due in due.iter().filter(|due| due.vital) {
+            if due.frame_len > self.sent.room() {
+                break;
+            }
+            self.send(due, context, vehicle, snapshot, &mut frames);
+        }
         if now_s - self.abort_answered_s >= ABORT_ANSWERED_S
             && let Some(answer) = self.aborts.front().copied()
             && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
@@ -148,35 +163,35 @@ impl Lane {
             self.abort_answered_s = now_s;
             self.aborts.pop_front();
         }
-        // Kept free for what the crew lives by: that never waits for something else.
-        let kept_free = kept_free_bytes(self.signature_len);
         while let Some(answer) = self.answers.front().cloned() {
-            let room = self.sent.room().saturating_sub(kept_free).min(self.answered.room());
+            let room = self.room_for_answers().min(self.answered.room());
             let Some(frame) = self.encode(&answer, room) else { break };
             self.answered.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
             self.put(frame, now_s, &mut frames);
             self.answers.pop_front();
         }
         while let Some(chunk) = self.texts.front().cloned() {
-            let room = self.sent.room().saturating_sub(kept_free).min(self.said.room());
+            let room = self.room_for_answers().min(self.said.room());
             let Some(frame) = self.encode(&chunk, room) else { break };
             self.said.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
             self.put(frame, now_s, &mut frames);
             self.texts.pop_front();
         }
-        self.send_due(
-            due.iter().filter(|due| !due.vital),
-            kept_free,
-            context,
-            vehicle,
-            snapshot,
-            &mut frames,
-        );
+        for due in due.iter().filter(|due| !due.vital) {
+            // By its longest, so that nothing is put together in vain. What is less important does not overtake it.
+            if due.frame_len > self.room_for_telemetry() {
+                break;
+            }
+            self.send(due, context, vehicle, snapshot, &mut frames);
+        }
         let longest = self.streams.longest_frame_len();
         while let Some(message) = self.next_requested(vehicle) {
             // Also free for telemetry that falls due in the meantime: it is not to wait for this.
-            let room = self.sent.room().saturating_sub(kept_free + longest);
+            let room = self.room_for_telemetry().saturating_sub(longest);
             let Some(frame) = self.encode(&message.into(), room) else { break };
+            self.telemetry_briefly.take(self.len_of(&frame), now_s);
             self.put(frame, now_s, &mut frames);
             if self.requested.pop_front().is_none() {
                 self.next_parameter = self.next_parameter.map(|place| place + 1);
@@ -185,29 +200,35 @@ impl Lane {
         frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
     }
 
-    /// Sends these, in their order, up to the first that finds no room.
-    fn send_due<'a>(
+    /// Room for what the crew does not live by: for that some is kept free, so that it never waits for anything else.
+    fn room(&self) -> usize {
+        self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
+    }
+
+    fn room_for_answers(&self) -> usize {
+        self.room().min(self.answers_briefly.room())
+    }
+
+    fn room_for_telemetry(&self) -> usize {
+        self.room().min(self.telemetry_briefly.room())
+    }
+
+    fn send(
         &mut self,
-        due: impl Iterator<Item = &'a crate::streams::Due>,
-        kept_free: usize,
+        due: &Due,
         context: &Context,
         vehicle: &dyn Craft,
         snapshot: &mut Option<Snapshot>,
         frames: &mut Vec<Frame>,
     ) {
-        for due in due {
-            // By its longest, so that nothing is put together in vain.
-            if due.frame_len > self.sent.room().saturating_sub(kept_free) {
-                return;
-            }
-            // In most frames nothing is due, and the state is not put together for nothing.
-            let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
-            if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
-                let frame = self.encoder.encode(&message);
-                self.put(frame, context.now_s, frames);
-            }
-            self.streams.on_sent(due.message_id, context.now_s);
+        // In most frames nothing is due, and the state is not put together for nothing.
+        let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
+        if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
+            let frame = self.encoder.encode(&message);
+            self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
+            self.put(frame, context.now_s, frames);
         }
+        self.streams.on_sent(due.message_id, context.now_s);
     }
 
     /// What was asked for and is to be sent next: single messages first, then the list of parameters.

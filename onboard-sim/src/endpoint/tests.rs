@@ -58,7 +58,7 @@ impl Bench {
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
         let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
         self.endpoint.on_frame(0, &frame, &mut self.vehicle);
-        let sent = self.run(0.1);
+        let sent = self.run(0.5);
         let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
         assert_eq!(answers.len(), 1, "one answer to one command");
         assert_eq!((answers[0].command, answers[0].target), (command, GROUND));
@@ -133,6 +133,8 @@ fn a_refusal_is_answered_and_explained_in_words() {
         assert_eq!(result, MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8);
         assert_eq!(words.contains("arm refused: log"), said, "{words}");
     }
+    // Texts have a share of each second.
+    bench.run(1.0);
     let (result, words) = bench.ask(400, 2.0, 0.0);
     assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
     assert!(words.contains("param1 = 2"), "{words}");
@@ -188,7 +190,7 @@ fn intervals_can_be_set_within_the_budget_and_read_back() {
         },
         &mut bench.vehicle,
     );
-    let interval = bench.run(0.1).iter().find_map(|frame| match frame.decode() {
+    let interval = bench.run(0.5).iter().find_map(|frame| match frame.decode() {
         Ok(MavMessage::MESSAGE_INTERVAL(interval)) => Some(interval.interval_us),
         _ => None,
     });

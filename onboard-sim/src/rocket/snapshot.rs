@@ -68,7 +68,7 @@ impl Rocket {
             descent: None,
             estimator: None,
             sensors: self.watch.facts(self.frame),
-            site: crate::site::Site::default(),
+            site: self.flight.order.mission.site,
             pad_altitude_m: self.flight.order.mission.pad_altitude_m,
         }
     }

@@ -62,7 +62,7 @@ impl Vehicle {
             descent: None,
             estimator: None,
             sensors: None,
-            site: crate::site::Site::default(),
+            site: self.profile.site,
             // Its air has one density: it says no altitude.
             pad_altitude_m: 0.0,
         }

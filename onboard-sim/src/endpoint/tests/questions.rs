@@ -37,7 +37,7 @@ impl Bench {
             param_id: name(id),
             param_type,
         }));
-        let sent = self.run(0.1);
+        let sent = self.run(0.5);
         (values(&sent), texts(&sent).join("; "))
     }
 

@@ -1,11 +1,14 @@
 //! Where on the Earth the pad is: for maps, and for nothing that decides.
 
+use serde::Deserialize;
+
 /// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
 const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
 /// Where on the Earth a pad is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Site {
     /// Latitude, degrees, north positive, -85 to 85: closer to a pole east and west lead around it.
     pub latitude_deg: f64,
@@ -22,7 +25,7 @@ impl Default for Site {
 
 impl Site {
     /// The range of each key and the value found there, if that is outside it.
-    pub fn bad_value(&self) -> Option<(&'static str, f64, &'static str)> {
+    pub(crate) fn bad_value(&self) -> Option<(&'static str, f64, &'static str)> {
         let Self { latitude_deg, longitude_deg } = *self;
         [
             ("site.latitude_deg", latitude_deg, 85.0, "-85 to 85"),
