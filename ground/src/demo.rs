@@ -7,7 +7,7 @@ use std::io;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use onboard_sim::fly::{self, FlyOptions, LoadedFlight};
+use onboard_sim::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
 use onboard_sim::vehicle::DeadlinePolicy;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
@@ -68,6 +68,7 @@ impl Demo {
             links: vec![link],
             key_file: None,
             recorder,
+            on_the_wire: OnTheWire::drawn(),
             seed: options.seed,
             speed: options.speed,
             auto_start: false,

@@ -1,11 +1,14 @@
 //! MAVLink commands to requests of the vehicle.
 //!
 //! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly: an arm that is
-//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock.
+//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock. A forced *disarm* is what other
+//! ground stations call an emergency stop: it always stops what can still be stopped.
 
 use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
-use protocol::dialect::{AUTOPILOT_VERSION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult};
+use protocol::dialect::{
+    AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
+};
 
 use crate::craft::{Answer, Request, Result};
 
@@ -14,6 +17,8 @@ use crate::craft::{Answer, Request, Result};
 pub enum Command {
     /// Something for the vehicle to decide.
     Vehicle(Request),
+    /// Disarm, whatever the vehicle does: on the ground a disarm, in the air an abort.
+    ForcedDisarm,
     /// MAV_CMD_SET_MESSAGE_INTERVAL: message id, interval in microseconds (-1 off, 0 default).
     SetInterval {
         /// Message.
@@ -47,9 +52,11 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
     let [param1, param2, ..] = request.params;
     let unfit = |result, reason: String| Err(Unfit { result, reason: Some(reason) });
     if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
-        // The force codes of parameter 2 (21196, 2989) change nothing: every check counts.
+        // A force code changes nothing about an arm: every check counts.
         if param1.to_bits() == 1.0f32.to_bits() {
             Ok(Command::Vehicle(Request::Arm))
+        } else if param1 == 0.0 && FORCE_CODES.contains(&param2) {
+            Ok(Command::ForcedDisarm)
         } else if param1 == 0.0 {
             Ok(Command::Vehicle(Request::Disarm))
         } else {
@@ -83,11 +90,15 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
     }
 }
 
+/// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl, MAVSDK) and
+/// ArduPilot's (Mission Planner, MAVProxy).
+const FORCE_CODES: [f32; 2] = [21196.0, 2989.0];
 /// MAV_CMD_GET_MESSAGE_INTERVAL, the predecessor of a request for MESSAGE_INTERVAL.
 const GET_MESSAGE_INTERVAL: u16 = 510;
 /// Requests for one message each, from before MAV_CMD_REQUEST_MESSAGE; clients in use still send them:
-/// MAV_CMD_REQUEST_PROTOCOL_VERSION and MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES.
-const LEGACY_REQUESTS: [(u16, u32); 2] = [(519, 300), (520, AUTOPILOT_VERSION_DATA::ID)];
+/// MAV_CMD_GET_HOME_POSITION, MAV_CMD_REQUEST_PROTOCOL_VERSION and MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES.
+const LEGACY_REQUESTS: [(u16, u32); 3] =
+    [(410, HOME_POSITION_DATA::ID), (519, 300), (520, AUTOPILOT_VERSION_DATA::ID)];
 
 /// The MAV_RESULT of a vehicle's answer.
 pub fn mav_result(answer: &Answer) -> MavResult {
@@ -145,6 +156,16 @@ mod tests {
     }
 
     #[test]
+    fn a_disarm_is_forced_by_these_codes_and_by_nothing_else() {
+        for code in [21196.0, 2989.0] {
+            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::ForcedDisarm));
+        }
+        for code in [0.0, 1.0, 21195.0, 2989.5, f32::NAN, f32::INFINITY] {
+            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::Vehicle(Request::Disarm)), "{code}");
+        }
+    }
+
+    #[test]
     fn termination_needs_more_than_half() {
         assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(Request::Abort)));
         for param1 in [0.0, 0.5, f32::NAN, -1.0] {
@@ -166,7 +187,8 @@ mod tests {
 
     #[test]
     fn older_ways_to_ask_for_a_message_are_understood() {
-        for (number, param1, message_id, of) in [(519, 1.0, 300, 0), (520, 1.0, 148, 0), (510, 30.0, 244, 30)]
+        for (number, param1, message_id, of) in
+            [(410, 0.0, 242, 0), (519, 1.0, 300, 0), (520, 1.0, 148, 0), (510, 30.0, 244, 30)]
         {
             assert_eq!(
                 parse(&command(number, param1, f32::NAN)),

@@ -1,12 +1,17 @@
 //! The vehicle's end of MAVLink, without sockets: frames in, frames out.
 //!
-//! Telemetry is scheduled within a radio's budget; answers and texts go first and count against it.
+//! In every second each link carries its budget at most, whatever is asked: what the crew lives by goes first, then
+//! answers and texts within shares of their own, then telemetry, then what was asked for.
 
+mod budget;
+mod lane;
+mod lists;
 mod questions;
+mod refusals;
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 
-use flight::phase::Phase;
+use flight::phase::{Interlocks, Mode, Phase};
 use mavlink::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
@@ -20,39 +25,70 @@ use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
 
+pub(crate) use self::budget::WINDOW_S;
+use self::lane::{Answer, Lane};
+use self::refusals::{Refusals, Warnings};
 use crate::commands::{self, Command};
-use crate::craft::{Craft, Severity, VehicleEvent};
+use crate::craft::{Craft, Request, Severity, VehicleEvent};
 use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
 
-/// Unsent telemetry may save up this much of the budget for a burst.
-const BURST_BYTES: f64 = 400.0;
-
 /// Requested messages that may wait; more are refused for the time being.
 const MAX_REQUESTED: usize = 32;
-/// Commands that were not believed are spoken of this often at most.
-const REJECTED_SAID_EVERY_S: f64 = 5.0;
 /// Sources that are greeted; a forged flood of ids cannot grow memory.
 const MAX_KNOWN: usize = 16;
+/// After an abort the heartbeat is sent this often, s, for this long, s: through bad air, too, the crew soon sees that
+/// it is latched.
+const ABORTED_BEAT_S: f64 = 0.2;
+const ABORTED_BEATS_FOR_S: f64 = 3.0;
+
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
-    encoder: Encoder,
-    /// What a signature adds to every frame, bytes; 0 without a key.
-    signature_len: usize,
-    streams: Streams,
-    /// Answers and texts that wait to be sent.
-    urgent: Vec<Frame>,
-    /// Messages that were asked for; they wait for room in the budget.
-    requested: VecDeque<MavMessage>,
-    /// The next parameter of a list that was asked for; none when the list has been sent.
-    next_parameter: Option<u16>,
+    boot_number: u32,
+    lanes: Vec<Lane>,
+    /// What each link carries at most, bytes per second.
+    capacities_bytes_s: Vec<u32>,
     text_id: u16,
-    credit_bytes: f64,
-    last_poll_s: f64,
+    now_s: f64,
     warned_of_twin: bool,
-    say_rejected_after_s: f64,
-    /// Whoever has sent anything yet; a newcomer is told the limits at once.
+    /// Whoever has sent anything yet; a newcomer is told what stands still at once.
     known: BTreeSet<Address>,
+    /// The station that armed; nobody else sets rates until it is disarmed.
+    armed_by: Option<Address>,
+    refusals: Refusals,
+    warnings: Warnings,
+    told: Option<Told>,
+    aborted_at_s: Option<f64>,
+}
+
+/// A frame that leaves, and the links that carry it.
+#[derive(Debug, Clone)]
+pub struct Outgoing {
+    /// The frame.
+    pub frame: Frame,
+    /// The links, by their numbers.
+    pub links: Vec<usize>,
+}
+
+/// What every message of one instant shares.
+struct Context {
+    now_s: f64,
+    boot_number: u32,
+}
+
+/// What the crew learns at once when it changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Told {
+    phase: Phase,
+    interlocks: Interlocks,
+    counting_down: bool,
+}
+
+impl From<&Mode> for Told {
+    fn from(mode: &Mode) -> Self {
+        let Mode { phase, interlocks, countdown_end_s, .. } = *mode;
+        Self { phase, interlocks, counting_down: countdown_end_s.is_some() }
+    }
 }
 
 impl Default for VehicleEndpoint {
@@ -67,32 +103,54 @@ impl VehicleEndpoint {
         Self::sending(&STANDARD)
     }
 
-    /// With these messages at their default rates.
+    /// With these messages at their default rates, over one link with a radio's budget.
     pub fn sending(standard: &'static [Standard]) -> Self {
-        Self {
-            encoder: Encoder::new(VEHICLE),
-            signature_len: 0,
-            streams: Streams::of(standard),
-            urgent: Vec::new(),
-            requested: VecDeque::new(),
-            next_parameter: None,
-            text_id: 0,
-            credit_bytes: BURST_BYTES,
-            last_poll_s: 0.0,
-            warned_of_twin: false,
-            say_rejected_after_s: 0.0,
-            known: BTreeSet::new(),
-        }
+        Self::over(Streams::of(standard), 0)
     }
 
     /// The same where every frame will be signed, and is longer for it.
     pub fn sending_signed(standard: &'static [Standard]) -> Self {
-        let streams = Streams::signed(standard);
-        Self { signature_len: SIGNATURE_LEN, streams, ..Self::sending(standard) }
+        Self::over(Streams::signed(standard), SIGNATURE_LEN)
+    }
+
+    fn over(streams: Streams, signature_len: usize) -> Self {
+        Self {
+            boot_number: 0,
+            lanes: vec![Lane::new(vec![0], streams, Encoder::new(VEHICLE), signature_len)],
+            capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
+            text_id: 0,
+            now_s: 0.0,
+            warned_of_twin: false,
+            known: BTreeSet::new(),
+            armed_by: None,
+            refusals: Refusals::default(),
+            warnings: Warnings::default(),
+            told: None,
+            aborted_at_s: None,
+        }
+    }
+
+    /// With this boot number, which nothing but another power-up changes.
+    #[must_use]
+    pub fn booted(self, boot_number: u32) -> Self {
+        Self { boot_number, ..self }
+    }
+
+    /// Over links that carry so many bytes per second each. They carry the same, as much as the slowest takes, until one
+    /// of them is asked for more.
+    #[must_use]
+    pub fn over_links(mut self, capacities_bytes_s: &[u32]) -> Self {
+        self.capacities_bytes_s = capacities_bytes_s.to_vec();
+        let slowest_bytes_s = capacities_bytes_s.iter().copied().min().unwrap_or(RADIO_BUDGET_BYTES_S);
+        for lane in &mut self.lanes {
+            lane.links = (0..capacities_bytes_s.len()).collect();
+            lane.set_capacity(slowest_bytes_s);
+        }
+        self
     }
 
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
-    pub fn on_frame(&mut self, frame: &Frame, vehicle: &mut dyn Craft) {
+    pub fn on_frame(&mut self, link: usize, frame: &Frame, vehicle: &mut dyn Craft) {
         if frame.source() == VEHICLE {
             if !self.warned_of_twin {
                 self.warned_of_twin = true;
@@ -101,15 +159,17 @@ impl VehicleEndpoint {
             return;
         }
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
-            self.streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
+            let streams = &mut self.lane(link).streams;
+            streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
+            streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if VEHICLE.accepts(request.target) {
-                self.on_command(&request, vehicle);
+                self.on_command(link, &request, vehicle);
             }
             return;
         }
-        if self.on_question(frame, vehicle) {
+        if self.on_question(link, frame, vehicle) {
             return;
         }
         match frame.decode() {
@@ -122,11 +182,11 @@ impl VehicleEndpoint {
                     target_system: frame.source().system_id,
                     target_component: frame.source().component_id,
                 };
-                self.answer(&MavMessage::TIMESYNC(answer));
+                self.lane(link).answer(MavMessage::TIMESYNC(answer).into());
             }
             Ok(message) => {
                 if let Some(pong) = pong(&message, frame.source()) {
-                    self.answer(&pong);
+                    self.lane(link).answer(pong.into());
                 }
             }
             // Nothing we know: no answer is better than a guess.
@@ -134,17 +194,13 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Says that a command was not believed; now and then, because a flood of them must not fill the radio. It is not
-    /// acknowledged: a forger could have the true ground's own command answered by it.
+    /// Says that a command was not believed. It is not acknowledged: a forger could have the true ground's own command
+    /// answered by it.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
         let Some(request) = CommandRequest::from_frame(frame).filter(|asked| VEHICLE.accepts(asked.target))
         else {
             return;
         };
-        if self.last_poll_s < self.say_rejected_after_s {
-            return;
-        }
-        self.say_rejected_after_s = self.last_poll_s + REJECTED_SAID_EVERY_S;
         let Address { system_id, component_id } = request.source;
         let words = format!("command {} from {system_id}/{component_id} refused: {why}", request.command);
         self.say(Severity::Warning, &words);
@@ -154,76 +210,142 @@ impl VehicleEndpoint {
     pub fn on_event(&mut self, event: &VehicleEvent) {
         match event {
             VehicleEvent::Text { severity, text } => self.say(*severity, text),
-            VehicleEvent::PhaseChanged { .. } => {
-                // The crew learns of a new phase at once, by the two messages that carry it.
-                self.streams.hurry(HEARTBEAT_DATA::ID);
-                self.streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
-            }
-            VehicleEvent::Verdict { .. } => self.streams.hurry(TD_LANDING_VERDICT_DATA::ID),
-            VehicleEvent::Tick(_) | VehicleEvent::Planned { .. } => {}
+            VehicleEvent::Verdict { .. } => self.hurry(TD_LANDING_VERDICT_DATA::ID),
+            // A new phase is seen by `poll`, like every other change of the vehicle's mode.
+            VehicleEvent::PhaseChanged { .. } | VehicleEvent::Tick(_) | VehicleEvent::Planned { .. } => {}
         }
     }
 
     /// What is to be sent now.
-    pub fn poll(&mut self, vehicle: &dyn Craft) -> Vec<Frame> {
-        let now_s = vehicle.time_s();
-        // In most frames nothing is due, and the state is not put together for nothing.
+    pub fn poll(&mut self, vehicle: &dyn Craft) -> Vec<Outgoing> {
+        self.now_s = vehicle.time_s();
+        self.watch(vehicle.mode());
+        for words in self.warnings.counted(self.now_s) {
+            self.say_aloud(Severity::Warning, &words);
+        }
+        let context = Context { now_s: self.now_s, boot_number: self.boot_number };
         let mut snapshot = None;
-        let earned = f64::from(RADIO_BUDGET_BYTES_S) * (now_s - self.last_poll_s).max(0.0);
-        self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
-        self.last_poll_s = now_s;
-        let mut frames = std::mem::take(&mut self.urgent);
-        for message_id in self.streams.due(now_s) {
-            let pending = self.bytes_of(&frames);
-            // The heartbeat is what the ground believes us alive by: it is never held back.
-            if self.credit_bytes < pending as f64 && message_id != HEARTBEAT_DATA::ID {
-                continue;
-            }
-            let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
-            if let Some(message) = telemetry::message(message_id, snapshot) {
-                frames.push(self.encoder.encode(&message));
-            }
-            self.streams.on_sent(message_id, now_s);
-        }
-        let mut sent = self.bytes_of(&frames);
-        // What was asked for comes after what the crew lives by.
-        while self.credit_bytes >= sent as f64
-            && let Some(message) = self.next_requested(vehicle)
-        {
-            let frame = self.encoder.encode(&message);
-            sent += frame.as_bytes().len() + self.signature_len;
-            frames.push(frame);
-        }
-        // A flood of commands, each answered, must not silence telemetry for longer than a burst.
-        self.credit_bytes = (self.credit_bytes - sent as f64).max(-BURST_BYTES);
-        frames
+        self.lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, &mut snapshot)).collect()
     }
 
-    fn bytes_of(&self, frames: &[Frame]) -> usize {
-        frames.iter().map(|frame| frame.as_bytes().len() + self.signature_len).sum()
+    /// The crew learns at once, by the two messages that say so, what has become of the vehicle.
+    fn watch(&mut self, mode: &Mode) {
+        let told = Told::from(mode);
+        if self.told.replace(told) != Some(told) {
+            self.hurry(HEARTBEAT_DATA::ID);
+            self.hurry(TD_FLIGHT_STATUS_DATA::ID);
+        }
+        if !told.interlocks.armed {
+            self.armed_by = None;
+        }
+        if told.interlocks.abort_latched {
+            let aborted_at_s = *self.aborted_at_s.get_or_insert(self.now_s);
+            if self.now_s - aborted_at_s < ABORTED_BEATS_FOR_S {
+                for lane in &mut self.lanes {
+                    lane.streams.at_least_every(HEARTBEAT_DATA::ID, ABORTED_BEAT_S);
+                }
+            }
+        }
     }
 
-    fn on_command(&mut self, request: &CommandRequest, vehicle: &mut dyn Craft) {
+    fn hurry(&mut self, message_id: u32) {
+        for lane in &mut self.lanes {
+            lane.streams.hurry(message_id);
+        }
+    }
+
+    fn lane(&mut self, link: usize) -> &mut Lane {
+        let place = self.lanes.iter().position(|lane| lane.links.contains(&link)).unwrap_or(0);
+        &mut self.lanes[place]
+    }
+
+    fn on_command(&mut self, link: usize, request: &CommandRequest, vehicle: &mut dyn Craft) {
+        let aborts = match commands::parse(request) {
+            Ok(Command::Vehicle(Request::Abort)) => true,
+            Ok(Command::ForcedDisarm) => means_abort(vehicle),
+            _ => false,
+        };
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
-            Ok(Command::Vehicle(asked)) => {
-                // The vehicle says its reason itself, for the log and every ground.
-                (commands::mav_result(&vehicle.request(asked)), None)
+            // The vehicle says its reason itself, for the log and every ground.
+            Ok(Command::Vehicle(asked)) => (self.ask(asked, request.source, vehicle), None),
+            Ok(Command::ForcedDisarm) => {
+                let asked = if aborts { Request::Abort } else { Request::Disarm };
+                (self.ask(asked, request.source, vehicle), None)
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
-                self.streams.set_interval(message_id, interval_us, self.last_poll_s)
+                match self.rates_forbidden(request.source, vehicle) {
+                    Some(reason) => {
+                        (MavResult::MAV_RESULT_DENIED, Some(format!("message {message_id}: {reason}")))
+                    }
+                    None => {
+                        let now_s = self.now_s;
+                        self.with_rates_of(link, |streams| {
+                            streams.set_interval(message_id, interval_us, now_s)
+                        })
+                    }
+                }
             }
-            Ok(Command::SendMessage { message_id, of }) => self.send_message(message_id, of, vehicle),
+            Ok(Command::SendMessage { message_id, of }) => self.send_message(link, message_id, of, vehicle),
         };
-        if let Some(frame) = CommandAnswer::to(request, result).encode(&mut self.encoder) {
-            self.urgent.push(frame);
+        let answer = CommandAnswer::to(request, result);
+        let refused = result != MavResult::MAV_RESULT_ACCEPTED;
+        if aborts {
+            self.lane(link).answer_abort(answer);
+        } else if !refused || self.refusals.may_answer(request.source, self.now_s) {
+            self.lane(link).answer(Answer::Command(answer));
         }
         if let Some(reason) = reason {
             self.say(Severity::Warning, &reason);
         }
     }
 
-    fn send_message(&mut self, message_id: u32, of: u32, vehicle: &dyn Craft) -> (MavResult, Option<String>) {
+    fn ask(&mut self, asked: Request, station: Address, vehicle: &mut dyn Craft) -> MavResult {
+        let was_armed = vehicle.mode().interlocks.armed;
+        let result = commands::mav_result(&vehicle.request(asked));
+        if asked == Request::Arm && !was_armed && vehicle.mode().interlocks.armed {
+            self.armed_by = Some(station);
+        }
+        result
+    }
+
+    /// Why this station may not set rates now, if so: while the vehicle is armed, only the station that armed it may. Of
+    /// a vehicle that armed itself everybody may.
+    fn rates_forbidden(&self, station: Address, vehicle: &dyn Craft) -> Option<String> {
+        let Address { system_id, component_id } =
+            self.armed_by.filter(|armed_by| vehicle.mode().interlocks.armed && *armed_by != station)?;
+        Some(format!("while armed, only {system_id}/{component_id}, which armed, sets rates"))
+    }
+
+    /// Has the rates of one link changed: an interval is for the link that asked. A link that shared its frames with
+    /// others gets a lane of its own if anything changes.
+    fn with_rates_of<T>(&mut self, link: usize, change: impl FnOnce(&mut Streams) -> T) -> T {
+        let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
+        let lane = self.lane(link);
+        if lane.links.len() <= 1 {
+            return change(&mut lane.streams);
+        }
+        let mut streams = lane.streams.clone();
+        streams.set_capacity(capacity_bytes_s);
+        let done = change(&mut streams);
+        if streams.intervals() != lane.streams.intervals() {
+            let mut own = lane.of_its_own(link);
+            own.streams = streams;
+            own.set_capacity(capacity_bytes_s);
+            self.lanes.push(own);
+        }
+        done
+    }
+
+    fn send_message(
+        &mut self,
+        link: usize,
+        message_id: u32,
+        of: u32,
+        vehicle: &dyn Craft,
+    ) -> (MavResult, Option<String>) {
+        let boot_number = self.boot_number;
+        let lane = self.lane(link);
         let messages: Vec<MavMessage> = match message_id {
             // 0 asks for all of them, k for the k-th.
             AVAILABLE_MODES_DATA::ID if of as usize > Phase::ALL.len() => {
@@ -235,25 +357,26 @@ impl VehicleEndpoint {
                 .filter(|(place, _)| of == 0 || of as usize == place + 1)
                 .map(|(_, message)| message)
                 .collect(),
-            MESSAGE_INTERVAL_DATA::ID => vec![self.streams.interval_of(of)],
-            _ => telemetry::message(message_id, &vehicle.snapshot()).into_iter().collect(),
+            MESSAGE_INTERVAL_DATA::ID => vec![lane.streams.interval_of(of)],
+            _ => telemetry::message(message_id, &vehicle.snapshot(), boot_number).into_iter().collect(),
         };
         if messages.is_empty() {
             return (MavResult::MAV_RESULT_UNSUPPORTED, None);
         }
-        if self.requested.len() + messages.len() > MAX_REQUESTED {
+        if !lane.request(messages) {
             return (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, None);
         }
-        self.requested.extend(messages);
         (MavResult::MAV_RESULT_ACCEPTED, None)
     }
 
-    fn answer(&mut self, message: &MavMessage) {
-        let frame = self.encoder.encode(message);
-        self.urgent.push(frame);
+    /// Says something to the crew. A warning that was said just now is counted instead.
+    fn say(&mut self, severity: Severity, words: &str) {
+        if severity != Severity::Warning || self.warnings.is_news(words, self.now_s) {
+            self.say_aloud(severity, words);
+        }
     }
 
-    fn say(&mut self, severity: Severity, words: &str) {
+    fn say_aloud(&mut self, severity: Severity, words: &str) {
         self.text_id = self.text_id.wrapping_add(1).max(1);
         let severity = match severity {
             Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
@@ -263,9 +386,16 @@ impl VehicleEndpoint {
             Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
         };
         for chunk in text::chunks(severity, words, self.text_id) {
-            self.answer(&MavMessage::STATUSTEXT(chunk));
+            for lane in &mut self.lanes {
+                lane.say(MavMessage::STATUSTEXT(chunk.clone()));
+            }
         }
     }
+}
+
+/// What other ground stations call an emergency stop or a kill is a forced disarm: of a vehicle in the air, an abort.
+fn means_abort(vehicle: &dyn Craft) -> bool {
+    !(vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed))
 }
 
 fn is_for_us(system_id: u8, component_id: u8) -> bool {

@@ -1,8 +1,9 @@
 //! The vehicle's parameters: what a ground may read by name, and the little that it may set.
 //!
-//! The rate of each message, in hertz, may be set while the vehicle stands disarmed on the pad. The landing cost's
+//! The rate of each message, in hertz, may be set at any time by the station that commands, as by
+//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The landing cost's
 //! weights may be read: they come from the profile, which the log holds, so that a replay computes with the same
-//! ones. Limits that keep anybody safe are no parameters. The list never changes in flight.
+//! ones. Limits that keep anybody safe are no parameters. The list of names never changes.
 
 use flight::profile::StateWeights;
 use protocol::dialect::{MavMessage, MavParamError};
@@ -68,8 +69,8 @@ pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessag
     value_message(name(place, streams), found as f32, place, count(streams))
 }
 
-/// Sets a parameter; `may_change` says whether the vehicle stands disarmed on the pad. Returns the parameter's place,
-/// whose value is to be told in any case, with the refusal, if it was not changed as asked.
+/// Sets a parameter; `forbidden` says why this station may set none now. Returns the parameter's place, whose value is to
+/// be told in any case, with the refusal, if it was not changed as asked.
 ///
 /// # Errors
 /// There is no such parameter.
@@ -77,7 +78,7 @@ pub fn set(
     id: ParamId,
     value: f32,
     value_type: u8,
-    may_change: bool,
+    forbidden: Option<String>,
     streams: &mut Streams,
     now_s: f64,
 ) -> Result<(u16, Option<Refusal>), Refusal> {
@@ -87,22 +88,20 @@ pub fn set(
     };
     let name = name(place, streams);
     let refuse = |error, why: &str| Some(Refusal { error, reason: format!("{name} not set: {why}") });
-    let refusal = match streams.messages().get(usize::from(place)) {
+    let refusal = match (streams.messages().get(usize::from(place)), forbidden) {
         _ if !is_real32(value_type) => refuse(
             MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH,
             "its type is REAL32 (MAV_PARAM_TYPE 9), as every parameter's here",
         ),
-        None => refuse(
+        (None, _) => refuse(
             MavParamError::MAV_PARAM_ERROR_READ_ONLY,
             "it comes from the profile (weights of the landing cost); fly another profile",
         ),
-        Some(_) if !may_change => {
-            refuse(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED, "only while disarmed on the pad")
-        }
-        Some(_) if !(value.is_finite() && value >= 0.0) => {
+        (Some(_), Some(why)) => refuse(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED, &why),
+        (Some(_), None) if !(value.is_finite() && value >= 0.0) => {
             refuse(MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "it must be 0 (off) or a rate in Hz")
         }
-        Some(stream) => {
+        (Some(stream), None) => {
             // 0 Hz is off; the rest is the interval's business, with its budget.
             let interval_us = if value == 0.0 { -1.0 } else { 1e6 / value };
             match streams.set_interval(stream.message_id, interval_us, now_s) {

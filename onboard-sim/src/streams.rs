@@ -2,27 +2,50 @@
 
 use mavlink::MessageData;
 use protocol::dialect::{
-    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA,
-    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
-    LOCAL_POSITION_NED_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA,
-    TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA,
+    CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
+    MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA, SYSTEM_TIME_DATA, TD_CONTROLLER_DATA,
+    TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
+
+use crate::endpoint::WINDOW_S;
 
 /// Bytes around a payload: header and checksum.
 const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are nought and therefore cut.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
 /// Default rates are at most this where frames are signed, Hz, the first that fits the radio: a signature is as long as a
-/// short message.
-const SIGNED_RATES_MAX_HZ: [f64; 4] = [6.0, 5.0, 4.0, 3.5];
+/// short message. What the crew lives by is not slowed down.
+const SIGNED_RATES_MAX_HZ: [f64; 8] = [6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
 /// Slowest interval that can be asked for, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
+/// The longest answer to an abort (COMMAND_ACK), bytes of payload.
+const ACK_PAYLOAD_LEN: usize = 10;
+/// What a ground is told of its own uplink (TD_UPLINK), bytes of payload and times a second.
+const UPLINK_PAYLOAD_LEN: usize = 16;
+const UPLINK_HZ: f64 = 2.0;
+/// What is hurried is sent this long after the last time at the earliest, s.
+const HURRIED_S: f64 = 0.1;
+
+/// Bytes that are kept free for what the crew lives by: a heartbeat, a flight status and the answer to an abort, all in
+/// one instant. They never wait behind telemetry.
+pub(crate) fn kept_free_bytes(signature_len: usize) -> usize {
+    let payload = HEARTBEAT_DATA::ENCODED_LEN + TD_FLIGHT_STATUS_DATA::ENCODED_LEN + ACK_PAYLOAD_LEN;
+    payload + 3 * (FRAME_OVERHEAD + signature_len)
+}
+
+/// A link's share for answers, and as much for texts, bytes in a second: whatever is asked, the rest is for telemetry.
+pub(crate) fn share_bytes_s(capacity_bytes_s: u32) -> usize {
+    capacity_bytes_s as usize / 5
+}
+
 /// A message that is sent by itself, with its longest payload and its default rate.
+#[derive(Debug)]
 pub struct Standard {
     /// Message.
     pub message_id: u32,
@@ -45,15 +68,15 @@ impl Standard {
 }
 
 /// What the planar vehicle sends unasked. In the order in which it is given up when the budget runs short: last first.
-pub const STANDARD: [Standard; 16] = [
+pub const STANDARD: [Standard; 21] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
-    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 1.0),
+    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 10.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 10.0),
-    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 10.0),
-    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 5.0),
+    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 5.0),
+    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 4.0),
     standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
     standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
     standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
@@ -64,25 +87,31 @@ pub const STANDARD: [Standard; 16] = [
     // For other people's clients, off until asked for: what they say is in the messages above already.
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
+    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0),
+    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0),
+    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0),
+    // Without its extensions, which are not known here.
+    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
+    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
 ];
 
 /// What the rocket from apogee sends unasked, in the same order.
-pub const FROM_APOGEE: [Standard; 20] = [
+pub const FROM_APOGEE: [Standard; 25] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
-    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 1.0),
+    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
     standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0),
-    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 8.0),
-    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 4.0),
-    standard::<TD_FINS_DATA>("RATE_FINS", 4.0),
+    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 4.0),
+    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
+    standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
     standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
     standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
-    standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 1.0),
+    standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
     // Off until asked for.
@@ -90,6 +119,12 @@ pub const FROM_APOGEE: [Standard; 20] = [
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0),
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
+    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0),
+    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0),
+    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0),
+    // Without its extensions, which are not known here.
+    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
+    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
 ];
 
 #[derive(Debug, Clone, Copy)]
@@ -101,6 +136,7 @@ struct Stream {
     /// `None`: switched off.
     interval_s: Option<f64>,
     due_s: f64,
+    sent_s: f64,
 }
 
 impl Stream {
@@ -109,14 +145,27 @@ impl Stream {
     }
 }
 
-/// Every stream of a craft, in the order of its messages.
+/// A message whose time has come.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Due {
+    pub(crate) message_id: u32,
+    /// Its longest frame, bytes.
+    pub(crate) frame_len: usize,
+    /// The crew lives by it.
+    pub(crate) vital: bool,
+}
+
+/// Every stream of a craft over one link, in the order of its messages.
+#[derive(Debug, Clone)]
 pub struct Streams {
     messages: &'static [Standard],
+    signature_len: usize,
+    capacity_bytes_s: u32,
     streams: Vec<Stream>,
 }
 
 impl Streams {
-    /// Every message at its default rate.
+    /// Every message at its default rate, within a radio's budget.
     pub fn of(messages: &'static [Standard]) -> Self {
         Self::at_most(messages, 0, f64::INFINITY)
     }
@@ -125,9 +174,12 @@ impl Streams {
     pub fn signed(messages: &'static [Standard]) -> Self {
         let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz);
         let [fastest, slower @ ..] = SIGNED_RATES_MAX_HZ;
-        slower.into_iter().fold(at_most(fastest), |streams, rate_max_hz| {
-            if streams.bytes_s() <= f64::from(RADIO_BUDGET_BYTES_S) { streams } else { at_most(rate_max_hz) }
-        })
+        slower.into_iter().fold(
+            at_most(fastest),
+            |streams, rate_max_hz| {
+                if streams.fit() { streams } else { at_most(rate_max_hz) }
+            },
+        )
     }
 
     /// What is sent.
@@ -137,6 +189,7 @@ impl Streams {
 
     fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64) -> Self {
         let streams = messages.iter().enumerate().map(|(place, standard)| {
+            let rate_max_hz = if is_vital(standard.message_id) { f64::INFINITY } else { rate_max_hz };
             let interval_s = (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
             Stream {
                 message_id: standard.message_id,
@@ -145,20 +198,50 @@ impl Streams {
                 interval_s,
                 // Spread, so that the slow ones do not all fall into the same instant.
                 due_s: 0.02 * place as f64,
+                sent_s: f64::NEG_INFINITY,
             }
         });
-        Self { messages, streams: streams.collect() }
+        Self { messages, signature_len, capacity_bytes_s: RADIO_BUDGET_BYTES_S, streams: streams.collect() }
+    }
+
+    /// The link's budget, bytes per second.
+    pub fn capacity_bytes_s(&self) -> u32 {
+        self.capacity_bytes_s
+    }
+
+    /// Gives the link another budget; the intervals stay.
+    pub fn set_capacity(&mut self, capacity_bytes_s: u32) {
+        self.capacity_bytes_s = capacity_bytes_s;
+    }
+
+    /// Whether all of it fits the link's budget.
+    pub fn fit(&self) -> bool {
+        self.bytes_s() <= self.for_telemetry_bytes_s()
+    }
+
+    /// What the link's budget leaves for telemetry, bytes per second: all of it but what is kept free for what may not
+    /// wait, and what every ground is told of its uplink.
+    fn for_telemetry_bytes_s(&self) -> f64 {
+        let uplink_len = UPLINK_PAYLOAD_LEN + FRAME_OVERHEAD + self.signature_len;
+        let in_window = f64::from(self.capacity_bytes_s) - kept_free_bytes(self.signature_len) as f64;
+        in_window / WINDOW_S - UPLINK_HZ * uplink_len as f64
     }
 
     /// The messages whose time has come, most important first.
-    pub fn due(&self, now_s: f64) -> Vec<u32> {
+    pub(crate) fn due(&self, now_s: f64) -> Vec<Due> {
         let due = |stream: &&Stream| stream.interval_s.is_some() && now_s >= stream.due_s;
-        self.streams.iter().filter(due).map(|stream| stream.message_id).collect()
+        let named = |&Stream { message_id, frame_len, .. }: &Stream| Due {
+            message_id,
+            frame_len,
+            vital: is_vital(message_id),
+        };
+        self.streams.iter().filter(due).map(named).collect()
     }
 
     /// A message was sent, or there was nothing to say in it.
     pub fn on_sent(&mut self, message_id: u32, now_s: f64) {
         for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
+            stream.sent_s = now_s;
             let Some(interval_s) = stream.interval_s else { continue };
             // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
             // or held back is not sent twice.
@@ -167,16 +250,32 @@ impl Streams {
         }
     }
 
-    /// Sends a message at the next opportunity.
+    /// Sends a message at the next opportunity; however often that is asked, no more than ten times a second.
     pub fn hurry(&mut self, message_id: u32) {
+        self.at_least_every(message_id, HURRIED_S);
+    }
+
+    /// Sends a message no later than so long after the last time.
+    pub(crate) fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
         for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
-            stream.due_s = f64::NEG_INFINITY;
+            stream.due_s = stream.due_s.min(stream.sent_s + interval_s);
         }
     }
 
     /// Bytes per second of all of them, at their longest.
     pub fn bytes_s(&self) -> f64 {
         self.streams.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
+    }
+
+    /// The longest frame of those that are sent, bytes.
+    pub(crate) fn longest_frame_len(&self) -> usize {
+        let sent = self.streams.iter().filter(|stream| stream.interval_s.is_some());
+        sent.map(|stream| stream.frame_len).max().unwrap_or(0)
+    }
+
+    /// The interval of each, in their order; `None` is off.
+    pub(crate) fn intervals(&self) -> Vec<Option<f64>> {
+        self.streams.iter().map(|stream| stream.interval_s).collect()
     }
 
     /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
@@ -192,9 +291,10 @@ impl Streams {
                 Some(format!("message {message_id} is not sent by this vehicle")),
             );
         };
+        let before = self.streams[place];
         let wanted = match interval_us {
             -1.0 => None,
-            0.0 => self.streams[place].default_interval_s,
+            0.0 => before.default_interval_s,
             us if us >= 1.0 && f64::from(us) * 1e-6 <= MAX_INTERVAL_S => Some(f64::from(us) * 1e-6),
             _ => {
                 let reason =
@@ -202,23 +302,17 @@ impl Streams {
                 return (MavResult::MAV_RESULT_DENIED, Some(reason));
             }
         };
-        let default_s = self.streams[place].default_interval_s;
-        let vital = matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID);
-        if vital && wanted.is_none_or(|interval_s| default_s.is_none_or(|default_s| interval_s > default_s)) {
+        let slower = |interval_s| before.default_interval_s.is_none_or(|default_s| interval_s > default_s);
+        if is_vital(message_id) && wanted.is_none_or(slower) {
             let reason = format!("message {message_id}: the crew lives by it; it is not slowed down");
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
-        let others: f64 = self
-            .streams
-            .iter()
-            .enumerate()
-            .filter(|(other, _)| *other != place)
-            .map(|(_, stream)| stream.bytes_s(stream.interval_s))
-            .sum();
-        let total = others + self.streams[place].bytes_s(wanted);
-        if wanted.is_some() && total > f64::from(RADIO_BUDGET_BYTES_S) {
+        let total = self.bytes_s() - before.bytes_s(before.interval_s) + before.bytes_s(wanted);
+        let free = self.for_telemetry_bytes_s();
+        if before.bytes_s(wanted) > before.bytes_s(before.interval_s) && total > free {
             let reason = format!(
-                "message {message_id}: {total:.0} B/s in all, the link's budget is {RADIO_BUDGET_BYTES_S}"
+                "message {message_id}: {total:.0} B/s in all; the link's budget is {}, {free:.0} of it for telemetry",
+                self.capacity_bytes_s
             );
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
@@ -249,4 +343,9 @@ impl Streams {
         let message_id = u16::try_from(message_id).unwrap_or(u16::MAX);
         MavMessage::MESSAGE_INTERVAL(MESSAGE_INTERVAL_DATA { interval_us, message_id })
     }
+}
+
+/// The crew lives by it: it never waits for anything else.
+fn is_vital(message_id: u32) -> bool {
+    matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
 }

@@ -7,6 +7,7 @@
 //!
 //! [`Motion`]: crate::craft::Motion
 
+mod global;
 mod ours;
 mod space;
 
@@ -30,7 +31,7 @@ use crate::craft::Snapshot;
 const PROTOCOL_VERSION_ID: u32 = 300;
 
 /// The message of this id as things stand, or `None` if the vehicle has none or nothing to say in it.
-pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
+pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option<MavMessage> {
     match message_id {
         HEARTBEAT_DATA::ID => Some(heartbeat(snapshot)),
         SYS_STATUS_DATA::ID => Some(sys_status(snapshot)),
@@ -42,7 +43,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
         AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version()),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
         ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
-        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot)),
+        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, boot_number)),
         TD_FINS_DATA::ID => Some(ours::fins(snapshot)),
         TD_GIMBAL_DATA::ID => Some(ours::gimbal(snapshot)),
         TD_CONTROLLER_DATA::ID => ours::controller(snapshot),
@@ -50,7 +51,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
         TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
-        _ => space::message(message_id, snapshot),
+        _ => space::message(message_id, snapshot).or_else(|| global::message(message_id, snapshot)),
     }
 }
 
@@ -69,8 +70,10 @@ pub fn available_modes() -> impl Iterator<Item = MavMessage> {
 }
 
 fn heartbeat(snapshot: &Snapshot) -> MavMessage {
-    let mut base_mode =
-        MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED;
+    // Nothing here burns, and the vehicle says so from its boot on: whoever shows it can show that it is simulated.
+    let mut base_mode = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED
+        | MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED;
     base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, snapshot.interlocks.armed);
     let system_status = match snapshot.phase {
         _ if snapshot.interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
@@ -169,7 +172,7 @@ fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
         alt: -motion.position_m[2] as f32,
         climb: -down_m_s as f32,
-        heading: 0,
+        heading: global::heading_deg(&motion.ned_from_body).round() as i16 % 360,
         throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
     })
 }

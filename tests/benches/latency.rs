@@ -14,7 +14,7 @@ use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
-use onboard_sim::fly::{FlyOptions, Speed, fly_observed, load_profile};
+use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_profile};
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
 use protocol::dialect::MavMessage;
 use protocol::transport::Endpoint;
@@ -43,6 +43,7 @@ fn start_vehicle(
         links: vec![link],
         key_file: None,
         recorder: None,
+        on_the_wire: OnTheWire::drawn(),
         seed: 1,
         speed: Speed::Factor(1.0),
         auto_start: true,

@@ -46,7 +46,7 @@ fn mk2(number: u64) -> (Vec<(Duration, Frame)>, bool) {
             stands_s += rocket.frame_s();
         }
         let now = Duration::from_secs_f64(rocket.time_s());
-        heard.extend(endpoint.poll(&rocket).into_iter().map(|frame| (now, frame)));
+        heard.extend(endpoint.poll(&rocket).into_iter().map(|outgoing| (now, outgoing.frame)));
     }
     assert!(rocket.is_over(), "still {:?}", rocket.phase());
     let strict = rocket.judged_by_table_2().expect("it came down").landed;

@@ -46,6 +46,7 @@ pub mod pilot;
 pub mod powered;
 pub mod profile;
 pub mod rigid;
+pub mod site;
 pub mod stabiliser;
 pub mod thrust_curve;
 pub mod thrust_estimate;

@@ -14,11 +14,15 @@ use crate::motor_estimate::MotorPrior;
 use crate::motors::{self, MotorError};
 use crate::powered::PoweredSettings;
 use crate::profile::{ArmingLimits, GateLimits, TouchdownBox};
+use crate::site::Site;
 use crate::thrust_curve::ThrustCurve;
 
 /// Length of the countdown, s, where a mission does not say, and at most.
 const COUNTDOWN_S: f64 = 5.0;
 const COUNTDOWN_MAX_S: f64 = 600.0;
+
+/// Altitudes of a pad, m: from the shore of the Dead Sea to above every road.
+const PAD_ALTITUDES_M: core::ops::RangeInclusive<f64> = -450.0..=6_000.0;
 
 /// Where a mission begins: at apogee, nose up.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -68,6 +72,9 @@ pub struct Mission {
     pub gravity_m_s2: f64,
     /// Altitude of the pad above the sea, m.
     pub pad_altitude_m: f64,
+    /// Where on the Earth the pad is.
+    #[serde(default)]
+    pub site: Site,
     /// The fins steer; otherwise they stay open and equal (passive descent).
     pub steered: bool,
     /// Place of the lidar along the axis, ahead of the feet, m.
@@ -145,6 +152,18 @@ pub enum MissionError {
         /// The value found.
         found: f64,
     },
+    /// The pad is nowhere.
+    #[error("{origin}: {key} = {found}: must be {required}")]
+    Site {
+        /// Where the text came from.
+        origin: String,
+        /// The key, with its section.
+        key: &'static str,
+        /// The value found.
+        found: f64,
+        /// The accepted range, in words.
+        required: &'static str,
+    },
     /// The motor is not to be had.
     #[error(transparent)]
     Motor(#[from] MotorError),
@@ -172,6 +191,15 @@ impl Mission {
         let countdown_s = mission.start.countdown_s;
         if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
             return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });
+        }
+        let altitude_m = mission.pad_altitude_m;
+        let nowhere = (!PAD_ALTITUDES_M.contains(&altitude_m)).then_some((
+            "pad_altitude_m",
+            altitude_m,
+            "-450 to 6000",
+        ));
+        if let Some((key, found, required)) = mission.site.bad_value().or(nowhere) {
+            return Err(MissionError::Site { origin: origin.to_owned(), key, found, required });
         }
         mission.motor()?;
         Ok(mission)
@@ -241,6 +269,21 @@ mod tests {
             );
         }
         assert!(Mission::is_meant(text) && !Mission::is_meant("name = \"x\"") && !Mission::is_meant("="));
+    }
+
+    #[test]
+    fn a_site_is_a_place_on_the_earth_and_a_known_field_unless_said() {
+        let (name, text) = BUILTIN[0];
+        let of = |site: &str| Mission::from_toml(&text.replace("[start]", &format!("{site}\n[start]")), name);
+        assert_eq!(of("").expect("sound").site, Site::default());
+        let given = of("[site]\nlatitude_deg = 48.1\nlongitude_deg = 11.6").expect("sound").site;
+        assert_eq!(given, Site { latitude_deg: 48.1, longitude_deg: 11.6 });
+        let message = of("[site]\nlatitude_deg = 89.0\nlongitude_deg = 11.6").expect_err("wrong").to_string();
+        assert!(message.contains("site.latitude_deg = 89") && message.contains("-85 to 85"), "{message}");
+        assert!(of("[site]\nlatitude_deg = 48.1").is_err(), "half a place is none");
+        let sunken = text.replace("pad_altitude_m = 0.0", "pad_altitude_m = -500.0");
+        let message = Mission::from_toml(&sunken, name).expect_err("wrong").to_string();
+        assert!(message.contains("pad_altitude_m = -500"), "{message}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `onboard-sim fly`: one flight, on the wire or by itself.
 
 use std::io::Write as _;
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -10,9 +11,11 @@ use campaign::fault::TimedFault;
 use clap::Args;
 use onboard_sim::craft::Judged;
 use onboard_sim::fly::{
-    FlightSummary, FlyOptions, LoadedFlight, Outcome, Speed, fly_observed, load_profile, log_header,
+    FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Outcome, Speed, fly_observed, load_profile,
+    log_header,
 };
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use protocol::identity::RADIO_BUDGET_BYTES_S;
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
@@ -34,6 +37,14 @@ pub(crate) struct FlyArguments {
     /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
+    /// Bytes per second that a network link may be asked to carry, 2000 to 1000000; a serial link stays at 2000. Nothing
+    /// more is sent until a station asks for it.
+    #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
+        value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
+    network_budget: u32,
+    /// Number of this boot on the wire, instead of a random one.
+    #[arg(long, value_name = "NUMBER")]
+    boot_number: Option<NonZeroU32>,
     /// Log to write (MCAP). An existing file is not overwritten.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -58,7 +69,7 @@ pub(crate) struct FlyArguments {
     /// Arm and start without a ground station, also with --mavlink.
     #[arg(long)]
     auto_start: bool,
-    /// Keep serving the links after the flight, until interrupted.
+    /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
     #[arg(long)]
     stay: bool,
     /// Do not apply a controller output that took longer than its sample, as hardware would not.
@@ -121,7 +132,13 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
             Some(Recorder::create(path, &header)?)
         }
     };
+    let drawn = OnTheWire::drawn();
+    let on_the_wire = OnTheWire {
+        boot_number: arguments.boot_number.unwrap_or(drawn.boot_number),
+        network_bytes_s: arguments.network_budget,
+    };
     let options = FlyOptions {
+        on_the_wire,
         profile,
         auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
         links: arguments.mavlink,

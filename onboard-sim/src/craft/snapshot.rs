@@ -7,6 +7,7 @@ use flight::dynamics::PlanarState;
 use flight::nmpc::SolveStatus;
 use flight::phase::{Interlocks, Phase};
 use flight::rigid::RigidState;
+use flight::site::Site;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 
@@ -90,6 +91,10 @@ pub struct Snapshot {
     pub estimator: Option<EstimatorFacts>,
     /// What the sensors said last; `None` where none are modelled.
     pub sensors: Option<SensorFacts>,
+    /// Where on the Earth the pad is.
+    pub site: Site,
+    /// Altitude of the pad above the sea, m.
+    pub pad_altitude_m: f64,
 }
 
 /// Position, velocity, attitude and rotation, north-east-down. Body axes: x towards the nose.

@@ -13,6 +13,7 @@ use protocol::transport::{Endpoint, Transport, TransportSender};
 
 use super::FlyError;
 use super::recording::{note, record_raw};
+use crate::endpoint::Outgoing;
 
 /// Timestamps are remembered this often, in stamps (10 us).
 const REMEMBER_EVERY: u64 = 100_000;
@@ -73,8 +74,8 @@ impl Intake {
 
 /// A frame from a link.
 pub(super) enum Heard {
-    /// To be acted on.
-    Frame(Frame),
+    /// To be acted on; and the number of its link.
+    Frame(usize, Frame),
     /// Not to be acted on: its signature is missing or wrong.
     Rejected(Frame, Rejection),
 }
@@ -112,7 +113,7 @@ impl Links {
                         News::Frame(frame) => {
                             commanded |= CommandRequest::from_frame(&frame).is_some();
                             self.intake.record(name, &frame, time_s);
-                            heard.push(Heard::Frame(frame));
+                            heard.push(Heard::Frame(number, frame));
                         }
                         News::Copy(frame) => self.intake.record(name, &frame, time_s),
                         // Not recorded: a flood of forgeries must not fill the log. It is counted.
@@ -131,9 +132,12 @@ impl Links {
         heard
     }
 
-    pub(super) fn send(&mut self, frame: &Frame, time_s: f64) {
+    pub(super) fn send(&mut self, Outgoing { frame, links }: &Outgoing, time_s: f64) {
         let (now, clock) = (Duration::from_secs_f64(time_s), clock());
         for (number, OpenLink { sender, name, .. }) in self.open.iter().enumerate() {
+            if !links.contains(&number) {
+                continue;
+            }
             let bytes = self.hub.bytes_for(number, frame, clock);
             let count = bytes.len();
             // What found no room was not sent, and the log must not say so.

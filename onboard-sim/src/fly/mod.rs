@@ -1,6 +1,7 @@
 //! The run loop: a craft, its clock, its links and its log.
 
 mod autopilot;
+mod boot;
 mod links;
 mod load;
 mod pace;
@@ -20,6 +21,7 @@ use protocol::transport::Endpoint;
 use tokio::sync::watch;
 
 use self::autopilot::AutoPilot;
+pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
 pub use self::pace::Lateness;
@@ -64,13 +66,16 @@ pub struct FlyOptions {
     pub key_file: Option<PathBuf>,
     /// Log to write into.
     pub recorder: Option<Recorder>,
+    /// What it is on the wire beside what it does.
+    pub on_the_wire: OnTheWire,
     /// Seed of the dispersions.
     pub seed: u64,
     /// Speed of simulated time.
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
     pub auto_start: bool,
-    /// End once the flight is over; otherwise keep serving the links until told to stop.
+    /// End once the flight is over; otherwise keep serving the links until told to stop. After an abort on the pad links
+    /// are served in any case: the crew has to see the wait run down.
     pub exit_when_safed: bool,
     /// What a late controller output leads to.
     pub deadline_policy: DeadlinePolicy,
@@ -216,10 +221,13 @@ pub async fn fly_observed(
     craft.pull_pin();
     let mut links =
         Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
-    let mut endpoint = match options.key_file {
+    let endpoint = match options.key_file {
         Some(_) => VehicleEndpoint::sending_signed(craft.standard()),
         None => VehicleEndpoint::sending(craft.standard()),
     };
+    let capacities_bytes_s: Vec<u32> =
+        options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
+    let mut endpoint = endpoint.booted(options.on_the_wire.boot_number.get()).over_links(&capacities_bytes_s);
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
@@ -235,7 +243,7 @@ pub async fn fly_observed(
         let arrived = links.receive(craft.time_s());
         for heard in heard.pass(arrived, craft.time_s(), craft.radio()) {
             match heard {
-                Heard::Frame(frame) => endpoint.on_frame(&frame, craft),
+                Heard::Frame(link, frame) => endpoint.on_frame(link, &frame, craft),
                 Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
@@ -259,15 +267,20 @@ pub async fn fly_observed(
             record(recorder, craft, &events);
         }
         let leaving = endpoint.poll(craft);
-        for frame in sent.pass(leaving, time_s, craft.radio()) {
-            links.send(&frame, time_s);
+        for outgoing in sent.pass(leaving, time_s, craft.radio()) {
+            links.send(&outgoing, time_s);
         }
         if links.dropped() > dropped {
             dropped = links.dropped();
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
         let over = craft.is_over() || pilot.refused.is_some();
-        if over && options.exit_when_safed && pace.has_lingered(!options.links.is_empty()) {
+        let aborted_on_the_pad = craft.phase().on_pad() && craft.aborted() && !options.links.is_empty();
+        if over
+            && !aborted_on_the_pad
+            && options.exit_when_safed
+            && pace.has_lingered(!options.links.is_empty())
+        {
             break false;
         }
         let waiting = over || (craft.phase().on_pad() && craft.mode().countdown_end_s.is_none());

@@ -68,6 +68,8 @@ impl Rocket {
             descent: None,
             estimator: None,
             sensors: self.watch.facts(self.frame),
+            site: self.flight.order.mission.site,
+            pad_altitude_m: self.flight.order.mission.pad_altitude_m,
         }
     }
 

@@ -4,13 +4,13 @@ use flight::phase::{Interlocks, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase, TdSolverStatus,
+    TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase, TdSolverStatus, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres};
 use crate::craft::{AbortEffect, PATH_POINTS, Snapshot};
 
-pub(super) fn flight_status(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_ignition_s.map(|since_s| -since_s));
     let locks = snapshot.interlocks;
     let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
@@ -23,6 +23,8 @@ pub(super) fn flight_status(snapshot: &Snapshot) -> MavMessage {
         phase: td_phase(snapshot.phase),
         abort_effect,
         abort_impact_m_s,
+        boot_number,
+        vehicle_flags: TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
         ..TD_FLIGHT_STATUS_DATA::default()
     })
 }

@@ -62,6 +62,9 @@ impl Vehicle {
             descent: None,
             estimator: None,
             sensors: None,
+            site: self.profile.site,
+            // Its air has one density: it says no altitude.
+            pad_altitude_m: 0.0,
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Flights flown by the simulated vehicle, with the logs that it writes itself.
 
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use onboard_sim::fly::{FlyOptions, Speed, fly, load_profile, log_header};
+use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly, load_profile, log_header};
 use onboard_sim::vehicle::DeadlinePolicy;
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
@@ -56,6 +57,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulate
     let options = FlyOptions {
         profile,
         links: links.to_vec(),
+        on_the_wire: OnTheWire { boot_number: NonZeroU32::MIN, ..OnTheWire::drawn() },
         recorder: Some(recorder.clone()),
         seed,
         speed: Speed::Max,

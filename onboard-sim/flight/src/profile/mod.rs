@@ -15,6 +15,8 @@ pub use sections::{
 
 use serde::Deserialize;
 
+use crate::site::Site;
+
 /// Everything that distinguishes one simulated or real vehicle and its mission from another.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -47,6 +49,9 @@ pub struct Profile {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
+    /// Where on the Earth the pad is.
+    #[serde(default)]
+    pub site: Site,
     /// How the true vehicle differs from the controller's model.
     #[serde(default)]
     pub plant: Plant,

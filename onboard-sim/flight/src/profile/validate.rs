@@ -41,6 +41,9 @@ pub(super) fn validate(profile: &Profile) -> Check {
     start(profile)?;
     nmpc(profile)?;
     limits(profile)?;
+    if let Some((key, found, required)) = profile.site.bad_value() {
+        require(false, key, found, required)?;
+    }
     scatter(profile)
 }
 

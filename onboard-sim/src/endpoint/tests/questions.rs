@@ -26,7 +26,7 @@ fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
 impl Bench {
     fn tell(&mut self, message: &MavMessage) {
         let frame = self.ground.encode(message);
-        self.endpoint.on_frame(&frame, &mut self.vehicle);
+        self.endpoint.on_frame(0, &frame, &mut self.vehicle);
     }
 
     fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
@@ -37,7 +37,7 @@ impl Bench {
             param_id: name(id),
             param_type,
         }));
-        let sent = self.run(0.1);
+        let sent = self.run(0.5);
         (values(&sent), texts(&sent).join("; "))
     }
 
@@ -60,7 +60,8 @@ fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
     let parameters = parameters::count(&Streams::of(&STANDARD));
     assert_eq!(places, (0..parameters).collect::<Vec<_>>());
     assert!(values(&sent).iter().all(|value| value.param_count == parameters));
-    assert!(count(&sent, ATTITUDE_QUATERNION_DATA::ID) >= 99);
+    let attitudes = count(&sent, ATTITUDE_QUATERNION_DATA::ID);
+    assert!(attitudes >= 99, "{attitudes}");
 }
 
 #[test]
@@ -96,12 +97,13 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     for (id, asked, holds, why) in [
         ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
         ("RATE_FINS", -3.0, 4.0, "must be"),
-        ("RATE_FINS", f32::NAN, 4.0, "must be"),
-        ("RATE_FINS", f32::INFINITY, 4.0, "must be"),
-        ("RATE_FINS", -1e6, 4.0, "must be"),
+        ("RATE_GIMBAL", f32::NAN, 5.0, "must be"),
+        ("RATE_POSITION", f32::INFINITY, 10.0, "must be"),
         ("RATE_HEARTBEAT", 0.0, 1.0, "the crew lives by it"),
         ("NMPC_W_U", 51.0, 50.0, "from the profile"),
     ] {
+        // Texts have a share of each second.
+        bench.run(1.0);
         let (found, words) = bench.set_real(id, asked);
         assert_eq!(found.to_bits(), f32::to_bits(holds), "{id} = {asked}");
         assert!(words.contains(why), "{id} = {asked}: {words}");
@@ -115,13 +117,65 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     assert_eq!(count(&bench.run(2.0), TD_FINS_DATA::ID), 0, "switched off");
 }
 
+/// Both ways to set a rate, asked by a station.
+fn set_rates(bench: &mut Bench, station: Address) -> (u8, f32, String) {
+    let ground = std::mem::replace(&mut bench.ground, Encoder::new(station));
+    let request = CommandRequest {
+        source: station,
+        target: VEHICLE,
+        command: 511,
+        params: [TD_FINS_DATA::ID as f32, 500_000.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        confirmation: 0,
+    };
+    bench.endpoint.on_command(0, &request, &mut bench.vehicle);
+    let sent = bench.run(0.2);
+    let answer = sent.iter().find_map(CommandAnswer::from_frame).unwrap();
+    let (values, words) = bench.set("RATE_FINS", 1.0, MavParamType::MAV_PARAM_TYPE_REAL32);
+    bench.ground = ground;
+    (answer.result, values[0].param_value, format!("{} {words}", texts(&sent).join(" ")))
+}
+
 #[test]
-fn nothing_is_set_once_armed() {
+fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
+    let other = Address { system_id: 254, component_id: 190 };
+    let mut bench = Bench::new();
+    assert_eq!(set_rates(&mut bench, other).0, 0, "before arming every station may");
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+    // A second arm is accepted, for it is armed; that does not hand the rates over.
+    let again = CommandRequest {
+        source: other,
+        target: VEHICLE,
+        command: 400,
+        params: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        confirmation: 0,
+    };
+    bench.endpoint.on_command(0, &again, &mut bench.vehicle);
+    bench.run(0.2);
+    assert_eq!(bench.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
+    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
+    bench.run(7.0);
+    assert!(!bench.vehicle.phase().on_pad(), "{:?}", bench.vehicle.phase());
+    let (result, rate_hz, words) = set_rates(&mut bench, other);
+    assert_eq!((result, rate_hz.to_bits()), (MavResult::MAV_RESULT_DENIED as u8, 4.0f32.to_bits()));
+    assert!(words.contains("only 255/190, which armed, sets rates"), "{words}");
+    let (result, rate_hz, _) = set_rates(&mut bench, GROUND);
+    assert_eq!(
+        (result, rate_hz.to_bits()),
+        (0, 1.0f32.to_bits()),
+        "the station that armed may, in flight too"
+    );
+}
+
+#[test]
+fn a_rate_beyond_the_budget_is_refused_in_flight_as_on_the_pad() {
     let mut bench = Bench::new();
     assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-    let (found, words) = bench.set_real("RATE_FINS", 1.0);
+    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
+    bench.run(7.0);
+    let (found, words) = bench.set_real("RATE_FINS", 20.0);
     assert_eq!(found.to_bits(), 2.0f32.to_bits());
-    assert!(words.contains("disarmed on the pad"), "{words}");
+    assert!(words.contains("budget is 2000"), "{words}");
+    assert_eq!(bench.ask(511, TD_FINS_DATA::ID as f32, 50_000.0).0, MavResult::MAV_RESULT_DENIED as u8);
 }
 
 #[test]
@@ -175,7 +229,7 @@ fn versions_capabilities_and_the_mode_are_told_to_those_who_ask() {
             payload[30..32].copy_from_slice(&[1, 1]);
             bench.ground.encode_payload(COMMAND_LONG_DATA::ID, &payload).unwrap()
         };
-        bench.endpoint.on_frame(&frame, &mut bench.vehicle);
+        bench.endpoint.on_frame(0, &frame, &mut bench.vehicle);
         let sent = bench.run(0.5);
         assert_eq!(count(&sent, message_id), 1, "command {command} with {param1}");
         let results: Vec<u8> = sent.iter().filter_map(CommandAnswer::from_frame).map(|a| a.result).collect();

@@ -2,7 +2,8 @@
 
 use campaign::dispersion::Dispersion;
 use protocol::dialect::{
-    BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA, MavSysStatusSensor,
+    BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA,
+    GPS_RAW_INT_DATA, GpsFixType, HIGHRES_IMU_DATA, LOCAL_POSITION_NED_DATA, MavSysStatusSensor,
     SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_PREDICTED_PATH_DATA, TdChute,
 };
 
@@ -63,12 +64,13 @@ impl Airborne {
             let time_s = self.rocket.time_s();
             let uplink = std::mem::take(&mut self.uplink);
             for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
-                self.endpoint.on_frame(&frame, &mut self.rocket);
+                self.endpoint.on_frame(0, &frame, &mut self.rocket);
             }
             for event in self.rocket.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
-            let leaving = self.endpoint.poll(&self.rocket);
+            let leaving =
+                self.endpoint.poll(&self.rocket).into_iter().map(|outgoing| outgoing.frame).collect();
             sent.extend(self.sent.pass(leaving, self.rocket.time_s(), self.rocket.radio()));
         }
         sent
@@ -88,7 +90,7 @@ impl Airborne {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(&request, &mut self.rocket);
+        self.endpoint.on_command(0, &request, &mut self.rocket);
         let sent = self.run(0.3);
         let found = sent
             .iter()
@@ -101,21 +103,41 @@ impl Airborne {
 #[test]
 fn its_standard_rates_fit_the_radio_signed_or_not() {
     for streams in [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE)] {
-        let total = streams.bytes_s();
-        assert!(total <= f64::from(RADIO_BUDGET_BYTES_S), "{total} B/s");
+        assert!(streams.fit(), "{} B/s", streams.bytes_s());
+        assert!(streams.rate_hz(LOCAL_POSITION_NED_DATA::ID) >= 3.0);
     }
 }
 
+/// Twenty commands a second that are refused with words, all the way from apogee to the ground.
 #[test]
-fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
+fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals_cost_no_position() {
     let mut airborne = Airborne::let_go("field");
-    let mut worst = 0;
+    let mut ground = Encoder::new(GROUND);
+    let mut sent = Vec::new();
+    let (mut frame, began_s) = (0u64, airborne.rocket.time_s());
     while !airborne.rocket.is_over() {
-        let second: usize = airborne.run(1.0).iter().map(|frame| frame.as_bytes().len()).sum();
-        worst = worst.max(second);
+        if frame.is_multiple_of(10) {
+            airborne.uplink.push(ground.encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+                param1: 1.0,
+                command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+                target_system: 1,
+                target_component: 1,
+                ..COMMAND_LONG_DATA::default()
+            })));
+        }
+        frame += 1;
+        let time_s = airborne.rocket.time_s();
+        sent.extend(airborne.run(0.001).into_iter().map(|frame| (time_s, frame)));
     }
-    assert!(worst as f64 <= f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{worst} B in one second");
+    let flown_s = airborne.rocket.time_s() - began_s;
+    let sizes: Vec<_> = sent.iter().map(|(time_s, frame)| (*time_s, frame.as_bytes().len())).collect();
+    let worst = super::budget::worst_second(&sizes);
+    assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
     assert!(worst > 1_200, "it had much to say: {worst} B");
+    let positions =
+        sent.iter().filter(|(_, frame)| frame.message_id() == LOCAL_POSITION_NED_DATA::ID).count();
+    let hz = positions as f64 / flown_s;
+    assert!((7.8..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
 }
 
 #[test]
@@ -157,7 +179,7 @@ fn the_landing_burn_tells_its_plan() {
     airborne.run_while(|rocket| rocket.phase() != Phase::Powered);
     airborne.run(0.5);
     let sent = airborne.run(2.0);
-    assert!(count(&sent, TD_CONTROLLER_DATA::ID) >= 7 && count(&sent, TD_PREDICTED_PATH_DATA::ID) >= 1);
+    assert!(count(&sent, TD_CONTROLLER_DATA::ID) >= 5 && count(&sent, TD_PREDICTED_PATH_DATA::ID) >= 1);
     // The truth is the estimate here: there is no estimator to speak of, and no sensor.
     assert_eq!(count(&sent, ESTIMATOR_STATUS_DATA::ID), 0);
     let absent = sent.iter().any(|frame| {
@@ -225,4 +247,43 @@ fn over_a_late_link_an_abort_comes_late_and_is_still_an_abort() {
         answered_after_s = (answers > 0).then(|| late.rocket.time_s() - asked_at_s);
     }
     assert!((3.0..3.05).contains(&answered_after_s.unwrap()), "{answered_after_s:?}");
+}
+
+#[test]
+fn it_is_on_the_map_where_its_mission_has_its_pad() {
+    let mut airborne = Airborne::let_go("field");
+    airborne.run_while(|rocket| rocket.phase() != Phase::LandArmed);
+    let MavMessage::GLOBAL_POSITION_INT(place) = airborne.request(GLOBAL_POSITION_INT_DATA::ID) else {
+        panic!("not the position")
+    };
+    let snapshot = airborne.rocket.snapshot();
+    let (latitude_deg, longitude_deg) = snapshot.site.at_deg(0.0, 0.0);
+    // Within a few hundred metres of the pad, some 200 m up; a degree is 111 km.
+    assert!((f64::from(place.lat) * 1e-7 - latitude_deg).abs() < 5e-3, "{place:?}");
+    assert!((f64::from(place.lon) * 1e-7 - longitude_deg).abs() < 5e-3, "{place:?}");
+    assert!((50_000..400_000).contains(&place.relative_alt) && place.vz > 100, "{place:?}");
+    let MavMessage::GPS_RAW_INT(fix) = airborne.request(GPS_RAW_INT_DATA::ID) else { panic!("not the fix") };
+    assert_eq!((fix.fix_type, fix.satellites_visible), (GpsFixType::GPS_FIX_TYPE_3D_FIX, u8::MAX));
+}
+
+/// Outcome: what other ground stations call an emergency stop opens the parachute.
+#[test]
+fn a_forced_disarm_in_the_air_is_an_abort_and_is_answered_as_one() {
+    for (code, aborted) in [(21196.0, true), (2989.0, true), (0.0, false)] {
+        let mut airborne = Airborne::let_go("field");
+        airborne.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
+        airborne.uplink.push(Encoder::new(GROUND).encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+            param1: 0.0,
+            param2: code,
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        })));
+        let sent = airborne.run(0.2);
+        assert_eq!(airborne.rocket.aborted(), aborted, "code {code}");
+        assert_eq!(airborne.rocket.phase() == Phase::Chute, aborted, "code {code}");
+        let accepted = sent.iter().filter_map(CommandAnswer::from_frame).any(|answer| answer.result == 0);
+        assert_eq!(accepted, aborted, "code {code}");
+    }
 }

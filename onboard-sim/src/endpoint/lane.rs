@@ -1,0 +1,266 @@
+//! Links that carry the same frames: what they may carry, and what waits for room on them.
+//!
+//! All links begin in one lane, so that a ground that hears several of them knows the copies by their numbers. A link
+//! that is given intervals of its own gets a lane of its own, with its own numbers.
+
+use std::collections::VecDeque;
+
+use protocol::command::CommandAnswer;
+use protocol::dialect::MavMessage;
+use protocol::frame::{Encoder, Frame};
+
+use super::budget::{BRIEFLY_S, WINDOW_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
+use super::{Context, MAX_REQUESTED, Outgoing};
+use crate::craft::{Craft, Snapshot};
+use crate::streams::{Due, Streams, kept_free_bytes, share_bytes_s};
+use crate::{parameters, telemetry};
+
+/// Answers and texts that may wait, each; what comes beyond is dropped, and whoever wants an answer asks again.
+const MAX_WAITING: usize = 32;
+/// However often an abort is repeated, it is answered this long after the last answer at the earliest, s.
+const ABORT_ANSWERED_S: f64 = 0.09;
+
+/// An answer that waits to be sent.
+#[derive(Debug, Clone)]
+pub(super) enum Answer {
+    Message(Box<MavMessage>),
+    Command(CommandAnswer),
+}
+
+impl From<MavMessage> for Answer {
+    fn from(message: MavMessage) -> Self {
+        Self::Message(Box::new(message))
+    }
+}
+
+/// Links that carry the same frames.
+#[derive(Clone)]
+pub(super) struct Lane {
+    pub(super) links: Vec<usize>,
+    pub(super) streams: Streams,
+    encoder: Encoder,
+    signature_len: usize,
+    sent: Window,
+    /// Of that, telemetry of the last moment.
+    telemetry_briefly: Window,
+    /// Of that, answers and texts of the last moment.
+    answers_briefly: Window,
+    /// Of that, answers.
+    answered: Window,
+    /// Of that, texts.
+    said: Window,
+    /// Answers to aborts; one for each station at most.
+    aborts: VecDeque<CommandAnswer>,
+    abort_answered_s: f64,
+    texts: VecDeque<Answer>,
+    answers: VecDeque<Answer>,
+    /// Messages that were asked for; they come after all that the crew lives by.
+    requested: VecDeque<MavMessage>,
+    /// The next parameter of a list that was asked for; none when the list has been sent.
+    next_parameter: Option<u16>,
+}
+
+impl Lane {
+    pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
+        let mut lane = Self {
+            links,
+            streams,
+            encoder,
+            signature_len,
+            sent: Window::of(WINDOW_S),
+            telemetry_briefly: Window::of(BRIEFLY_S),
+            answers_briefly: Window::of(BRIEFLY_S),
+            answered: Window::of(WINDOW_S),
+            said: Window::of(WINDOW_S),
+            aborts: VecDeque::new(),
+            abort_answered_s: f64::NEG_INFINITY,
+            texts: VecDeque::new(),
+            answers: VecDeque::new(),
+            requested: VecDeque::new(),
+            next_parameter: None,
+        };
+        let capacity_bytes_s = lane.streams.capacity_bytes_s();
+        lane.set_capacity(capacity_bytes_s);
+        lane
+    }
+
+    pub(super) fn set_capacity(&mut self, capacity_bytes_s: u32) {
+        self.streams.set_capacity(capacity_bytes_s);
+        self.sent.set_limit(capacity_bytes_s as usize);
+        self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
+        self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
+        self.answered.set_limit(share_bytes_s(capacity_bytes_s));
+        self.said.set_limit(share_bytes_s(capacity_bytes_s));
+    }
+
+    /// One of its links, alone: with all that was sent and waits.
+    pub(super) fn of_its_own(&mut self, link: usize) -> Self {
+        self.links.retain(|other| *other != link);
+        Self { links: vec![link], ..self.clone() }
+    }
+
+    /// An answer to an abort. One that waits already says the same.
+    pub(super) fn answer_abort(&mut self, answer: CommandAnswer) {
+        if !self.aborts.contains(&answer) && self.aborts.len() < MAX_WAITING {
+            self.aborts.push_back(answer);
+        }
+    }
+
+    pub(super) fn answer(&mut self, answer: Answer) {
+        if self.answers.len() < MAX_WAITING {
+            self.answers.push_back(answer);
+        }
+    }
+
+    pub(super) fn say(&mut self, chunk: MavMessage) {
+        if self.texts.len() < MAX_WAITING {
+            self.texts.push_back(chunk.into());
+        }
+    }
+
+    /// Sends them when there is room; says whether they may wait. Beyond that they are dropped: whoever wants them asks
+    /// again.
+    pub(super) fn request(&mut self, messages: Vec<MavMessage>) -> bool {
+        let fits = self.requested.len() + messages.len() <= MAX_REQUESTED;
+        if fits {
+            self.requested.extend(messages);
+        }
+        fits
+    }
+
+    /// Sends every parameter, from the beginning, also while an earlier list is on its way.
+    pub(super) fn list_parameters(&mut self) {
+        self.next_parameter = Some(0);
+    }
+
+    /// What is to be sent now: first what the crew lives by, then answers, then telemetry, most important first, then
+    /// what was asked for. In every second it is within the budget.
+    pub(super) fn poll(
+        &mut self,
+        context: &Context,
+        vehicle: &dyn Craft,
+        snapshot: &mut Option<Snapshot>,
+    ) -> Vec<Outgoing> {
+        let now_s = context.now_s;
+        self.sent.move_to(now_s);
+        self.telemetry_briefly.move_to(now_s);
+        self.answers_briefly.move_to(now_s);
+        self.answered.move_to(now_s);
+        self.said.move_to(now_s);
+        let mut frames = Vec::new();
+        let due = self.streams.due(now_s);
+        for due in due.iter().filter(|due| due.vital) {
+            if due.frame_len > self.sent.room() {
+                break;
+            }
+            self.send(due, context, vehicle, snapshot, &mut frames);
+        }
+        if now_s - self.abort_answered_s >= ABORT_ANSWERED_S
+            && let Some(answer) = self.aborts.front().copied()
+            && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
+        {
+            self.put(frame, now_s, &mut frames);
+            self.abort_answered_s = now_s;
+            self.aborts.pop_front();
+        }
+        while let Some(answer) = self.answers.front().cloned() {
+            let room = self.room_for_answers().min(self.answered.room());
+            let Some(frame) = self.encode(&answer, room) else { break };
+            self.answered.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, &mut frames);
+            self.answers.pop_front();
+        }
+        while let Some(chunk) = self.texts.front().cloned() {
+            let room = self.room_for_answers().min(self.said.room());
+            let Some(frame) = self.encode(&chunk, room) else { break };
+            self.said.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, &mut frames);
+            self.texts.pop_front();
+        }
+        for due in due.iter().filter(|due| !due.vital) {
+            // By its longest, so that nothing is put together in vain. What is less important does not overtake it.
+            if due.frame_len > self.room_for_telemetry() {
+                break;
+            }
+            self.send(due, context, vehicle, snapshot, &mut frames);
+        }
+        let longest = self.streams.longest_frame_len();
+        while let Some(message) = self.next_requested(vehicle) {
+            // Also free for telemetry that falls due in the meantime: it is not to wait for this.
+            let room = self.room_for_telemetry().saturating_sub(longest);
+            let Some(frame) = self.encode(&message.into(), room) else { break };
+            self.telemetry_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, &mut frames);
+            if self.requested.pop_front().is_none() {
+                self.next_parameter = self.next_parameter.map(|place| place + 1);
+            }
+        }
+        frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
+    }
+
+    /// Room for what the crew does not live by: for that some is kept free, so that it never waits for anything else.
+    fn room(&self) -> usize {
+        self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
+    }
+
+    fn room_for_answers(&self) -> usize {
+        self.room().min(self.answers_briefly.room())
+    }
+
+    fn room_for_telemetry(&self) -> usize {
+        self.room().min(self.telemetry_briefly.room())
+    }
+
+    fn send(
+        &mut self,
+        due: &Due,
+        context: &Context,
+        vehicle: &dyn Craft,
+        snapshot: &mut Option<Snapshot>,
+        frames: &mut Vec<Frame>,
+    ) {
+        // In most frames nothing is due, and the state is not put together for nothing.
+        let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
+        if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
+            let frame = self.encoder.encode(&message);
+            self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
+            self.put(frame, context.now_s, frames);
+        }
+        self.streams.on_sent(due.message_id, context.now_s);
+    }
+
+    /// What was asked for and is to be sent next: single messages first, then the list of parameters.
+    fn next_requested(&mut self, vehicle: &dyn Craft) -> Option<MavMessage> {
+        if let Some(message) = self.requested.front() {
+            return Some(message.clone());
+        }
+        self.next_parameter = self.next_parameter.filter(|place| *place < parameters::count(&self.streams));
+        self.next_parameter.map(|place| parameters::value(place, &self.streams, vehicle.weights()))
+    }
+
+    /// The frame, if it is no longer than this; a frame that is not sent takes no number.
+    fn encode(&mut self, answer: &Answer, room: usize) -> Option<Frame> {
+        let mut encoder = self.encoder.clone();
+        let frame = match answer {
+            Answer::Message(message) => encoder.encode(message),
+            // The dialect has COMMAND_ACK; were it not so, there would be nothing to send.
+            Answer::Command(answer) => answer.encode(&mut encoder)?,
+        };
+        if self.len_of(&frame) > room {
+            return None;
+        }
+        self.encoder = encoder;
+        Some(frame)
+    }
+
+    fn len_of(&self, frame: &Frame) -> usize {
+        frame.as_bytes().len() + self.signature_len
+    }
+
+    fn put(&mut self, frame: Frame, now_s: f64, frames: &mut Vec<Frame>) {
+        self.sent.take(self.len_of(&frame), now_s);
+        frames.push(frame);
+    }
+}

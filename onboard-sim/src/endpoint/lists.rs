@@ -1,0 +1,117 @@
+//! Lists that this vehicle does not keep: missions, fences, rally points, logs on board.
+//!
+//! Other people's ground stations ask for them whatever the capabilities say, and tell their user of a failure if they
+//! hear nothing. So every question is answered: the lists are empty, and nothing can be put into them. Protocols:
+//! <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of common.xml. Questions are read by their bytes,
+//! because a mission type that the dialect does not know must be answered, too.
+
+use protocol::dialect::{
+    LOG_DATA_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult,
+    MavMissionType,
+};
+use protocol::frame::Frame;
+use protocol::identity::Address;
+
+/// A question about a list, with its answer.
+pub(super) struct ListQuestion {
+    /// Who is asked; 0 means all.
+    pub(super) target: Address,
+    pub(super) answer: MavMessage,
+}
+
+impl ListQuestion {
+    /// The question in a frame; `None` for any other message.
+    pub(super) fn from_frame(frame: &Frame) -> Option<Self> {
+        let bytes = frame.padded_payload();
+        let integer = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let of = |target_at: usize, type_at: usize| List {
+            target: Address { system_id: bytes[target_at], component_id: bytes[target_at + 1] },
+            asker: frame.source(),
+            mission_type: mission_type(bytes[type_at]),
+        };
+        Some(match frame.message_id() {
+            MISSION_REQUEST_LIST => of(0, 2).empty(),
+            // To begin an upload of nothing is to clear the list: it is clear.
+            MISSION_COUNT if integer(0) == 0 => of(2, 4).done(),
+            MISSION_COUNT => of(2, 4).unsupported(),
+            MISSION_CLEAR_ALL => of(0, 2).done(),
+            MISSION_REQUEST | MISSION_REQUEST_INT => {
+                of(2, 4).acknowledge(MavMissionResult::MAV_MISSION_INVALID_SEQUENCE)
+            }
+            MISSION_WRITE_PARTIAL_LIST => of(4, 6).unsupported(),
+            MISSION_ITEM | MISSION_ITEM_INT => of(32, 37).unsupported(),
+            LOG_REQUEST_LIST => {
+                let target = Address { system_id: bytes[4], component_id: bytes[5] };
+                Self { target, answer: MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default()) }
+            }
+            LOG_REQUEST_DATA => {
+                let target = Address { system_id: bytes[10], component_id: bytes[11] };
+                let ofs = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+                let answer = LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] };
+                Self { target, answer: MavMessage::LOG_DATA(answer) }
+            }
+            _ => return None,
+        })
+    }
+}
+
+const MISSION_WRITE_PARTIAL_LIST: u32 = 38;
+const MISSION_ITEM: u32 = 39;
+const MISSION_REQUEST: u32 = 40;
+const MISSION_REQUEST_LIST: u32 = 43;
+const MISSION_COUNT: u32 = 44;
+const MISSION_CLEAR_ALL: u32 = 45;
+const MISSION_REQUEST_INT: u32 = 51;
+const MISSION_ITEM_INT: u32 = 73;
+const LOG_REQUEST_LIST: u32 = 117;
+const LOG_REQUEST_DATA: u32 = 119;
+
+/// One of the three kinds of list; `None` for a number that is none of them.
+fn mission_type(number: u8) -> Option<MavMissionType> {
+    match number {
+        0 => Some(MavMissionType::MAV_MISSION_TYPE_MISSION),
+        1 => Some(MavMissionType::MAV_MISSION_TYPE_FENCE),
+        2 => Some(MavMissionType::MAV_MISSION_TYPE_RALLY),
+        _ => None,
+    }
+}
+
+struct List {
+    target: Address,
+    asker: Address,
+    mission_type: Option<MavMissionType>,
+}
+
+impl List {
+    fn empty(self) -> ListQuestion {
+        let Some(mission_type) = self.mission_type else { return self.unsupported() };
+        let answer = MISSION_COUNT_DATA {
+            count: 0,
+            target_system: self.asker.system_id,
+            target_component: self.asker.component_id,
+            mission_type,
+            ..MISSION_COUNT_DATA::default()
+        };
+        ListQuestion { target: self.target, answer: MavMessage::MISSION_COUNT(answer) }
+    }
+
+    fn done(self) -> ListQuestion {
+        self.acknowledge(MavMissionResult::MAV_MISSION_ACCEPTED)
+    }
+
+    fn unsupported(self) -> ListQuestion {
+        self.acknowledge(MavMissionResult::MAV_MISSION_UNSUPPORTED)
+    }
+
+    fn acknowledge(self, result: MavMissionResult) -> ListQuestion {
+        let answer = MISSION_ACK_DATA {
+            target_system: self.asker.system_id,
+            target_component: self.asker.component_id,
+            mavtype: result,
+            // All of them, where it was asked about none that there is.
+            mission_type: self.mission_type.unwrap_or(MavMissionType::MAV_MISSION_TYPE_ALL),
+            ..MISSION_ACK_DATA::default()
+        };
+        ListQuestion { target: self.target, answer: MavMessage::MISSION_ACK(answer) }
+    }
+}

@@ -1,0 +1,210 @@
+//! What the downlink carries in any one second, whatever is asked.
+
+use protocol::dialect::{LOCAL_POSITION_NED_DATA, MavModeFlag, MavState, STATUSTEXT_DATA};
+
+use super::*;
+
+/// The most bytes in any one second of what was sent at which time.
+pub(super) fn worst_second(sent: &[(f64, usize)]) -> usize {
+    let mut worst = 0;
+    for (first, (began_s, _)) in sent.iter().enumerate() {
+        let within = sent[first..].iter().take_while(|(time_s, _)| time_s - began_s < 1.0);
+        worst = worst.max(within.map(|(_, bytes)| bytes).sum());
+    }
+    worst
+}
+
+/// What was sent, and when.
+struct Sent(Vec<(f64, Frame)>);
+
+impl Sent {
+    fn count(&self, message_id: u32) -> usize {
+        self.0.iter().filter(|(_, frame)| frame.message_id() == message_id).count()
+    }
+
+    fn worst_second(&self, signature_len: usize) -> usize {
+        let sizes: Vec<_> =
+            self.0.iter().map(|(time_s, frame)| (*time_s, frame.as_bytes().len() + signature_len)).collect();
+        worst_second(&sizes)
+    }
+
+    /// The longest pause between two messages of this kind, s.
+    fn longest_pause_s(&self, message_id: u32) -> f64 {
+        let times: Vec<f64> = self
+            .0
+            .iter()
+            .filter(|(_, frame)| frame.message_id() == message_id)
+            .map(|(time_s, _)| *time_s)
+            .collect();
+        times.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
+    }
+}
+
+impl Bench {
+    fn signed() -> Self {
+        let mut bench = Self { endpoint: VehicleEndpoint::sending_signed(&STANDARD), ..Self::new() };
+        bench.run(2.0);
+        bench
+    }
+
+    /// Runs for this long, with what `ask` asks in each frame of 20 ms.
+    fn run_asked(&mut self, duration_s: f64, mut ask: impl FnMut(u64) -> Vec<CommandRequest>) -> Sent {
+        let end_s = self.vehicle.time_s() + duration_s;
+        let mut sent = Vec::new();
+        for frame in 0.. {
+            for request in ask(frame) {
+                self.endpoint.on_command(0, &request, &mut self.vehicle);
+            }
+            sent.extend(self.run(0.001).into_iter().map(|frame| (self.vehicle.time_s(), frame)));
+            if self.vehicle.time_s() >= end_s {
+                break;
+            }
+        }
+        Sent(sent)
+    }
+}
+
+fn from(station: u8, command: u16, param1: f32, param2: f32) -> CommandRequest {
+    let source = Address { system_id: station, component_id: 190 };
+    let params = [param1, param2, 0.0, 0.0, 0.0, 0.0, 0.0];
+    CommandRequest { source, target: VEHICLE, command, params, confirmation: 0 }
+}
+
+/// Twenty a second, in frames of 20 ms.
+fn twenty_hz(frame: u64) -> bool {
+    matches!(frame % 5, 0 | 2)
+}
+
+#[test]
+fn twenty_refused_commands_a_second_cost_no_position_and_are_counted() {
+    let mut bench = Bench::new();
+    bench.run(2.0);
+    // A start that nobody armed for: the vehicle refuses it with words.
+    let sent = bench
+        .run_asked(10.0, |frame| if twenty_hz(frame) { vec![from(255, 300, 0.0, 0.0)] } else { Vec::new() });
+    let worst = sent.worst_second(0);
+    assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
+    let positions = sent.count(LOCAL_POSITION_NED_DATA::ID);
+    assert!(positions >= 99, "{positions} positions in 10 s at 10 Hz");
+    // Eight at once, then two a second; said once, then counted every 5 s.
+    let (answers, texts_sent) = (sent.count(77), sent.count(STATUSTEXT_DATA::ID));
+    assert!((26..=29).contains(&answers), "{answers} answers");
+    assert!((2..=8).contains(&texts_sent), "{texts_sent} chunks of text");
+    let frames: Vec<Frame> = sent.0.into_iter().map(|(_, frame)| frame).collect();
+    let words = texts(&frames);
+    assert!(
+        words[0].contains("start refused: cannot start in PAD_IDLE") && !words[0].contains("more)"),
+        "{words:?}"
+    );
+    assert!(words[1].contains("start refused") && words[1].contains("more)"), "{words:?}");
+}
+
+/// Of everything too much: refused and obeyed commands of many stations, questions, requests.
+fn flood(frame: u64) -> Vec<CommandRequest> {
+    let station = (frame % 40) as u8 + 100;
+    vec![
+        from(station, 300, 0.0, 0.0),
+        from(station, 400, (frame % 3) as f32, 0.0),
+        from(station, 512, 148.0, 0.0),
+        from(255, 512, f32::NAN, frame as f32),
+        from(255, 511, TD_FINS_DATA::ID as f32, (frame % 7) as f32 * 1e5),
+        from(254, 12_345, frame as f32, 0.0),
+    ]
+}
+
+#[test]
+fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messages_come() {
+    for (mut bench, signature_len) in [(Bench::new(), 0), (Bench::signed(), SIGNATURE_LEN)] {
+        let sent = bench.run_asked(12.0, flood);
+        let worst = sent.worst_second(signature_len);
+        assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
+        assert!(worst > 1_500, "the flood was one: {worst} B");
+        let pause_s = sent.longest_pause_s(HEARTBEAT_DATA::ID);
+        assert!(pause_s <= 1.05, "{pause_s} s without a heartbeat");
+        let pause_s = sent.longest_pause_s(TD_FLIGHT_STATUS_DATA::ID);
+        assert!(pause_s <= 0.25, "{pause_s} s without a flight status");
+    }
+}
+
+#[test]
+fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
+    for mut bench in [Bench::new(), Bench::signed()] {
+        assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+        bench.run_asked(5.0, flood);
+        bench.endpoint.on_command(0, &from(255, 185, 1.0, 0.0), &mut bench.vehicle);
+        let aborted_at_s = bench.vehicle.time_s();
+        let sent = bench.run_asked(3.0, |frame| {
+            let mut asked = flood(frame);
+            if frame.is_multiple_of(3) {
+                asked.push(from(255, 185, 1.0, 0.0));
+            }
+            asked
+        });
+        let answers: Vec<f64> = sent
+            .0
+            .iter()
+            .filter(|(_, frame)| {
+                CommandAnswer::from_frame(frame).is_some_and(|a| (a.command, a.result) == (185, 0))
+            })
+            .map(|(time_s, _)| time_s - aborted_at_s)
+            .collect();
+        assert!(answers[0] <= 0.02 + 1e-9, "answered after {} s", answers[0]);
+        assert!(answers.iter().filter(|after_s| **after_s <= 1.0).count() >= 5, "{answers:?}");
+        let beats: Vec<f64> = sent
+            .0
+            .iter()
+            .filter(|(_, frame)| {
+                matches!(frame.decode(), Ok(MavMessage::HEARTBEAT(beat))
+                    if beat.system_status == MavState::MAV_STATE_FLIGHT_TERMINATION)
+            })
+            .map(|(time_s, _)| time_s - aborted_at_s)
+            .collect();
+        assert!(beats[0] <= 0.12, "seen after {} s", beats[0]);
+        assert!(beats.iter().filter(|after_s| **after_s <= 1.05).count() >= 5, "{beats:?}");
+    }
+}
+
+#[test]
+fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
+    let sent = bench.run_asked(14.0, |_| Vec::new());
+    assert_ne!(
+        count(
+            &sent.0.iter().map(|(_, frame)| frame.clone()).collect::<Vec<_>>(),
+            TD_LANDING_VERDICT_DATA::ID
+        ),
+        0
+    );
+    let worst = sent.worst_second(0);
+    assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
+}
+
+#[test]
+fn every_heartbeat_and_flight_status_says_from_the_boot_on_that_it_is_simulated_and_which_boot_it_is() {
+    let mut bench = Bench { endpoint: VehicleEndpoint::new().booted(0xB007_0001), ..Bench::new() };
+    let first = bench.run(0.001);
+    assert!(
+        count(&first, HEARTBEAT_DATA::ID) == 1 && count(&first, TD_FLIGHT_STATUS_DATA::ID) == 1,
+        "at once"
+    );
+    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
+    let sent = first.into_iter().chain(bench.run(5.0));
+    let (mut beats, mut statuses) = (0, 0);
+    for frame in sent {
+        match frame.decode() {
+            Ok(MavMessage::HEARTBEAT(beat)) => {
+                beats += 1;
+                assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED));
+            }
+            Ok(MavMessage::TD_FLIGHT_STATUS(status)) => {
+                statuses += 1;
+                assert_eq!(status.boot_number, 0xB007_0001);
+                assert_eq!(status.vehicle_flags, protocol::dialect::TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
+            }
+            _ => {}
+        }
+    }
+    assert!(beats >= 5 && statuses >= 25, "{beats} heartbeats, {statuses} flight statuses");
+}

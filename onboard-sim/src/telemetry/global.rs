@@ -1,0 +1,214 @@
+//! Attitude in angles, and the vehicle on the globe: for other people's clients, whose maps and instruments show these.
+
+use mavlink::MessageData as _;
+use protocol::dialect::{
+    ATTITUDE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, GpsFixType, HOME_POSITION_DATA, MavMessage,
+    SYSTEM_TIME_DATA,
+};
+
+use super::boot_ms;
+use crate::craft::Snapshot;
+
+/// Pitch is this close to upright when roll and heading are one and the same rotation: above a sine of 0.99999 (0.26
+/// degrees) a single float does not tell them apart any more.
+const UPRIGHT_SINE: f64 = 0.999_99;
+
+/// The message of this id, or `None` if it is none of these.
+pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
+    match message_id {
+        ATTITUDE_DATA::ID => Some(attitude(snapshot)),
+        GLOBAL_POSITION_INT_DATA::ID => Some(position(snapshot)),
+        HOME_POSITION_DATA::ID => Some(home(snapshot)),
+        GPS_RAW_INT_DATA::ID => Some(gps(snapshot)),
+        SYSTEM_TIME_DATA::ID => Some(system_time(snapshot)),
+        _ => None,
+    }
+}
+
+/// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, where roll and yaw are one
+/// rotation, all of it is yaw.
+fn roll_pitch_yaw_rad([w, x, y, z]: &[f64; 4]) -> [f64; 3] {
+    let sine = 2.0 * (w * y - x * z);
+    if sine.abs() > UPRIGHT_SINE {
+        let up = libm::copysign(1.0, sine);
+        return [0.0, up * core::f64::consts::FRAC_PI_2, wrapped_rad(-2.0 * up * libm::atan2(*x, *w))];
+    }
+    [
+        libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        libm::asin(sine),
+        libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    ]
+}
+
+/// The same angle between minus and plus half a turn.
+fn wrapped_rad(angle_rad: f64) -> f64 {
+    libm::atan2(libm::sin(angle_rad), libm::cos(angle_rad))
+}
+
+/// Where the vehicle points on a compass, degrees from north over east, 0 to 360. A nose that is steeper than 45 degrees
+/// points nowhere on it; its belly does then, as an aircraft's that has pitched up from there.
+pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
+    let nose = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)];
+    let belly = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x)];
+    let nose_down = 2.0 * (x * z - w * y);
+    let [north, east] = match nose_down {
+        steep if steep < -core::f64::consts::FRAC_1_SQRT_2 => belly,
+        steep if steep > core::f64::consts::FRAC_1_SQRT_2 => belly.map(|part| -part),
+        _ => nose,
+    };
+    let heading_deg = libm::atan2(east, north).to_degrees();
+    if heading_deg < 0.0 { heading_deg + 360.0 } else { heading_deg }
+}
+
+fn attitude(snapshot: &Snapshot) -> MavMessage {
+    let [roll, pitch, yaw] = roll_pitch_yaw_rad(&snapshot.motion.ned_from_body).map(|angle| angle as f32);
+    let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
+    MavMessage::ATTITUDE(ATTITUDE_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        roll,
+        pitch,
+        yaw,
+        rollspeed,
+        pitchspeed,
+        yawspeed,
+    })
+}
+
+/// Latitude and longitude, 1e-7 degrees, of a place so far north and east of the pad, m.
+fn degrees_e7(snapshot: &Snapshot, north_m: f64, east_m: f64) -> (i32, i32) {
+    let (latitude_deg, longitude_deg) = snapshot.site.at_deg(north_m, east_m);
+    ((1e7 * latitude_deg).round() as i32, (1e7 * longitude_deg).round() as i32)
+}
+
+fn millimetres(length_m: f64) -> i32 {
+    (1000.0 * length_m).round() as i32
+}
+
+fn position(snapshot: &Snapshot) -> MavMessage {
+    let [north_m, east_m, down_m] = snapshot.motion.position_m;
+    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed_m_s| (100.0 * speed_m_s).round() as i16);
+    let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
+    MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        lat,
+        lon,
+        alt: millimetres(snapshot.pad_altitude_m - down_m),
+        relative_alt: millimetres(-down_m),
+        vx,
+        vy,
+        vz,
+        hdg: (100.0 * heading_deg(&snapshot.motion.ned_from_body)).round() as u16 % 36_000,
+    })
+}
+
+/// The pad. Which way the ground slopes there, and from where one would approach it, is not known.
+fn home(snapshot: &Snapshot) -> MavMessage {
+    let (latitude, longitude) = degrees_e7(snapshot, 0.0, 0.0);
+    MavMessage::HOME_POSITION(HOME_POSITION_DATA {
+        latitude,
+        longitude,
+        altitude: millimetres(snapshot.pad_altitude_m),
+        x: 0.0,
+        y: 0.0,
+        z: 0.0,
+        q: [f32::NAN; 4],
+        approach_x: f32::NAN,
+        approach_y: f32::NAN,
+        approach_z: f32::NAN,
+        time_usec: (1e6 * snapshot.time_s) as u64,
+    })
+}
+
+/// Whether the satellite receiver reports, and where the estimate has the vehicle then: single fixes are not kept. A craft
+/// without sensors has no receiver.
+fn gps(snapshot: &Snapshot) -> MavMessage {
+    let [north_m, east_m, down_m] = snapshot.motion.position_m;
+    let [north_m_s, east_m_s, _] = snapshot.motion.velocity_m_s;
+    let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
+    let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
+    let fix_type = match &snapshot.sensors {
+        None => GpsFixType::GPS_FIX_TYPE_NO_GPS,
+        Some(sensors) if sensors.gnss => GpsFixType::GPS_FIX_TYPE_3D_FIX,
+        Some(_) => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+    };
+    let unknown = GPS_RAW_INT_DATA {
+        time_usec: (1e6 * snapshot.time_s) as u64,
+        eph: u16::MAX,
+        epv: u16::MAX,
+        vel: u16::MAX,
+        cog: u16::MAX,
+        fix_type,
+        satellites_visible: u8::MAX,
+        ..GPS_RAW_INT_DATA::default()
+    };
+    MavMessage::GPS_RAW_INT(if fix_type == GpsFixType::GPS_FIX_TYPE_3D_FIX {
+        GPS_RAW_INT_DATA {
+            lat,
+            lon,
+            alt: millimetres(snapshot.pad_altitude_m - down_m),
+            vel: (100.0 * libm::hypot(north_m_s, east_m_s)).round() as u16,
+            cog: (100.0 * if course_deg < 0.0 { course_deg + 360.0 } else { course_deg }).round() as u16
+                % 36_000,
+            ..unknown
+        }
+    } else {
+        unknown
+    })
+}
+
+/// No clock on board knows the time of day: nought, as the standard has it.
+fn system_time(snapshot: &Snapshot) -> MavMessage {
+    MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(snapshot.time_s) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Yaw, then pitch, then roll, degrees.
+    fn ned_from_body(yaw_deg: f64, pitch_deg: f64, roll_deg: f64) -> [f64; 4] {
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(
+            roll_deg.to_radians(),
+            pitch_deg.to_radians(),
+            yaw_deg.to_radians(),
+        );
+        [turn.w, turn.i, turn.j, turn.k]
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        // The shorter way around.
+        let off = (found - expected).rem_euclid(360.0);
+        off.min(360.0 - off) < 1e-6
+    }
+
+    #[test]
+    fn angles_come_back_from_the_rotation() {
+        for (yaw, pitch, roll) in
+            [(0.0, 0.0, 0.0), (30.0, 20.0, -40.0), (-120.0, 80.0, 10.0), (170.0, -60.0, 5.0)]
+        {
+            let found = roll_pitch_yaw_rad(&ned_from_body(yaw, pitch, roll)).map(f64::to_degrees);
+            let expected = [roll, pitch, yaw];
+            assert!(found.iter().zip(expected).all(|(found, expected)| close(*found, expected)), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn upright_there_is_no_roll_and_the_yaw_is_what_is_left() {
+        for (yaw, pitch) in [(0.0, 90.0), (75.0, 90.0), (-160.0, 90.0), (75.0, -90.0)] {
+            let found = roll_pitch_yaw_rad(&ned_from_body(yaw, pitch, 0.0)).map(f64::to_degrees);
+            assert!(close(found[0], 0.0) && close(found[1], pitch) && close(found[2], yaw), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn the_heading_is_the_compass_s_at_every_pitch() {
+        for yaw in [0.0, 75.0, 200.0, 359.0] {
+            for pitch in [-90.0, -50.0, -10.0, 0.0, 44.0, 46.0, 85.0, 90.0] {
+                let found = heading_deg(&ned_from_body(yaw, pitch, 0.0));
+                assert!(close(found, yaw), "yaw {yaw}, pitch {pitch}: {found}");
+            }
+        }
+        // A rocket that leans over backwards does not turn round for it.
+        assert!(close(heading_deg(&ned_from_body(75.0 + 180.0, 80.0, 180.0)), 75.0));
+    }
+}
