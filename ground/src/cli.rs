@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Parser, Subcommand};
 use protocol::dialect::TdPhase;
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::Endpoint;
 
 use crate::attach::place;
@@ -35,6 +36,15 @@ pub struct Cli {
     /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
     #[arg(long, value_name = "LINK", global = true)]
     pub connect: Vec<Endpoint>,
+
+    /// This station's own MAVLink system id: each station on one link needs its own. Default: 255.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub sysid: Option<u8>,
+
+    /// MAVLink system id of the vehicle to show and command; nobody else on the link is. Default: 1; of a replay: the
+    /// first that was heard.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub vehicle_sysid: Option<u8>,
 
     /// Sign every frame with this key, and believe nothing that is not signed with it. `onboard-sim keygen` makes one.
     #[arg(long, value_name = "FILE", global = true)]
@@ -225,6 +235,16 @@ impl Cli {
         self.socket.clone().unwrap_or_else(place::default_path)
     }
 
+    /// Our own MAVLink address.
+    pub fn us(&self) -> Address {
+        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
+    }
+
+    /// The vehicle's MAVLink address.
+    pub fn vehicle(&self) -> Address {
+        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
+    }
+
     /// Whether a demonstration is described, which no link and no station that runs already can be meant by.
     pub fn describes_demonstration(&self) -> bool {
         let replayed = self.replay.is_some() || matches!(self.command, Some(Command::Attach { .. }));
@@ -255,6 +275,8 @@ mod tests {
         for word in [
             "--connect",
             "--key",
+            "--sysid",
+            "--vehicle-sysid",
             "--log",
             "--profile",
             "--seed",
@@ -275,6 +297,7 @@ mod tests {
         };
         assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
         assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
+        assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
         assert!(refuse(&["--speed", "0"]).contains("0.01"));
         assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
     }

@@ -36,6 +36,7 @@ const REJECTED_SAID_EVERY_S: f64 = 5.0;
 const MAX_KNOWN: usize = 16;
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
+    us: Address,
     encoder: Encoder,
     /// What a signature adds to every frame, bytes; 0 without a key.
     signature_len: usize,
@@ -70,6 +71,7 @@ impl VehicleEndpoint {
     /// With these messages at their default rates.
     pub fn sending(standard: &'static [Standard]) -> Self {
         Self {
+            us: VEHICLE,
             encoder: Encoder::new(VEHICLE),
             signature_len: 0,
             streams: Streams::of(standard),
@@ -91,12 +93,21 @@ impl VehicleEndpoint {
         Self { signature_len: SIGNATURE_LEN, streams, ..Self::sending(standard) }
     }
 
+    /// The same as another system than the first.
+    #[must_use]
+    pub fn of_system(self, system_id: u8) -> Self {
+        let us = VEHICLE.of_system(system_id);
+        Self { us, encoder: Encoder::new(us), ..self }
+    }
+
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
     pub fn on_frame(&mut self, frame: &Frame, vehicle: &mut dyn Craft) {
-        if frame.source() == VEHICLE {
+        if frame.source() == self.us {
             if !self.warned_of_twin {
                 self.warned_of_twin = true;
-                self.say(Severity::Warning, "another system 1 component 1 is on this link");
+                let Address { system_id, component_id } = self.us;
+                let words = format!("another system {system_id} component {component_id} is on this link");
+                self.say(Severity::Warning, &words);
             }
             return;
         }
@@ -104,7 +115,7 @@ impl VehicleEndpoint {
             self.streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
-            if VEHICLE.accepts(request.target) {
+            if self.us.accepts(request.target) {
                 self.on_command(&request, vehicle);
             }
             return;
@@ -114,7 +125,7 @@ impl VehicleEndpoint {
         }
         match frame.decode() {
             Ok(MavMessage::TIMESYNC(sync))
-                if sync.tc1 == 0 && is_for_us(sync.target_system, sync.target_component) =>
+                if sync.tc1 == 0 && self.is_for_us(sync.target_system, sync.target_component) =>
             {
                 let answer = TIMESYNC_DATA {
                     tc1: (1e9 * vehicle.time_s()) as i64,
@@ -137,7 +148,7 @@ impl VehicleEndpoint {
     /// Says that a command was not believed; now and then, because a flood of them must not fill the radio. It is not
     /// acknowledged: a forger could have the true ground's own command answered by it.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
-        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| VEHICLE.accepts(asked.target))
+        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| self.us.accepts(asked.target))
         else {
             return;
         };
@@ -248,6 +259,10 @@ impl VehicleEndpoint {
         (MavResult::MAV_RESULT_ACCEPTED, None)
     }
 
+    fn is_for_us(&self, system_id: u8, component_id: u8) -> bool {
+        self.us.accepts(Address { system_id, component_id })
+    }
+
     fn answer(&mut self, message: &MavMessage) {
         let frame = self.encoder.encode(message);
         self.urgent.push(frame);
@@ -266,10 +281,6 @@ impl VehicleEndpoint {
             self.answer(&MavMessage::STATUSTEXT(chunk));
         }
     }
-}
-
-fn is_for_us(system_id: u8, component_id: u8) -> bool {
-    VEHICLE.accepts(Address { system_id, component_id })
 }
 
 /// The answer to a PING that asks for one. Deprecated, but older ground stations still measure with it.

@@ -30,6 +30,7 @@ use crate::config::Config;
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::{Model, Role, Settings};
+use crate::update::update;
 use clock::{Clock, LogTime};
 use log::LogGuard;
 use output::Output;
@@ -84,7 +85,7 @@ async fn station_runs(cli: &Cli) -> bool {
 async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &cli.connect[..] {
-        [] => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed)?),
+        [] => Some(DemoOptions::load(&cli.profile, cli.seed, cli.speed, cli.vehicle().system_id)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -107,7 +108,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
     let log_guard = LogGuard::new(recorder.clone());
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let mut wire = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await?;
+    let mut wire = Wire::open(cli.us(), endpoints, key, clock, recorder.clone(), log_time.clone()).await?;
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
             Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
@@ -127,6 +128,8 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
             .and_then(Endpoint::capacity_bytes_s),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
+        us: cli.us(),
+        vehicle: cli.vehicle(),
         role: Role::Station,
         auto,
         // A daemon, too, goes on after a flight.
@@ -156,7 +159,9 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         report_at: Duration::ZERO,
     };
     let ran = station.run(&mut model, &mut wire).await;
-    wire.remember();
+    if let Some(msg) = wire.remember() {
+        update(&mut model, msg, clock.now());
+    }
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;

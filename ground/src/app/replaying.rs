@@ -27,7 +27,7 @@ const STEP: Duration = Duration::from_millis(100);
 /// # Errors
 /// The log cannot be read, the terminal failed, or the film has no such phase.
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
-    let film = Film::load(path)?;
+    let film = Film::load(path, cli.vehicle_sysid.map(|_| cli.vehicle()))?;
     let damage = film.damage.clone();
     let name = path.display().to_string();
     let settings =

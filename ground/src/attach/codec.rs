@@ -17,7 +17,7 @@ use crate::update::Msg;
 use bytes::{Reader, Writer};
 
 /// Changes when the bytes do; a screen of another version is told so.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// Nothing longer is believed.
 const LENGTH_MAX: usize = 64 * 1024;
 /// The length itself.
@@ -34,6 +34,8 @@ pub struct Hello {
     pub auto: bool,
     /// Bytes per second; 0 where nothing is known to bound it.
     pub link_capacity_bytes_s: u32,
+    /// System ids of the station and of its vehicle.
+    pub system_ids: [u8; 2],
     /// The link's name.
     pub link_name: String,
     /// The log's path; empty without one.
@@ -83,6 +85,7 @@ pub fn encode_told(told: &Told, now: Duration) -> Option<Vec<u8>> {
     match told {
         Told::Hello(hello) => {
             out.kind(0).u32(hello.version).u8(u8::from(hello.auto)).u32(hello.link_capacity_bytes_s);
+            out.u8(hello.system_ids[0]).u8(hello.system_ids[1]);
             out.text(&hello.link_name).text(&hello.log_path).text(&hello.tlog_path);
         }
         Told::Live => drop(out.kind(1)),
@@ -114,6 +117,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::ScreenGone => drop(out.kind(13)),
         Msg::HeardOver(number) => drop(out.kind(14).u64(*number as u64)),
         Msg::OneLinkDown(why) => drop(out.kind(15).text(why)),
+        Msg::LinkSays(words) => drop(out.kind(17).text(words)),
         Msg::Links { links, signing } => {
             out.kind(16);
             report::encode(links, signing.as_ref(), out);
@@ -135,6 +139,7 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
             version: rest.u32()?,
             auto: rest.u8()? != 0,
             link_capacity_bytes_s: rest.u32()?,
+            system_ids: [rest.u8()?, rest.u8()?],
             link_name: rest.text()?,
             log_path: rest.text()?,
             tlog_path: rest.text()?,
@@ -173,6 +178,7 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
             let (links, signing) = report::decode(&mut rest)?;
             Told::Msg(Msg::Links { links, signing })
         }
+        17 => Told::Msg(Msg::LinkSays(rest.text()?)),
         _ => return Err(CodecError("an unknown kind of message")),
     };
     rest.end()?;

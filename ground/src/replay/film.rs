@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use protocol::dialect::{MavCmd, MavMessage, TdPhase};
 use protocol::frame::{Frame, Framer};
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::frame_length;
@@ -63,18 +63,38 @@ pub struct Film {
     pub phases: Vec<(TdPhase, Duration)>,
     /// Why reading ended early, if it did.
     pub damage: Option<String>,
+    /// Whose flight it is: of several vehicles the one that was asked for, else the first that was heard.
+    pub vehicle: Option<Address>,
+}
+
+/// Who is who in a log; each is the first that was heard in its part, unless it is known before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sides {
+    vehicle: Option<Address>,
+    ground: Option<Address>,
+}
+
+impl Sides {
+    fn hear(&mut self, source: Address) {
+        if source.component_id == VEHICLE.component_id {
+            self.vehicle.get_or_insert(source);
+        } else if source.component_id == GROUND.component_id {
+            self.ground.get_or_insert(source);
+        }
+    }
 }
 
 impl Film {
-    /// Reads a log; a `.tlog` by its name, everything else as MCAP.
+    /// Reads the flight of this vehicle (`None`: the first that was heard) from a log; a `.tlog` by its name, everything
+    /// else as MCAP.
     ///
     /// # Errors
     /// The file cannot be read, holds nothing to show, or too much.
-    pub fn load(path: &Path) -> Result<Self, FilmError> {
+    pub fn load(path: &Path, vehicle: Option<Address>) -> Result<Self, FilmError> {
         let read = |source| FilmError::Read { path: path.to_owned(), source };
         let file = BufReader::new(File::open(path).map_err(read)?);
         let is_tlog = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
-        let film = if is_tlog { from_tlog(file) } else { from_mcap(file) }.map_err(read)?;
+        let film = if is_tlog { from_tlog(file, vehicle) } else { from_mcap(file, vehicle) }.map_err(read)?;
         if film.scenes.is_empty() {
             return Err(FilmError::Empty { path: path.to_owned() });
         }
@@ -94,7 +114,7 @@ impl Film {
         self.phases.iter().find(|(known, _)| *known == phase).map(|(_, at)| *at)
     }
 
-    fn of(mut stamped: Vec<(u64, Scene)>, damage: Option<String>) -> Self {
+    fn of(mut stamped: Vec<(u64, Scene)>, damage: Option<String>, sides: Sides) -> Self {
         // Stable: what has the same time keeps its order in the file.
         stamped.sort_by_key(|(at_ns, _)| *at_ns);
         let first_ns = stamped.first().map_or(0, |(at_ns, _)| *at_ns);
@@ -110,11 +130,12 @@ impl Film {
             }
             scenes.push((at, scene));
         }
-        Self { scenes, phases, damage }
+        Self { scenes, phases, damage, vehicle: sides.vehicle }
     }
 }
 
-fn from_mcap(file: impl Read) -> std::io::Result<Film> {
+fn from_mcap(file: impl Read, vehicle: Option<Address>) -> std::io::Result<Film> {
+    let mut sides = Sides { vehicle, ground: None };
     let mut reader = LogReader::new(file);
     // What the ground heard; else what the vehicle said.
     let (mut heard, mut said) = (Vec::new(), Vec::new());
@@ -124,13 +145,19 @@ fn from_mcap(file: impl Read) -> std::io::Result<Film> {
         let endpoint = channel.metadata.get("endpoint").map(String::as_str);
         match (channel.topic.as_str(), endpoint) {
             (TOPIC_RAW_RX, Some("ground")) => {
-                heard.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
+                heard.extend(
+                    frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame, &mut sides)),
+                );
             }
             (TOPIC_RAW_TX, Some("ground")) => {
-                heard.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
+                heard.extend(
+                    frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame, &mut sides)),
+                );
             }
             (TOPIC_RAW_TX | TOPIC_RAW_RX, Some("vehicle")) => {
-                said.extend(frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame)));
+                said.extend(
+                    frames(&data).into_iter().filter_map(|frame| scene(log_time_ns, frame, &mut sides)),
+                );
             }
             _ => {}
         }
@@ -141,11 +168,12 @@ fn from_mcap(file: impl Read) -> std::io::Result<Film> {
     let of_vehicle = |(_, scene): &(u64, Scene)| matches!(scene, Scene::Heard(_));
     let scenes = if heard.iter().any(of_vehicle) { heard } else { said };
     let scenes = if scenes.iter().any(of_vehicle) { scenes } else { Vec::new() };
-    Ok(Film::of(scenes, reader.damage().map(ToString::to_string)))
+    Ok(Film::of(scenes, reader.damage().map(ToString::to_string), sides))
 }
 
 /// Microseconds since the Unix epoch, big-endian, then a frame; again and again.
-fn from_tlog(mut file: impl Read) -> std::io::Result<Film> {
+fn from_tlog(mut file: impl Read, vehicle: Option<Address>) -> std::io::Result<Film> {
+    let mut sides = Sides { vehicle, ground: None };
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;
     let mut scenes = Vec::new();
@@ -160,10 +188,10 @@ fn from_tlog(mut file: impl Read) -> std::io::Result<Film> {
             damage = Some(format!("unreadable {} bytes before the end", rest.len()));
             break;
         };
-        scenes.extend(frame.and_then(|frame| scene(stamp_us.saturating_mul(1_000), frame)));
+        scenes.extend(frame.and_then(|frame| scene(stamp_us.saturating_mul(1_000), frame, &mut sides)));
         rest = &rest[8 + len..];
     }
-    Ok(Film::of(scenes, damage))
+    Ok(Film::of(scenes, damage, sides))
 }
 
 /// The length of the frame that the bytes begin with, and the frame if its checksum holds.
@@ -182,11 +210,12 @@ fn frames(bytes: &[u8]) -> Vec<Frame> {
 
 /// What a frame shows: the vehicle's own; the crew's command, for the first time it was sent; or that the ground sent
 /// something.
-fn scene(at_ns: u64, frame: Frame) -> Option<(u64, Scene)> {
-    if frame.source() == VEHICLE {
+fn scene(at_ns: u64, frame: Frame, sides: &mut Sides) -> Option<(u64, Scene)> {
+    sides.hear(frame.source());
+    if Some(frame.source()) == sides.vehicle {
         return Some((at_ns, Scene::Heard(frame)));
     }
-    if frame.source() != GROUND {
+    if Some(frame.source()) != sides.ground {
         return None;
     }
     let sent = Some((at_ns, Scene::Sent(frame.as_bytes().len())));

@@ -34,7 +34,7 @@ fn film() -> Film {
         })
         .collect();
     let phases = [0, 20, 40, 50].map(|second| (phase_at(second), S(second))).to_vec();
-    Film { scenes, phases, damage: None }
+    Film { scenes, phases, ..Film::default() }
 }
 
 fn player() -> Player {
@@ -154,7 +154,7 @@ fn a_tlog_is_played_up_to_its_damage() {
     }
     bytes.extend([1, 2, 3]);
     std::fs::write(&path, &bytes).unwrap();
-    let film = Film::load(&path).unwrap();
+    let film = Film::load(&path, None).unwrap();
     let at_400_ms = Duration::from_millis(400);
     assert_eq!(film.scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
     assert!(matches!(film.scenes[1].1, Scene::Sent(21)), "our own heartbeat: {:?}", film.scenes[1]);
@@ -167,7 +167,7 @@ fn what_is_no_log_is_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("notes.mcap");
     std::fs::write(&path, "not a log").unwrap();
-    let refused = Film::load(&path).unwrap_err();
+    let refused = Film::load(&path, None).unwrap_err();
     assert!(matches!(refused, FilmError::Empty { .. }) && refused.to_string().contains("notes.mcap"));
-    assert!(matches!(Film::load(&directory.path().join("gone")), Err(FilmError::Read { .. })));
+    assert!(matches!(Film::load(&directory.path().join("gone"), None), Err(FilmError::Read { .. })));
 }

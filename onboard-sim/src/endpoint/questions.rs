@@ -3,7 +3,6 @@
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::frame::Frame;
 use protocol::ftp::FileRequest;
-use protocol::identity::VEHICLE;
 use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::{MAX_REQUESTED, VehicleEndpoint};
@@ -14,13 +13,13 @@ impl VehicleEndpoint {
     /// Answers a question about parameters or files; says whether the frame was one.
     pub(super) fn on_question(&mut self, frame: &Frame, vehicle: &dyn Craft) -> bool {
         if let Some(request) = FileRequest::from_frame(frame) {
-            if VEHICLE.accepts(request.target) {
+            if self.us.accepts(request.target) {
                 self.queue(request.decline());
             }
             return true;
         }
         let Some(request) = ParamRequest::from_frame(frame) else { return false };
-        if !VEHICLE.accepts(request.target) {
+        if !self.us.accepts(request.target) {
             return true;
         }
         let asker = frame.source();

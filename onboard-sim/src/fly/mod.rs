@@ -58,6 +58,8 @@ impl std::str::FromStr for Speed {
 pub struct FlyOptions {
     /// What flies.
     pub profile: LoadedFlight,
+    /// MAVLink system id of the vehicle.
+    pub system_id: u8,
     /// Links to serve; none is allowed.
     pub links: Vec<Endpoint>,
     /// The key that every frame is to be signed with; none is allowed.
@@ -219,7 +221,8 @@ pub async fn fly_observed(
     let mut endpoint = match options.key_file {
         Some(_) => VehicleEndpoint::sending_signed(craft.standard()),
         None => VehicleEndpoint::sending(craft.standard()),
-    };
+    }
+    .of_system(options.system_id);
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };

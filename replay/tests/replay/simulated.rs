@@ -54,6 +54,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulate
     let profile = load_profile(profile).unwrap();
     let recorder = Recorder::create(&log, &log_header("onboard-sim", &profile, seed, START_UNIX_NS)).unwrap();
     let options = FlyOptions {
+        system_id: 1,
         profile,
         links: links.to_vec(),
         recorder: Some(recorder.clone()),
