@@ -4,6 +4,9 @@
 //! -p e2e --test hostile -- --nocapture` for as many as a bad day has; the numbers are printed.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
+#[path = "hostile/strangers.rs"]
+mod strangers;
+
 use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;

@@ -79,6 +79,37 @@ fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
 }
 
 #[test]
+fn of_two_rockets_on_one_link_each_has_its_own_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut station = program(Program::Ground);
+    station
+        .args(["--connect", "udpin:127.0.0.1:0", "--headless", "--auto", "--log", "ground.mcap"])
+        .args(["--sysid", "254", "--vehicle-sysid", "2"])
+        .current_dir(folder.path());
+    let mut station = Running::start(&mut station);
+    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
+    let rocket = |id: &str| {
+        let mut command = program(Program::OnboardSim);
+        Running::start(command.args(["fly", "--mavlink", &link, "--sysid", id]).current_dir(folder.path()))
+    };
+    let (first, second) = (rocket("1"), rocket("2"));
+    let (station, second) = (station.wait(), second.wait());
+    assert_eq!((station.code, second.code), (Some(0), Some(0)), "{}\n{}", station.output, second.output);
+    first.signal(e2e::Signal::SIGTERM);
+    let first = first.wait();
+    assert!(!first.output.contains("PAD_ARMED"), "the other rocket's commands: {}", first.output);
+    // The log shows the one that flew.
+    let mut replayed = program(Program::Ground);
+    let replayed = Running::to_end(
+        replayed
+            .args(["--replay", "ground.mcap", "--headless"])
+            .args(["--vehicle-sysid", "2"])
+            .current_dir(folder.path()),
+    );
+    assert!(replayed.output.contains("TOUCHDOWN"), "{}", replayed.output);
+}
+
+#[test]
 fn a_link_that_dies_in_flight_is_named_and_the_other_carries_on() {
     let folder = tempfile::tempdir().unwrap();
     let mut flight = vehicle(folder.path(), &["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"].map(str::to_owned));

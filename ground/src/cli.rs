@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Parser, Subcommand};
 use protocol::dialect::TdPhase;
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::Endpoint;
 
 use crate::config::{Characters, Colour};
@@ -34,6 +35,15 @@ pub struct Cli {
     /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
     #[arg(long, value_name = "LINK", global = true)]
     pub connect: Vec<Endpoint>,
+
+    /// This station's own MAVLink system id: each station on one link needs its own. Default: 255.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub sysid: Option<u8>,
+
+    /// MAVLink system id of the vehicle to show and command; nobody else on the link is. Default: 1; of a replay: the
+    /// first that was heard.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub vehicle_sysid: Option<u8>,
 
     /// Sign every frame with this key, and believe nothing that is not signed with it. `onboard-sim keygen` makes one.
     #[arg(long, value_name = "FILE", global = true)]
@@ -231,6 +241,16 @@ impl Cli {
         (profile, self.seed.unwrap_or(DEMO_SEED), self.speed.unwrap_or(Speed::Factor(1.0)))
     }
 
+    /// Our own MAVLink address.
+    pub fn us(&self) -> Address {
+        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
+    }
+
+    /// The vehicle's MAVLink address.
+    pub fn vehicle(&self) -> Address {
+        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
+    }
+
     /// Whether a demonstration is described, which no link of the settings can be meant by.
     pub fn describes_demonstration(&self) -> bool {
         self.demo || self.profile.is_some() || self.seed.is_some() || self.speed.is_some()
@@ -281,6 +301,8 @@ mod tests {
         for word in [
             "--connect",
             "--key",
+            "--sysid",
+            "--vehicle-sysid",
             "--log",
             "--profile",
             "--seed",
@@ -301,6 +323,7 @@ mod tests {
         };
         assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
         assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
+        assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
         assert!(refuse(&["--speed", "0"]).contains("0.01"));
         assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
     }

@@ -15,6 +15,10 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Links to the vehicle, as for --connect, for `ground daemon`. A bare `ground` flies its demonstration.
 #connect = ["udpin:0.0.0.0:14550"]
 
+# MAVLink system ids of this station and of its vehicle, as for --sysid and --vehicle-sysid.
+#sysid = 255
+#vehicle_sysid = 1
+
 # Signing key, as for --key. Default: nothing is signed.
 #key = "touchdown.key"
 
@@ -47,6 +51,10 @@ pub struct Config {
     /// As `--connect`, each.
     #[serde(default)]
     pub connect: Vec<String>,
+    /// As `--sysid`.
+    pub sysid: Option<u8>,
+    /// As `--vehicle-sysid`.
+    pub vehicle_sysid: Option<u8>,
     /// As `--key`.
     pub key: Option<PathBuf>,
     /// As `--log`.
@@ -139,6 +147,11 @@ impl Config {
         for link in &config.connect {
             link.parse::<Endpoint>().map_err(|error| format!("connect: {error}"))?;
         }
+        for (key, value) in [("sysid", config.sysid), ("vehicle_sysid", config.vehicle_sysid)] {
+            if value == Some(0) {
+                return Err(format!("{key}: 0 addresses every system; give one from 1 to 255"));
+            }
+        }
         for (key, value) in [("log", &config.log), ("tlog", &config.tlog)] {
             if let Some(file) = value {
                 file.parse::<LogChoice>().map_err(|error| format!("{key}: {error}"))?;
@@ -159,6 +172,11 @@ impl Config {
         let is_daemon = matches!(cli.command, Some(Command::Daemon));
         if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
             cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        }
+        // A replay shows the vehicle that was heard, whatever is on the air now.
+        if cli.replay.is_none() {
+            cli.sysid = cli.sysid.or(self.sysid);
+            cli.vehicle_sysid = cli.vehicle_sysid.or(self.vehicle_sysid);
         }
         if cli.key.is_none() && !cli.connect.is_empty() {
             cli.key.clone_from(&self.key);

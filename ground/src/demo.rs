@@ -28,6 +28,8 @@ pub struct DemoOptions {
     pub seed: u64,
     /// Speed of simulated time.
     pub speed: Speed,
+    /// Its MAVLink system id.
+    pub system_id: u8,
 }
 
 impl DemoOptions {
@@ -35,8 +37,8 @@ impl DemoOptions {
     ///
     /// # Errors
     /// There is no such profile, or it is wrong.
-    pub fn load(name_or_path: &str, seed: u64, speed: Speed) -> anyhow::Result<Self> {
-        Ok(Self { profile: fly::load_profile(name_or_path)?, seed, speed })
+    pub fn load(name_or_path: &str, seed: u64, speed: Speed, system_id: u8) -> anyhow::Result<Self> {
+        Ok(Self { profile: fly::load_profile(name_or_path)?, seed, speed, system_id })
     }
 
     /// The header of the log that holds both sides.
@@ -65,6 +67,7 @@ impl Demo {
     ) -> io::Result<Self> {
         let fly_options = FlyOptions {
             profile: options.profile.clone(),
+            system_id: options.system_id,
             links: vec![link],
             key_file: None,
             recorder,

@@ -44,6 +44,7 @@ const ABORTED_BEATS_FOR_S: f64 = 3.0;
 
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
+    us: Address,
     boot_number: u32,
     lanes: Vec<Lane>,
     /// What each link carries at most, bytes per second.
@@ -115,6 +116,7 @@ impl VehicleEndpoint {
 
     fn over(streams: Streams, signature_len: usize) -> Self {
         Self {
+            us: VEHICLE,
             boot_number: 0,
             lanes: vec![Lane::new(vec![0], streams, Encoder::new(VEHICLE), signature_len)],
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
@@ -149,12 +151,23 @@ impl VehicleEndpoint {
         self
     }
 
+    /// The same as another system than the first.
+    #[must_use]
+    pub fn of_system(self, system_id: u8) -> Self {
+        let us = VEHICLE.of_system(system_id);
+        let mut lanes = self.lanes;
+        lanes.iter_mut().for_each(|lane| lane.speak_as(us));
+        Self { us, lanes, ..self }
+    }
+
     /// Takes a frame from a link and acts on it; the answers come out of [`VehicleEndpoint::poll`].
     pub fn on_frame(&mut self, link: usize, frame: &Frame, vehicle: &mut dyn Craft) {
-        if frame.source() == VEHICLE {
+        if frame.source() == self.us {
             if !self.warned_of_twin {
                 self.warned_of_twin = true;
-                self.say(Severity::Warning, "another system 1 component 1 is on this link");
+                let Address { system_id, component_id } = self.us;
+                let words = format!("another system {system_id} component {component_id} is on this link");
+                self.say(Severity::Warning, &words);
             }
             return;
         }
@@ -164,7 +177,7 @@ impl VehicleEndpoint {
             streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
-            if VEHICLE.accepts(request.target) {
+            if self.us.accepts(request.target) {
                 self.on_command(link, &request, vehicle);
             }
             return;
@@ -174,7 +187,7 @@ impl VehicleEndpoint {
         }
         match frame.decode() {
             Ok(MavMessage::TIMESYNC(sync))
-                if sync.tc1 == 0 && is_for_us(sync.target_system, sync.target_component) =>
+                if sync.tc1 == 0 && self.is_for_us(sync.target_system, sync.target_component) =>
             {
                 let answer = TIMESYNC_DATA {
                     tc1: (1e9 * vehicle.time_s()) as i64,
@@ -197,7 +210,7 @@ impl VehicleEndpoint {
     /// Says that a command was not believed. It is not acknowledged: a forger could have the true ground's own command
     /// answered by it.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
-        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| VEHICLE.accepts(asked.target))
+        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| self.us.accepts(asked.target))
         else {
             return;
         };
@@ -369,6 +382,10 @@ impl VehicleEndpoint {
         (MavResult::MAV_RESULT_ACCEPTED, None)
     }
 
+    fn is_for_us(&self, system_id: u8, component_id: u8) -> bool {
+        self.us.accepts(Address { system_id, component_id })
+    }
+
     /// Says something to the crew. A warning that was said just now is counted instead.
     fn say(&mut self, severity: Severity, words: &str) {
         if severity != Severity::Warning || self.warnings.is_news(words, self.now_s) {
@@ -396,10 +413,6 @@ impl VehicleEndpoint {
 /// What other ground stations call an emergency stop or a kill is a forced disarm: of a vehicle in the air, an abort.
 fn means_abort(vehicle: &dyn Craft) -> bool {
     !(vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed))
-}
-
-fn is_for_us(system_id: u8, component_id: u8) -> bool {
-    VEHICLE.accepts(Address { system_id, component_id })
 }
 
 /// The answer to a PING that asks for one. Deprecated, but older ground stations still measure with it.

@@ -3,7 +3,7 @@
 mod cli;
 
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{BufWriter, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -13,6 +13,7 @@ use onboard_sim::fly::{builtins, load_planar, load_profile};
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
 use protocol::key_file::KeyFile;
+use protocol::signing::Key;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]
@@ -46,6 +47,11 @@ enum Command {
         /// The file; an existing one is not overwritten.
         #[arg(value_name = "FILE")]
         file: PathBuf,
+        /// Make it of a passphrase, read as a line from standard input, as MAVProxy's `signing key` does (SHA-256).
+        ///
+        /// Whoever records one signed frame can try passphrases on it: take six random words or more.
+        #[arg(long)]
+        passphrase: bool,
     },
     /// List the built-in profiles, or print one as a file to start from.
     Profiles {
@@ -97,13 +103,26 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Landability(arguments) => map_landability(&arguments),
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Paper { json } => repeat_paper(json),
-        Command::Keygen { file } => {
-            KeyFile::create(&file)?;
-            Ok(ExitCode::SUCCESS)
-        }
+        Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
     }
+}
+
+fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
+    if !of_passphrase {
+        KeyFile::create(file)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if std::io::stdin().is_terminal() {
+        write!(std::io::stderr(), "passphrase, shown as you type it: ")?;
+    }
+    let mut line = String::new();
+    std::io::stdin().read_line(&mut line).context("reading the passphrase")?;
+    let passphrase = line.trim_end_matches(['\n', '\r']);
+    anyhow::ensure!(!passphrase.is_empty(), "the passphrase is empty");
+    KeyFile::create_with(file, &Key::from_passphrase(passphrase))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> {

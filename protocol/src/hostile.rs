@@ -106,14 +106,14 @@ pub fn hub(data: &[u8]) {
         let link = usize::from(kind % 3);
         let peer = u64::from(kind >> 6);
         let received = match (kind >> 2) % 6 {
-            0 => Received::Datagram(piece.to_vec()),
+            0 => datagram(piece.to_vec()),
             1 => Received::Stream(peer, piece.to_vec()),
             2 => Received::Silence(peer),
             3 => Received::Gone(peer),
             // Frames that are whole, so that more than framing is reached.
             _ => match frame_of(piece) {
-                Some(frame) if kind & 1 == 0 => Received::Datagram(frame.as_bytes().to_vec()),
-                Some(frame) => Received::Datagram(forged(&frame)),
+                Some(frame) if kind & 1 == 0 => datagram(frame.as_bytes().to_vec()),
+                Some(frame) => datagram(forged(&frame)),
                 None => Received::Down(printable(piece)),
             },
         };
@@ -126,6 +126,10 @@ pub fn hub(data: &[u8]) {
             }
         }
     }
+}
+
+fn datagram(bytes: Vec<u8>) -> Received {
+    Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
 }
 
 /// The bytes as a flight log; and a good log with some of its bytes changed: two of place, one of value, and so on.

@@ -13,7 +13,7 @@ use crate::frame::{Frame, Framer, FramerCounters};
 use crate::link::LinkStats;
 use crate::signing::{Rejection, Signing, SigningCounters};
 
-pub use received::{Peer, Received};
+pub use received::{Origin, Peer, Received};
 
 /// Streams of one link that may be open at the same time.
 const MAX_STREAMS: usize = 8;
@@ -27,6 +27,11 @@ pub enum News {
     Copy(Frame),
     /// A frame that is not to be acted on: signatures are wanted, and this one is missing or wrong.
     Rejected(Frame, Rejection),
+    /// A frame of this sender was believed; comes before that frame. Its link is to be told
+    /// (`transport::TransportSender::believe`).
+    Believed(Origin),
+    /// Others have sent to the link that are not answered; how many, in words.
+    Strangers(String),
     /// The link works; with whom.
     Up(String),
     /// The link does not work; why.
@@ -71,10 +76,10 @@ impl HubLink {
     }
 
     fn take(&mut self, received: Received, now: Duration) -> Taken {
-        let (framer, bytes) = match received {
-            Received::Datagram(bytes) => {
+        let (framer, bytes, origin) = match received {
+            Received::Datagram { from, bytes } => {
                 self.datagrams.push_datagram(&bytes);
-                (&mut self.datagrams, bytes.len())
+                (&mut self.datagrams, bytes.len(), Origin::Datagram(from))
             }
             Received::Stream(peer, bytes) => {
                 if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(&peer) {
@@ -83,12 +88,12 @@ impl HubLink {
                 }
                 let framer = self.streams.entry(peer).or_default();
                 framer.push(&bytes);
-                (framer, bytes.len())
+                (framer, bytes.len(), Origin::Stream(peer))
             }
             Received::Silence(peer) => match self.streams.get_mut(&peer) {
                 Some(framer) => {
                     framer.on_silence();
-                    (framer, 0)
+                    (framer, 0, Origin::Stream(peer))
                 }
                 None => return Taken::Nothing,
             },
@@ -98,6 +103,7 @@ impl HubLink {
                 }
                 return Taken::Nothing;
             }
+            Received::Strangers(words) => return Taken::News(News::Strangers(words)),
             Received::Up(peer) => {
                 self.trouble = None;
                 return Taken::News(News::Up(peer));
@@ -111,14 +117,14 @@ impl HubLink {
         if bytes > 0 {
             self.stats.on_rx_bytes(bytes, now);
         }
-        Taken::Frames(frames)
+        Taken::Frames(frames, origin)
     }
 }
 
 enum Taken {
     Nothing,
     News(News),
-    Frames(Vec<Frame>),
+    Frames(Vec<Frame>, Origin),
 }
 
 /// Several links to one peer.
@@ -148,12 +154,25 @@ impl Hub {
     /// signatures need. A link that does not exist brings nothing.
     pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<News> {
         let Some(of) = self.links.get_mut(link) else { return Vec::new() };
-        let frames = match of.take(received, now) {
+        let (frames, origin) = match of.take(received, now) {
             Taken::Nothing => return Vec::new(),
             Taken::News(news) => return vec![news],
-            Taken::Frames(frames) => frames,
+            Taken::Frames(frames, origin) => (frames, origin),
         };
-        frames.into_iter().map(|frame| self.judge(link, frame, now, clock)).collect()
+        let mut news: Vec<News> =
+            frames.into_iter().map(|frame| self.judge(link, frame, now, clock)).collect();
+        if news.iter().any(|news| self.proves_its_sender(news)) {
+            news.insert(0, News::Believed(origin));
+        }
+        news
+    }
+
+    /// With a key the frame must be signed with it: a radio's report passes unsigned, and anybody can write one.
+    fn proves_its_sender(&self, news: &News) -> bool {
+        match news {
+            News::Frame(frame) | News::Copy(frame) => self.signing.is_none() || frame.is_signed(),
+            _ => false,
+        }
     }
 
     fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> News {

@@ -6,19 +6,28 @@
 //!
 //! Keys travel as files, never by radio: SETUP_SIGNING is not acted on.
 
-use std::collections::BTreeMap;
+mod memory;
+
 use std::fmt;
 use std::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 
 use crate::frame::{Frame, SIGNATURE_LEN};
-use crate::identity::Address;
+
+pub use memory::{Memory, MemoryError};
 
 /// 2015-01-01 00:00 UTC after the Unix epoch: 16,436 days.
 const EPOCH: Duration = Duration::from_hours(24 * 16_436);
 /// A stream that was never heard may begin this far behind our own time: one minute.
 const NEW_STREAM_LAG: u64 = 60 * STAMPS_PER_S;
+/// A frame may be this far ahead of a clock that is known to be set: one day. A clock set to the time of another zone is
+/// less than that off, and must not part vehicle and ground at the pad; the wrong year of one station must not shut
+/// out all others for good.
+const MAX_AHEAD: u64 = 24 * 3600 * STAMPS_PER_S;
+/// 2026-01-01 00:00 UTC, before this program was written: 4,018 days after 2015-01-01. A clock that shows an earlier
+/// time was never set.
+const PROGRAM_WRITTEN: u64 = 4_018 * 24 * 3600 * STAMPS_PER_S;
 /// What is remembered over a restart lies this far ahead, so that no timestamp is used twice.
 const LEAD: u64 = 5 * STAMPS_PER_S;
 const STAMPS_PER_S: u64 = 100_000;
@@ -46,6 +55,11 @@ impl Key {
     /// A key of these bytes.
     pub fn new(bytes: [u8; Self::LEN]) -> Self {
         Self(bytes)
+    }
+
+    /// The key of a passphrase: its SHA-256, as MAVProxy makes it.
+    pub fn from_passphrase(passphrase: &str) -> Self {
+        Self(Sha256::digest(passphrase).into())
     }
 
     /// The key written as 64 hexadecimal digits; `None` if it is anything else.
@@ -100,6 +114,9 @@ pub enum Rejection {
     /// It begins a stream with a timestamp more than a minute behind.
     #[error("too old")]
     TooOld,
+    /// Its timestamp is more than a day ahead of our clock, which is known to be set.
+    #[error("too new")]
+    TooNew,
 }
 
 /// What was believed and what was not.
@@ -115,12 +132,14 @@ pub struct SigningCounters {
     pub replayed: u64,
     /// Frames that began a stream too far behind.
     pub too_old: u64,
+    /// Frames too far ahead.
+    pub too_new: u64,
 }
 
 impl SigningCounters {
     /// Everything that was not believed.
     pub fn rejected(&self) -> u64 {
-        self.unsigned + self.wrong + self.replayed + self.too_old
+        self.unsigned + self.wrong + self.replayed + self.too_old + self.too_new
     }
 
     fn count(&mut self, outcome: Result<(), Rejection>) {
@@ -130,51 +149,8 @@ impl SigningCounters {
             Err(Rejection::Wrong) => &mut self.wrong,
             Err(Rejection::Replayed) => &mut self.replayed,
             Err(Rejection::TooOld) => &mut self.too_old,
+            Err(Rejection::TooNew) => &mut self.too_new,
         } += 1;
-    }
-}
-
-/// What must outlive a restart: the last timestamps.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Memory {
-    ours: u64,
-    streams: BTreeMap<(Address, u8), u64>,
-}
-
-impl Memory {
-    /// As lines of text.
-    pub fn to_text(&self) -> String {
-        let heard = |((Address { system_id, component_id }, link_id), stamp): (&(Address, u8), &u64)| {
-            format!("heard {system_id} {component_id} {link_id} {stamp}\n")
-        };
-        [format!("ours {}\n", self.ours)].into_iter().chain(self.streams.iter().map(heard)).collect()
-    }
-
-    /// Reads those lines.
-    ///
-    /// # Errors
-    /// The line that is neither `ours STAMP` nor `heard SYSTEM COMPONENT LINK STAMP`.
-    pub fn from_text(text: &str) -> Result<Self, String> {
-        let mut memory = Self::default();
-        for line in text.lines() {
-            memory.read_line(line).ok_or_else(|| line.to_owned())?;
-        }
-        Ok(memory)
-    }
-
-    fn read_line(&mut self, line: &str) -> Option<()> {
-        let words: Vec<&str> = line.split(' ').collect();
-        let stamp = |word: &str| word.parse().ok().filter(|stamp| *stamp <= MAX_STAMP);
-        match words[..] {
-            ["ours", ours] => self.ours = stamp(ours)?,
-            ["heard", system, component, link, heard] if self.streams.len() < MAX_STREAMS => {
-                let [system_id, component_id, link_id] =
-                    [system.parse().ok()?, component.parse().ok()?, link.parse().ok()?];
-                self.streams.insert((Address { system_id, component_id }, link_id), stamp(heard)?);
-            }
-            _ => return None,
-        }
-        Some(())
     }
 }
 
@@ -183,13 +159,16 @@ impl Memory {
 pub struct Signing {
     key: Key,
     memory: Memory,
+    /// Our clock as the runs before saw it last.
+    clock_before: u64,
     counters: SigningCounters,
 }
 
 impl Signing {
     /// With a key, and what was remembered of the runs before.
     pub fn new(key: Key, memory: Memory) -> Self {
-        Self { key, memory, counters: SigningCounters::default() }
+        let clock_before = memory.clock;
+        Self { key, memory, clock_before, counters: SigningCounters::default() }
     }
 
     /// Signs an unsigned frame for a link; `clock` is the time by the system's clock, which may stand still or be
@@ -197,6 +176,7 @@ impl Signing {
     #[must_use]
     pub fn sign(&mut self, frame: &Frame, link_id: u8, clock: u64) -> Frame {
         self.memory.ours = clock.max(self.memory.ours + 1).min(MAX_STAMP);
+        self.memory.clock = self.memory.clock.max(clock);
         let mut signed = frame.marked_signed();
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = link_id;
@@ -228,18 +208,30 @@ impl Signing {
         }
         let stamp = signature[1..7].iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte));
         let stream = (frame.source(), signature[0]);
-        let ours = self.memory.ours.max(clock);
+        self.memory.clock = self.memory.clock.max(clock);
+        // A clock that is known to be set is right about the time; else whoever was heard with the latest is.
+        let is_set = self.is_set(clock);
+        if is_set && stamp > clock + MAX_AHEAD {
+            return Err(Rejection::TooNew);
+        }
+        let time = if is_set { clock } else { self.memory.ours.max(clock) };
         match self.memory.streams.get(&stream) {
             Some(last) if stamp <= *last => return Err(Rejection::Replayed),
-            None if stamp + NEW_STREAM_LAG < ours || self.memory.streams.len() >= MAX_STREAMS => {
+            None if stamp + NEW_STREAM_LAG < time || self.memory.streams.len() >= MAX_STREAMS => {
                 return Err(Rejection::TooOld);
             }
             _ => {}
         }
         self.memory.streams.insert(stream, stamp);
-        // Whoever holds the key and has a later time is right about it.
+        // What we sign is to be newer than anything that was heard.
         self.memory.ours = self.memory.ours.max(stamp);
         Ok(())
+    }
+
+    /// Whether our clock is known to be set: it shows no time before this program was written, and it has not gone back
+    /// since the runs before. A board whose clock does not outlive its power fails one or the other.
+    fn is_set(&self, clock: u64) -> bool {
+        clock >= PROGRAM_WRITTEN.max(self.clock_before)
     }
 
     /// What was believed and what was not.
@@ -247,9 +239,10 @@ impl Signing {
         self.counters
     }
 
-    /// What is to be remembered over a restart; worth keeping once a second.
+    /// What is to be remembered over a restart: before anything is done that a believed frame asks for, so that it is
+    /// not believed twice, and once a second at least, so that no timestamp of ours is used twice.
     pub fn memory(&self) -> Memory {
         let ours = (self.memory.ours + LEAD).min(MAX_STAMP);
-        Memory { ours, streams: self.memory.streams.clone() }
+        Memory { ours, ..self.memory.clone() }
     }
 }

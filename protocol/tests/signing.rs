@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA};
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::identity::{GROUND, VEHICLE};
-use protocol::signing::{Key, Memory, Rejection, Signing, stamp_of};
+use protocol::signing::{Key, Memory, MemoryError, Rejection, Signing, stamp_of};
 
 const NOW: u64 = 37_000_000_000_000;
 const SECOND: u64 = 100_000;
@@ -119,8 +119,55 @@ fn a_later_time_is_adopted_from_whoever_holds_the_key() {
 fn a_memory_that_makes_no_sense_names_its_line() {
     for bad in ["ours x", "heard 1 2 3", "heard 256 1 0 5", "ours 281474976710656", "theirs 5", ""] {
         let text = format!("ours 5\n{bad}\nheard 1 1 0 5\n");
-        assert_eq!(Memory::from_text(&text), Err(bad.to_owned()));
+        assert_eq!(Memory::from_text(&text), Err(MemoryError::Line(bad.to_owned())));
     }
+    for nothing in ["", "heard 1 1 0 5\n"] {
+        assert_eq!(Memory::from_text(nothing), Err(MemoryError::Nothing), "{nothing:?}");
+    }
+    let memory = |text| Memory::from_text(text).unwrap();
+    // Cut off while it was written; the line before holds.
+    assert_eq!(memory("ours 5\nheard 1 1 0 50\nheard 1 1 0 6"), memory("ours 5\nheard 1 1 0 50\n"));
+}
+
+#[test]
+fn a_stamp_far_ahead_is_refused_where_our_own_clock_is_known_to_be_set() {
+    const DAY: u64 = 24 * 3600 * SECOND;
+    let far = side(7).sign(&beat(), 0, NOW + 10 * 365 * DAY);
+    let mut vehicle = side(7);
+    assert_eq!(vehicle.check(&far, NOW), Err(Rejection::TooNew));
+    assert_eq!(vehicle.check(&side(7).sign(&beat(), 0, NOW + DAY + SECOND), NOW), Err(Rejection::TooNew));
+    assert_eq!((vehicle.counters().too_new, vehicle.counters().rejected()), (2, 2));
+    assert_eq!(vehicle.check(&side(7).sign(&beat(), 0, NOW), NOW), Ok(()), "and shuts nobody out");
+    // Less than a day ahead is a clock of another time zone; it does not shut out those that are right, either.
+    let mut vehicle = side(7);
+    assert_eq!(vehicle.check(&side(7).sign(&beat(), 0, NOW + 14 * 3600 * SECOND), NOW), Ok(()));
+    assert_eq!(vehicle.check(&side(7).sign(&beat(), 1, NOW), NOW), Ok(()));
+}
+
+#[test]
+fn a_board_without_a_set_clock_adopts_the_first_stamp_not_older_than_those_it_stored() {
+    let mut ground = side(7);
+    // Never set: it shows 1970, or the day its image was made.
+    for clock in [0, 3_400_000_000_000] {
+        let mut board = side(7);
+        assert_eq!(board.check(&ground.sign(&beat(), 0, NOW), clock), Ok(()));
+    }
+    // Set in an earlier run; without power it went back to where it was then, or further.
+    let mut board = side(7);
+    board.check(&ground.sign(&beat(), 0, NOW), NOW).unwrap();
+    let stored = Memory::from_text(&board.memory().to_text()).unwrap();
+    let back = NOW - 3600 * SECOND;
+    let later = NOW + 30 * 24 * 3600 * SECOND;
+    let mut restarted = Signing::new(key(7), stored.clone());
+    assert_eq!(restarted.check(&side(7).sign(&beat(), 9, NOW - 61 * SECOND), back), Err(Rejection::TooOld));
+    assert_eq!(
+        restarted.check(&side(7).sign(&beat(), 9, later), back),
+        Ok(()),
+        "a month later by the ground"
+    );
+    // A clock that did not go back is set, and knows better.
+    let mut restarted = Signing::new(key(7), stored);
+    assert_eq!(restarted.check(&side(7).sign(&beat(), 9, later), NOW + SECOND), Err(Rejection::TooNew));
 }
 
 #[test]

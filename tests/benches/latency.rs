@@ -39,6 +39,7 @@ fn start_vehicle(
 ) -> Result<std::thread::JoinHandle<Result<(), Failure>>, Failure> {
     let ticks = Arc::clone(ticks);
     let options = FlyOptions {
+        system_id: 1,
         profile: load_profile("paper-calibrated")?,
         links: vec![link],
         key_file: None,

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::unix::OwnedWriteHalf;
@@ -230,6 +231,8 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         link_capacity_bytes_s: Some(hello.link_capacity_bytes_s).filter(|most| *most > 0),
         log_path: path(&hello.log_path),
         tlog_path: path(&hello.tlog_path),
+        us: GROUND.of_system(hello.system_ids[0]),
+        vehicle: VEHICLE.of_system(hello.system_ids[1]),
         role: if viewer.watch { Role::Watching } else { Role::Attached },
         seat: Seat::new(hello.screen, viewer.operator.clone()),
         demonstration: hello.demonstration,

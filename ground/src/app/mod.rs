@@ -32,6 +32,7 @@ use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit::{self, Exit};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
+use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use log::LogGuard;
@@ -83,7 +84,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     let demo_options = match &cli.connect[..] {
         [] => {
             let (profile, seed, speed) = cli.demonstration();
-            Some(DemoOptions::load(profile, seed, speed)?)
+            Some(DemoOptions::load(profile, seed, speed, cli.vehicle().system_id)?)
         }
         _ => None,
     };
@@ -108,7 +109,9 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
             }
         };
     let ran = station.run(&mut model, &mut wire).await;
-    wire.remember();
+    if let Some(msg) = wire.remember() {
+        update(&mut model, msg, clock.now());
+    }
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
@@ -134,7 +137,7 @@ async fn start(
     let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let opened = Wire::open(endpoints, key, clock, recorder.clone(), log_time.clone()).await;
+    let opened = Wire::open(cli.us(), endpoints, key, clock, recorder.clone(), log_time.clone()).await;
     let wire = match opened {
         Ok(wire) => wire,
         Err(error) => return Err(status::explain(error, &cli.connect).await),
@@ -157,6 +160,8 @@ async fn start(
             .and_then(Endpoint::capacity_bytes_s),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
+        us: cli.us(),
+        vehicle: cli.vehicle(),
         role: Role::Station,
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         demonstration: demo.is_some(),

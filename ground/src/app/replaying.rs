@@ -28,7 +28,8 @@ const STEP: Duration = Duration::from_millis(100);
 /// The log cannot be read, the terminal failed, or the film has no such phase.
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let mut told = 0;
-    let film = Film::load(path, &mut |progress| tell(path, progress, &mut told))?;
+    let vehicle = cli.vehicle_sysid.map(|_| cli.vehicle());
+    let film = Film::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
     let damage = film.damage.clone();
     let name = path.display().to_string();
     let settings =

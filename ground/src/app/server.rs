@@ -143,6 +143,7 @@ pub(super) fn hello(model: &Model) -> Hello {
         auto: settings.auto,
         demonstration: settings.demonstration,
         link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
+        system_ids: [settings.us.system_id, settings.vehicle.system_id],
         link_name: settings.link_name.clone(),
         log_path: settings.log_path.clone().unwrap_or_default(),
         tlog_path: settings.tlog_path.clone().unwrap_or_default(),

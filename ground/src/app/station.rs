@@ -81,7 +81,7 @@ impl Station {
                 received = wire.receive() => wire.take(received),
             };
             let mut next = Next::Go;
-            let report = self.is_report_due(&msgs).then(|| wire.report());
+            let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
             for msg in report.into_iter().chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {

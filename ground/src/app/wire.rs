@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame, FramerCounters};
 use protocol::hub::{Hub, HubLink, News, Received};
-use protocol::identity::GROUND;
+use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
@@ -17,8 +17,10 @@ use super::clock::{Clock, LogTime};
 use crate::model::link::LinkReport;
 use crate::update::Msg;
 
-/// Timestamps are remembered this often, in stamps (10 us).
+/// Timestamps are remembered this often at least, in stamps (10 us).
 const REMEMBER_EVERY: u64 = 100_000;
+/// Things taken from one link before keys and clock have their turn again.
+const MAX_AT_ONCE: usize = 1024;
 
 /// The open links to one vehicle.
 pub struct Wire {
@@ -26,6 +28,8 @@ pub struct Wire {
     hub: Hub,
     key_file: Option<KeyFile>,
     remembered_at: u64,
+    /// Said once, until it works again.
+    forgets_said: bool,
     encoder: Encoder,
     clock: Clock,
     recorder: Option<Recorder>,
@@ -39,12 +43,21 @@ struct OpenLink {
     ended: bool,
 }
 
+/// What was taken from the links in one go.
+#[derive(Default)]
+struct Taken {
+    msgs: Vec<Msg>,
+    bytes: usize,
+    believed: bool,
+}
+
 impl Wire {
-    /// Opens the links.
+    /// Opens the links, to speak as `us`.
     ///
     /// # Errors
     /// An address cannot be bound or resolved.
     pub async fn open(
+        us: Address,
         endpoints: Vec<Endpoint>,
         key: Option<(KeyFile, Signing)>,
         clock: Clock,
@@ -65,7 +78,8 @@ impl Wire {
             open,
             key_file,
             remembered_at: 0,
-            encoder: Encoder::new(GROUND),
+            forgets_said: false,
+            encoder: Encoder::new(us),
             clock,
             recorder,
             log_time,
@@ -100,21 +114,28 @@ impl Wire {
 
     /// What was received, and whatever waits behind it on any link, as messages.
     pub fn take(&mut self, (number, first): (usize, Received)) -> Vec<Msg> {
-        let mut msgs = Vec::new();
-        self.take_one(number, first, &mut msgs);
+        let mut taken = Taken::default();
+        self.take_one(number, first, &mut taken);
         for number in 0..self.open.len() {
-            while let Some(received) = self.open[number].transport.try_receive() {
-                self.take_one(number, received, &mut msgs);
+            for _ in 0..MAX_AT_ONCE {
+                let Some(received) = self.open[number].transport.try_receive() else { break };
+                self.take_one(number, received, &mut taken);
             }
+        }
+        let Taken { mut msgs, bytes, believed } = taken;
+        msgs.push(Msg::Received { bytes, framing: self.framing() });
+        // Before anything is made of it, so that a run that is killed leaves nothing to be replayed.
+        if believed {
+            msgs.splice(0..0, self.remember());
         }
         msgs
     }
 
-    fn take_one(&mut self, number: usize, received: Received, msgs: &mut Vec<Msg>) {
-        let bytes = match &received {
-            Received::Datagram(bytes) | Received::Stream(_, bytes) => bytes.len(),
-            _ => 0,
-        };
+    fn take_one(&mut self, number: usize, received: Received, taken: &mut Taken) {
+        if let Received::Datagram { bytes, .. } | Received::Stream(_, bytes) = &received {
+            taken.bytes += bytes.len();
+        }
+        let msgs = &mut taken.msgs;
         let name = self.open[number].name.clone();
         for news in self.hub.take(number, received, self.clock.now(), self.unix_stamp()) {
             match news {
@@ -126,6 +147,11 @@ impl Wire {
                     msgs.push(Msg::Frame(frame));
                 }
                 News::Copy(frame) => self.record(Direction::Rx, &name, &frame),
+                News::Believed(origin) => {
+                    taken.believed = true;
+                    self.open[number].sender.believe(origin);
+                }
+                News::Strangers(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
                 // Counted, and shown in the link's report.
                 News::Rejected(..) => {}
                 News::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
@@ -135,12 +161,11 @@ impl Wire {
                 News::Down(why) => msgs.push(Msg::OneLinkDown(why)),
             }
         }
-        msgs.push(Msg::Received { bytes, framing: self.framing() });
     }
 
-    /// The peer, with the link's name where there is more than one.
-    fn named(&self, name: &str, peer: String) -> String {
-        if self.open.len() > 1 { format!("{name} with {peer}") } else { peer }
+    /// The words, with the link's name where there is more than one.
+    fn named(&self, name: &str, words: String) -> String {
+        if self.open.len() > 1 { format!("{name}: {words}") } else { words }
     }
 
     fn framing(&self) -> FramerCounters {
@@ -168,26 +193,30 @@ impl Wire {
     }
 
     /// How each link does. Also remembers timestamps, now and then.
-    pub fn report(&mut self) -> Msg {
+    pub fn report(&mut self) -> Vec<Msg> {
         let now = self.clock.now();
         let stamp = self.unix_stamp();
+        let mut msgs = Vec::new();
         if stamp.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
             self.remembered_at = stamp;
-            self.remember();
+            msgs.extend(self.remember());
         }
         let links = self.hub.links().iter().zip(&self.open);
-        Msg::Links {
+        msgs.push(Msg::Links {
             links: links.map(|(link, open)| report_of(link, open, now)).collect(),
             signing: self.hub.signing(),
-        }
+        });
+        msgs
     }
 
-    /// Remembers timestamps for the next run.
-    pub fn remember(&mut self) {
-        if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory()) {
-            // A full disk shows by the log; the next run then begins by the clock.
-            let _ = file.remember(memory);
-        }
+    /// Remembers timestamps for the next run; says so once if it cannot.
+    pub fn remember(&mut self) -> Option<Msg> {
+        let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory()) else { return None };
+        let failed = file.remember(&memory).err();
+        let was_said = std::mem::replace(&mut self.forgets_said, failed.is_some());
+        failed
+            .filter(|_| !was_said)
+            .map(|why| Msg::LinkSays(format!("what was heard now could be replayed later: {why}")))
     }
 
     fn unix_stamp(&self) -> u64 {

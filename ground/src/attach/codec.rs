@@ -42,6 +42,8 @@ pub struct Hello {
     pub demonstration: bool,
     /// Bytes per second; 0 where nothing is known to bound it.
     pub link_capacity_bytes_s: u32,
+    /// System ids of the station and of its vehicle.
+    pub system_ids: [u8; 2],
     /// The link's name.
     pub link_name: String,
     /// The log's path; empty without one.
@@ -133,6 +135,7 @@ pub fn encode_told(told: &Told, now: Duration) -> Option<Vec<u8>> {
         Told::Hello(hello) => {
             out.kind(0).u32(hello.version).u32(hello.screen).u8(u8::from(hello.auto));
             out.u8(u8::from(hello.demonstration)).u32(hello.link_capacity_bytes_s);
+            out.u8(hello.system_ids[0]).u8(hello.system_ids[1]);
             out.text(&hello.link_name).text(&hello.log_path).text(&hello.tlog_path);
         }
         Told::Live => drop(out.kind(1)),
@@ -172,6 +175,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::ScreenGone => drop(out.kind(13)),
         Msg::HeardOver(number) => drop(out.kind(14).u64(*number as u64)),
         Msg::OneLinkDown(why) => drop(out.kind(15).text(why)),
+        Msg::LinkSays(words) => drop(out.kind(19).text(words)),
         Msg::Links { links, signing } => {
             out.kind(16);
             report::encode(links, signing.as_ref(), out);
@@ -245,6 +249,7 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
             Told::Msg(Msg::Crew(seats))
         }
         18 => Told::Msg(Msg::ScreenQuit),
+        19 => Told::Msg(Msg::LinkSays(rest.text()?)),
         30 => Told::Status(Status {
             pid: rest.u32()?,
             demonstration: rest.u8()? != 0,
@@ -279,6 +284,7 @@ fn hello(rest: &mut Reader) -> Result<Hello, CodecError> {
         auto: rest.u8()? != 0,
         demonstration: rest.u8()? != 0,
         link_capacity_bytes_s: rest.u32()?,
+        system_ids: [rest.u8()?, rest.u8()?],
         link_name: rest.text()?,
         log_path: rest.text()?,
         tlog_path: rest.text()?,

@@ -26,6 +26,7 @@ pub mod words;
 
 use std::time::Duration;
 
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
@@ -56,6 +57,10 @@ pub struct Settings {
     pub log_path: Option<String>,
     /// The telemetry log's path (`.tlog`); `None` without one.
     pub tlog_path: Option<String>,
+    /// The station's own MAVLink address.
+    pub us: Address,
+    /// The vehicle's: nobody else on the link is shown or commanded.
+    pub vehicle: Address,
     /// What this screen may do.
     pub role: Role,
     /// This screen and who sits at it.
@@ -78,6 +83,8 @@ impl Settings {
             link_capacity_bytes_s: None,
             log_path: None,
             tlog_path: None,
+            us: GROUND,
+            vehicle: VEHICLE,
             role: Role::Station,
             seat: Seat::default(),
             demonstration: false,

@@ -64,18 +64,25 @@ pub struct Film {
     pub phases: Vec<(TdPhase, Duration)>,
     /// Why reading ended early, if it did.
     pub damage: Option<String>,
+    /// Whose flight it is: of several vehicles the one that was asked for, else the first that was heard.
+    pub vehicle: Option<Address>,
 }
 
 impl Film {
-    /// Looks through a log from its beginning to its end; a `.tlog` by its name, everything else as MCAP.
+    /// Looks through a log from its beginning to its end for the flight of this vehicle (`None`: the first that was heard);
+    /// a `.tlog` by its name, everything else as MCAP.
     ///
     /// # Errors
     /// The file cannot be read, or holds nothing to show.
-    pub fn load(path: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Self, FilmError> {
+    pub fn load(
+        path: &Path,
+        vehicle: Option<Address>,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Self, FilmError> {
         let read = |source| FilmError::Read { path: path.to_owned(), source };
         let file = File::open(path).map_err(read)?;
         let total = file.metadata().map_err(read)?.len();
-        let mut footage = Footage::begin(&file, path).map_err(read)?;
+        let mut footage = Footage::begin(&file, path, vehicle).map_err(read)?;
         // What the ground heard; else what the vehicle said.
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
         let mut told = 0;
@@ -97,6 +104,7 @@ impl Film {
         Ok(Self {
             path: path.to_owned(),
             damage: footage.damage(),
+            vehicle: footage.vehicle(),
             file,
             side,
             scenes: survey.scenes,
@@ -120,7 +128,7 @@ impl Film {
     /// # Errors
     /// The file cannot be read any more.
     pub fn reel(&self) -> io::Result<Reel> {
-        let footage = Footage::begin(&self.file, &self.path)?;
+        let footage = Footage::begin(&self.file, &self.path, self.vehicle)?;
         Ok(Reel { footage, side: self.side, clock: FilmClock::default(), left: self.scenes })
     }
 }

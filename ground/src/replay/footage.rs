@@ -7,7 +7,7 @@ use std::path::Path;
 
 use protocol::dialect::{MavCmd, MavMessage};
 use protocol::frame::{Frame, Framer};
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::frame_length;
@@ -48,7 +48,25 @@ pub(super) struct Stamped {
 /// A log being read from its beginning.
 pub(super) struct Footage {
     kind: Kind,
+    sides: Sides,
     bytes_read: u64,
+}
+
+/// Who is who in a log; each is the first that was heard, unless it is known before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sides {
+    vehicle: Option<Address>,
+    ground: Option<Address>,
+}
+
+impl Sides {
+    fn hear(&mut self, source: Address) {
+        if source.component_id == VEHICLE.component_id {
+            self.vehicle.get_or_insert(source);
+        } else if source.component_id == GROUND.component_id {
+            self.ground.get_or_insert(source);
+        }
+    }
 }
 
 enum Kind {
@@ -57,8 +75,9 @@ enum Kind {
 }
 
 impl Footage {
-    /// From the beginning of an open file; a `.tlog` by its name, everything else as MCAP.
-    pub(super) fn begin(file: &File, path: &Path) -> io::Result<Self> {
+    /// From the beginning of an open file, of this vehicle or the first that is heard; a `.tlog` by its name, everything
+    /// else as MCAP.
+    pub(super) fn begin(file: &File, path: &Path, vehicle: Option<Address>) -> io::Result<Self> {
         let mut file = file.try_clone()?;
         file.rewind()?;
         let file = BufReader::with_capacity(BUFFER_BYTES, file);
@@ -68,12 +87,17 @@ impl Footage {
         } else {
             Kind::Mcap { reader: Box::new(LogReader::new(file)), waiting: VecDeque::new() }
         };
-        Ok(Self { kind, bytes_read: 0 })
+        Ok(Self { kind, sides: Sides { vehicle, ground: None }, bytes_read: 0 })
     }
 
     /// Bytes of records read so far: how far the reading is.
     pub(super) fn bytes_read(&self) -> u64 {
         self.bytes_read
+    }
+
+    /// Whose flight it is, as far as was heard.
+    pub(super) fn vehicle(&self) -> Option<Address> {
+        self.sides.vehicle
     }
 
     /// Why reading ended early, if it did; known at the end.
@@ -86,6 +110,7 @@ impl Footage {
 
     /// The next scene in the file's order.
     pub(super) fn next_scene(&mut self) -> io::Result<Option<Stamped>> {
+        let sides = &mut self.sides;
         match &mut self.kind {
             Kind::Mcap { reader, waiting } => loop {
                 if let Some(scene) = waiting.pop_front() {
@@ -101,7 +126,7 @@ impl Footage {
                     _ => continue,
                 };
                 if [TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) {
-                    let scenes = frames(&data).into_iter().filter_map(scene);
+                    let scenes = frames(&data).into_iter().filter_map(|frame| scene(frame, sides));
                     waiting.extend(scenes.map(|scene| Stamped { side, stamp_ns: log_time_ns, scene }));
                 }
             },
@@ -114,7 +139,7 @@ impl Footage {
                     }
                     TlogPiece::Frame { stamp_us, bytes } => {
                         // Of MAVLink 1 nothing is shown, nor of a frame whose checksum does not hold.
-                        if let Some(scene) = frames(&bytes).pop().and_then(scene) {
+                        if let Some(scene) = frames(&bytes).pop().and_then(|frame| scene(frame, sides)) {
                             let stamp_ns = stamp_us.saturating_mul(1_000);
                             return Ok(Some(Stamped { side: Side::Ground, stamp_ns, scene }));
                         }
@@ -161,11 +186,12 @@ fn frames(bytes: &[u8]) -> Vec<Frame> {
 
 /// What a frame shows: the vehicle's own; the crew's command, for the first time it was sent; or that the ground sent
 /// something.
-fn scene(frame: Frame) -> Option<Scene> {
-    if frame.source() == VEHICLE {
+fn scene(frame: Frame, sides: &mut Sides) -> Option<Scene> {
+    sides.hear(frame.source());
+    if Some(frame.source()) == sides.vehicle {
         return Some(Scene::Heard(frame));
     }
-    if frame.source() != GROUND {
+    if Some(frame.source()) != sides.ground {
         return None;
     }
     let sent = Some(Scene::Sent(frame.as_bytes().len()));

@@ -35,6 +35,7 @@ pub struct Player {
 impl Player {
     /// At the start, running.
     pub fn new(film: Film, settings: Settings) -> Self {
+        let settings = Settings { vehicle: film.vehicle.unwrap_or(settings.vehicle), ..settings };
         let mut player = Self {
             model: Model::new(settings.clone()),
             film,

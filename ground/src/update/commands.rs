@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use protocol::command::{ANSWER_TIMEOUT, CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
-use protocol::identity::VEHICLE;
 use protocol::log::record::EventLevel;
 
 use super::{Action, auto, keys};
@@ -56,7 +55,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
 fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let (command, param1) = kind.wire();
     let params = [param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    model.commands.sender.submit(VEHICLE, command, params, kind.resend(), now)
+    model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 
 fn is_open(acknowledged: Acknowledged) -> bool {

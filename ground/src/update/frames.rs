@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{MavMessage, TIMESYNC_DATA};
 use protocol::frame::Frame;
-use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
@@ -26,9 +26,9 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
         if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
             model.link.radio = Some((radio, now));
         }
-    } else if frame.source() == GROUND {
+    } else if frame.source() == model.settings.us {
         note_twin(model, now);
-    } else if frame.source() == VEHICLE {
+    } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
     } else if frame.message_id() == HEARTBEAT_ID {
         note_stranger(model, frame.source(), now);
@@ -38,7 +38,11 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
 fn note_twin(model: &mut Model, now: Duration) {
     if model.link.twin_said_at.is_none_or(|at| now.saturating_sub(at) >= TWIN_SAID_EVERY) {
         model.link.twin_said_at = Some(now);
-        model.warn(now, "another ground station uses our ids 255/190: acknowledgements may be its own");
+        let Address { system_id, component_id } = model.settings.us;
+        let words = format!(
+            "another ground station uses our ids {system_id}/{component_id}: acknowledgements may be its own"
+        );
+        model.warn(now, words);
     }
 }
 
@@ -54,7 +58,7 @@ fn note_stranger(model: &mut Model, source: Address, now: Duration) {
 
 fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     if let Some(answer) = CommandAnswer::from_frame(frame) {
-        if GROUND.accepts(answer.target) {
+        if model.settings.us.accepts(answer.target) {
             commands::on_answer(model, answer, now);
         }
         return;
@@ -122,7 +126,8 @@ pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
 fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
     let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
     // Another's question is its own to ask, and another's answer is measured by its clock.
-    if !GROUND.accepts(Address { system_id: data.target_system, component_id: data.target_component }) {
+    let target = Address { system_id: data.target_system, component_id: data.target_component };
+    if !model.settings.us.accepts(target) {
         return;
     }
     if data.tc1 == 0 {

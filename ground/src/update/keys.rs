@@ -7,7 +7,6 @@
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdPhase};
-use protocol::identity::VEHICLE;
 use protocol::log::record::Record;
 use protocol::log::v1::OperatorAction;
 
@@ -237,8 +236,8 @@ pub(super) fn ask_parameters(model: &mut Model) {
         return model.outbox.push(Action::Request(Asked::Parameters));
     }
     model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
-        target_system: VEHICLE.system_id,
-        target_component: VEHICLE.component_id,
+        target_system: model.settings.vehicle.system_id,
+        target_component: model.settings.vehicle.component_id,
     })));
 }
 

@@ -87,6 +87,8 @@ pub enum Msg {
     LinkDown(String),
     /// One of several links does not work; why.
     OneLinkDown(String),
+    /// Something about the links that the crew should know.
+    LinkSays(String),
     /// How the log does.
     Log(LogHealth),
     /// The embedded simulator ended by itself; why, if it failed.
@@ -180,6 +182,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::OneLinkDown(why) => {
             model.warn(now, format!("one link down: {}", protocol::text::printable(why.as_bytes())));
         }
+        Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
         Msg::HeardOver(number) => model.link.heard_over = Some(number),
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
@@ -215,8 +218,8 @@ fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<Signing
         model.warn(
             now,
             format!(
-                "frames refused: {} unsigned, {} wrongly signed, {} replayed, {} too old",
-                what.unsigned, what.wrong, what.replayed, what.too_old
+                "frames refused: {} unsigned, {} wrongly signed, {} replayed, {} too old, {} too new",
+                what.unsigned, what.wrong, what.replayed, what.too_old, what.too_new
             ),
         );
     }

@@ -5,7 +5,6 @@ use std::time::Duration;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TIMESYNC_DATA,
 };
-use protocol::identity::VEHICLE;
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
@@ -33,8 +32,8 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
             tc1: 0,
             ts1,
-            target_system: VEHICLE.system_id,
-            target_component: VEHICLE.component_id,
+            target_system: model.settings.vehicle.system_id,
+            target_component: model.settings.vehicle.component_id,
         })));
     }
     for text in model.texts.expire(now) {

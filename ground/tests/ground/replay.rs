@@ -44,7 +44,7 @@ fn film() -> Film {
 }
 
 fn load(path: &Path) -> Result<Film, FilmError> {
-    Film::load(path, &mut |_| {})
+    Film::load(path, None, &mut |_| {})
 }
 
 /// Every scene of a film with its time.

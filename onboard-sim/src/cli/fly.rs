@@ -15,7 +15,7 @@ use onboard_sim::fly::{
     log_header,
 };
 use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
-use protocol::identity::RADIO_BUDGET_BYTES_S;
+use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::transport::Endpoint;
 use tokio::sync::watch;
@@ -34,6 +34,9 @@ pub(crate) struct FlyArguments {
     /// serial:DEVICE:BAUD; may be given more than once.
     #[arg(long, value_name = "LINK")]
     mavlink: Vec<Endpoint>,
+    /// MAVLink system id of the vehicle: each vehicle on one link needs its own.
+    #[arg(long, default_value_t = VEHICLE.system_id, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    sysid: u8,
     /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -141,6 +144,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         on_the_wire,
         profile,
         auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
+        system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,
         recorder: recorder.clone(),

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
+use protocol::identity::Address;
 
 use super::budget::{BRIEFLY_S, WINDOW_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::{Context, MAX_REQUESTED, Outgoing};
@@ -61,6 +62,11 @@ pub(super) struct Lane {
 }
 
 impl Lane {
+    /// As this address from now on.
+    pub(super) fn speak_as(&mut self, us: Address) {
+        self.encoder = Encoder::new(us);
+    }
+
     pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
         let mut lane = Self {
             links,

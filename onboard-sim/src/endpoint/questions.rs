@@ -3,7 +3,6 @@
 use protocol::dialect::MavParamError;
 use protocol::frame::Frame;
 use protocol::ftp::FileRequest;
-use protocol::identity::VEHICLE;
 use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::VehicleEndpoint;
@@ -18,13 +17,13 @@ impl VehicleEndpoint {
             .map(|request| (request.target, request.decline()))
             .or_else(|| ListQuestion::from_frame(frame).map(|question| (question.target, question.answer)));
         if let Some((target, answer)) = unkept {
-            if VEHICLE.accepts(target) {
+            if self.us.accepts(target) {
                 self.lane(link).request(vec![answer]);
             }
             return true;
         }
         let Some(request) = ParamRequest::from_frame(frame) else { return false };
-        if !VEHICLE.accepts(request.target) {
+        if !self.us.accepts(request.target) {
             return true;
         }
         let asker = frame.source();

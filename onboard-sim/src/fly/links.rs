@@ -15,7 +15,7 @@ use super::FlyError;
 use super::recording::{note, record_raw};
 use crate::endpoint::Outgoing;
 
-/// Timestamps are remembered this often, in stamps (10 us).
+/// Timestamps are remembered this often at least, in stamps (10 us).
 const REMEMBER_EVERY: u64 = 100_000;
 /// Things taken from one link before the vehicle's own work goes on: a flood must not hold up a frame of the loop.
 const MAX_AT_ONCE: usize = 1024;
@@ -104,28 +104,32 @@ impl Links {
         let (now, clock) = (Duration::from_secs_f64(time_s), clock());
         let recorder = self.recorder.as_ref();
         let mut heard = Vec::new();
-        let mut commanded = false;
-        for (number, OpenLink { transport, name, .. }) in self.open.iter_mut().enumerate() {
+        let mut believed = false;
+        for (number, OpenLink { transport, sender, name }) in self.open.iter_mut().enumerate() {
             for _ in 0..MAX_AT_ONCE {
                 let Some(received) = transport.try_receive() else { break };
                 for news in self.hub.take(number, received, now, clock) {
                     match news {
+                        News::Believed(origin) => {
+                            believed = true;
+                            sender.believe(origin);
+                        }
                         News::Frame(frame) => {
-                            commanded |= CommandRequest::from_frame(&frame).is_some();
                             self.intake.record(name, &frame, time_s);
                             heard.push(Heard::Frame(number, frame));
                         }
                         News::Copy(frame) => self.intake.record(name, &frame, time_s),
                         // Not recorded: a flood of forgeries must not fill the log. It is counted.
                         News::Rejected(frame, why) => heard.push(Heard::Rejected(frame, why)),
+                        News::Strangers(words) => note(recorder, time_s, &format!("link {name}: {words}")),
                         News::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
                         News::Down(why) => note(recorder, time_s, &format!("link {name} down: {why}")),
                     }
                 }
             }
         }
-        // Before a command is obeyed, so that a restart does not make it new.
-        if commanded || clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
+        // Before anything is done about it, so that a restart does not make it new.
+        if believed || clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
             self.remembered_at = clock;
             self.remember(time_s);
         }
@@ -171,8 +175,13 @@ impl Links {
         }
         if let Some(counters) = self.hub.signing() {
             let words = format!(
-                "signatures: {} accepted, {} unsigned, {} wrong, {} replayed, {} too old",
-                counters.accepted, counters.unsigned, counters.wrong, counters.replayed, counters.too_old
+                "signatures: {} accepted, {} unsigned, {} wrong, {} replayed, {} too old, {} too new",
+                counters.accepted,
+                counters.unsigned,
+                counters.wrong,
+                counters.replayed,
+                counters.too_old,
+                counters.too_new
             );
             note(self.recorder.as_ref(), time_s, &words);
         }
@@ -181,7 +190,7 @@ impl Links {
 
     fn remember(&mut self, time_s: f64) {
         if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory())
-            && let Err(error) = file.remember(memory)
+            && let Err(error) = file.remember(&memory)
         {
             note(self.recorder.as_ref(), time_s, &format!("timestamps are not remembered: {error}"));
         }

@@ -60,6 +60,8 @@ impl std::str::FromStr for Speed {
 pub struct FlyOptions {
     /// What flies.
     pub profile: LoadedFlight,
+    /// MAVLink system id of the vehicle.
+    pub system_id: u8,
     /// Links to serve; none is allowed.
     pub links: Vec<Endpoint>,
     /// The key that every frame is to be signed with; none is allowed.
@@ -227,7 +229,10 @@ pub async fn fly_observed(
     };
     let capacities_bytes_s: Vec<u32> =
         options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
-    let mut endpoint = endpoint.booted(options.on_the_wire.boot_number.get()).over_links(&capacities_bytes_s);
+    let mut endpoint = endpoint
+        .of_system(options.system_id)
+        .booted(options.on_the_wire.boot_number.get())
+        .over_links(&capacities_bytes_s);
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };

@@ -14,7 +14,17 @@ fn beats(count: usize) -> Vec<Frame> {
 }
 
 fn datagram(frame: &Frame) -> Received {
-    Received::Datagram(frame.as_bytes().to_vec())
+    datagram_of(frame.as_bytes().to_vec())
+}
+
+/// Whoever sends it.
+fn datagram_of(bytes: Vec<u8>) -> Received {
+    Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
+}
+
+/// What is said of frames, without who sent them.
+fn of_frames(news: Vec<News>) -> Vec<News> {
+    news.into_iter().filter(|news| !matches!(news, News::Believed(_))).collect()
 }
 
 fn ms(milliseconds: u64) -> Duration {
@@ -58,9 +68,9 @@ fn streams_of_one_link_are_framed_apart() {
     let (head, tail) = frames[0].as_bytes().split_at(9);
     assert!(hub.take(0, Received::Stream(1, head.to_vec()), ms(0), 0).is_empty());
     let other = hub.take(0, Received::Stream(2, frames[1].as_bytes().to_vec()), ms(1), 0);
-    assert_eq!(other, [News::Frame(frames[1].clone())]);
+    assert_eq!(of_frames(other), [News::Frame(frames[1].clone())]);
     let rest = hub.take(0, Received::Stream(1, tail.to_vec()), ms(2), 0);
-    assert_eq!(rest, [News::Frame(frames[0].clone())]);
+    assert_eq!(of_frames(rest), [News::Frame(frames[0].clone())]);
     hub.take(0, Received::Gone(1), ms(3), 0);
     assert_eq!(hub.links()[0].framing().frames, 2, "an ended stream keeps its counts");
     for peer in 0..100 {
@@ -78,10 +88,13 @@ fn a_forged_frame_does_not_shadow_the_true_one() {
     let rejected = far.take(0, datagram(frame), ms(0), CLOCK);
     assert_eq!(rejected, [News::Rejected(frame.clone(), Rejection::Unsigned)]);
     let bytes: Vec<Vec<u8>> = (0..2).map(|link| near.bytes_for(link, frame, CLOCK)).collect();
-    let first = far.take(0, Received::Datagram(bytes[0].clone()), ms(1), CLOCK);
-    assert!(matches!(&first[..], [News::Frame(_)]));
-    let second = far.take(1, Received::Datagram(bytes[1].clone()), ms(2), CLOCK);
-    assert!(matches!(&second[..], [News::Copy(_)]), "signed anew for its own link, and yet the same frame");
+    let first = far.take(0, datagram_of(bytes[0].clone()), ms(1), CLOCK);
+    assert!(matches!(&first[..], [News::Believed(_), News::Frame(_)]));
+    let second = far.take(1, datagram_of(bytes[1].clone()), ms(2), CLOCK);
+    assert!(
+        matches!(&second[..], [News::Believed(_), News::Copy(_)]),
+        "signed anew for its own link, and yet the same frame"
+    );
     assert_eq!(far.signing().map(|counters| (counters.accepted, counters.unsigned)), Some((2, 1)));
 }
 
@@ -99,4 +112,33 @@ fn trouble_is_known_until_it_is_over() {
     assert_eq!(hub.links()[0].trouble(), Some("unplugged"));
     hub.take(0, Received::Up("/dev/x".to_owned()), ms(1), 0);
     assert_eq!(hub.links()[0].trouble(), None);
+}
+
+/// Who is told to its link as believed after one datagram of this frame.
+fn believed(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
+    let origin = |news| match news {
+        News::Believed(origin) => Some(origin),
+        _ => None,
+    };
+    hub.take(0, datagram_of(bytes), ms(0), CLOCK).into_iter().filter_map(origin).collect()
+}
+
+#[test]
+fn a_sender_is_believed_for_a_valid_frame_and_for_nothing_less() {
+    let sender = [Origin::Datagram(([127, 0, 0, 1], 1).into())];
+    let plain = beats(1).remove(0);
+    let mut hub = Hub::new(1, None);
+    assert_eq!(believed(&mut hub, vec![1, 2, 3]), []);
+    assert_eq!(believed(&mut hub, plain.as_bytes()[..20].to_vec()), []);
+    assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), sender);
+    let key = |fill| Some(Signing::new(Key::new([fill; Key::LEN]), Memory::default()));
+    let mut hub = Hub::new(1, key(7));
+    let mut signed_by = |fill| Hub::new(1, key(fill)).bytes_for(0, &plain, CLOCK);
+    let radio = MavMessage::RADIO_STATUS(crate::dialect::RADIO_STATUS_DATA::default());
+    assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), []);
+    assert_eq!(believed(&mut hub, signed_by(8)), []);
+    let report = Encoder::new(VEHICLE).encode(&radio).as_bytes().to_vec();
+    assert_eq!(believed(&mut hub, report), [], "the one message that passes unsigned proves nobody");
+    assert_eq!(believed(&mut hub, signed_by(7)), sender);
+    assert_eq!(believed(&mut hub, signed_by(7)), [], "replayed");
 }

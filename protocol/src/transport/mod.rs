@@ -3,7 +3,7 @@
 //!
 //! A [`Transport`] is two bounded queues and a task. The task outlives trouble: a serial line that goes
 //! away and a connection that breaks are tried again twice a second, and a UDP peer that restarts on another port is
-//! picked up.
+//! picked up. A link that anybody can send to answers only those of whom its owner says that it believed a frame.
 
 mod endpoint;
 mod serial;
@@ -18,10 +18,12 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-pub use crate::hub::Received;
+pub use crate::hub::{Origin, Received};
 pub use endpoint::{Endpoint, EndpointError};
 
 const QUEUE: usize = 1024;
+/// Senders that were believed and that the link has not taken note of yet; the next frame of one says it again.
+const BELIEVED: usize = 256;
 /// What does not work is tried again after this long.
 const REOPEN_AFTER: Duration = Duration::from_millis(500);
 
@@ -37,6 +39,7 @@ pub struct Transport {
 #[derive(Debug, Clone)]
 pub struct TransportSender {
     queue: mpsc::Sender<Vec<u8>>,
+    believed: mpsc::Sender<Origin>,
     dropped: Arc<AtomicU64>,
 }
 
@@ -48,6 +51,13 @@ impl TransportSender {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
         queued
+    }
+
+    /// Tells the link that a frame of this sender was believed ([`crate::hub::News::Believed`]): only then is it
+    /// answered, and only such a sender keeps its place against others.
+    pub fn believe(&self, origin: Origin) {
+        // Where there is no room its next frame says it again.
+        let _ = self.believed.try_send(origin);
     }
 
     /// Writes that found no room.
@@ -63,17 +73,22 @@ impl Transport {
     /// An address cannot be bound or, for UDP, resolved. A serial device that is not there and a TCP server that does
     /// not answer are no error: they may come later, and [`Received::Down`] says so until then.
     pub async fn open(mut endpoint: Endpoint) -> io::Result<Self> {
-        let (inbox, received) = mpsc::channel(QUEUE);
+        let is_udp = matches!(endpoint, Endpoint::UdpIn(_) | Endpoint::UdpOut(_));
+        let (inbox, received) = mpsc::channel(if is_udp { udp::AHEAD } else { QUEUE });
         let (queue, outbox) = mpsc::channel(QUEUE);
+        let (believed, believed_by_owner) = mpsc::channel(BELIEVED);
         match &mut endpoint {
             Endpoint::UdpIn(address) => {
-                let bound = udp::listen(address, inbox, outbox).await?;
+                let bound =
+                    udp::listen(address, udp::Ends { inbox, outbox, believed: believed_by_owner }).await?;
                 // Port 0 lets the system choose; the endpoint then names its choice.
                 if address.ends_with(":0") {
                     *address = bound.to_string();
                 }
             }
-            Endpoint::UdpOut(address) => udp::connect(address, inbox, outbox).await?,
+            Endpoint::UdpOut(address) => {
+                udp::connect(address, udp::Ends { inbox, outbox, believed: believed_by_owner }).await?;
+            }
             Endpoint::TcpIn(address) => {
                 let bound = tcp::listen(address, inbox, outbox).await?;
                 if address.ends_with(":0") {
@@ -83,7 +98,7 @@ impl Transport {
             Endpoint::TcpOut(address) => tcp::connect(address.clone(), inbox, outbox),
             Endpoint::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
         }
-        let sender = TransportSender { queue, dropped: Arc::new(AtomicU64::new(0)) };
+        let sender = TransportSender { queue, believed, dropped: Arc::new(AtomicU64::new(0)) };
         Ok(Self { endpoint, received, sender })
     }
 

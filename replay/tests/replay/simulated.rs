@@ -55,6 +55,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulate
     let profile = load_profile(profile).unwrap();
     let recorder = Recorder::create(&log, &log_header("onboard-sim", &profile, seed, START_UNIX_NS)).unwrap();
     let options = FlyOptions {
+        system_id: 1,
         profile,
         links: links.to_vec(),
         on_the_wire: OnTheWire { boot_number: NonZeroU32::MIN, ..OnTheWire::drawn() },

@@ -26,8 +26,8 @@ pub(super) fn encode(links: &[LinkReport], signing: Option<&SigningCounters>, ou
         out.u8(u8::from(trouble.is_some())).text(trouble.as_deref().unwrap_or_default());
     }
     out.u8(u8::from(signing.is_some()));
-    if let Some(SigningCounters { accepted, unsigned, wrong, replayed, too_old }) = signing {
-        out.u64(*accepted).u64(*unsigned).u64(*wrong).u64(*replayed).u64(*too_old);
+    if let Some(SigningCounters { accepted, unsigned, wrong, replayed, too_old, too_new }) = signing {
+        out.u64(*accepted).u64(*unsigned).u64(*wrong).u64(*replayed).u64(*too_old).u64(*too_new);
     }
 }
 
@@ -45,6 +45,7 @@ pub(super) fn decode(rest: &mut Reader) -> Result<Report, CodecError> {
             wrong: rest.u64()?,
             replayed: rest.u64()?,
             too_old: rest.u64()?,
+            too_new: rest.u64()?,
         }),
     };
     Ok((links, signing))

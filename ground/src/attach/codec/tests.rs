@@ -89,12 +89,13 @@ fn counters() -> impl Strategy<Value = FramerCounters> {
 }
 
 fn signing() -> impl Strategy<Value = SigningCounters> {
-    any::<[u64; 5]>().prop_map(|[accepted, unsigned, wrong, replayed, too_old]| SigningCounters {
+    any::<[u64; 6]>().prop_map(|[accepted, unsigned, wrong, replayed, too_old, too_new]| SigningCounters {
         accepted,
         unsigned,
         wrong,
         replayed,
         too_old,
+        too_new,
     })
 }
 
@@ -143,6 +144,7 @@ fn msg() -> impl Strategy<Value = Msg> {
         any::<String>().prop_map(Msg::LinkUp),
         any::<String>().prop_map(Msg::LinkDown),
         any::<String>().prop_map(Msg::OneLinkDown),
+        any::<String>().prop_map(Msg::LinkSays),
         any::<usize>().prop_map(Msg::HeardOver),
         (vec(link(), 0..4), option::of(signing())).prop_map(|(links, signing)| Msg::Links { links, signing }),
         (any::<u64>(), any::<bool>()).prop_map(|(dropped, failed)| Msg::Log(LogHealth { dropped, failed })),

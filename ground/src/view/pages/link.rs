@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::message_name;
-use protocol::identity::{Address, VEHICLE};
+use protocol::identity::Address;
 use protocol::link::{LinkFigures, SourceFigures};
 use ratatui::text::{Line, Span};
 
@@ -46,7 +46,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     lines.push(heading(theme, columns));
     for report in reports(model, now) {
         lines.push(link_line(&report, theme, columns));
-        lines.extend(report.sources.iter().map(|source| source_line(source, theme, columns)));
+        lines.extend(
+            report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme, columns)),
+        );
     }
     lines.push(Line::styled(
         format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
@@ -79,8 +81,13 @@ fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let mut lines = vec![row("rejected", unreadable)];
     if let Some(signing) = model.link.signing {
         let counts = format!(
-            "good {}  unsigned {}  wrong {}  replayed {}  too old {}",
-            signing.accepted, signing.unsigned, signing.wrong, signing.replayed, signing.too_old
+            "good {}  unsigned {}  wrong {}  replayed {}  old {}  new {}",
+            signing.accepted,
+            signing.unsigned,
+            signing.wrong,
+            signing.replayed,
+            signing.too_old,
+            signing.too_new
         );
         lines.push(row("signed", counts));
     }
@@ -147,10 +154,10 @@ fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static>
     Line::styled(text, theme.style(loss_role(loss)))
 }
 
-fn source_line(source: &SourceFigures, theme: Theme, columns: usize) -> Line<'static> {
+fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: usize) -> Line<'static> {
     let SourceFigures { source: address, age, rx_frames_s, loss } = *source;
     let Address { system_id, component_id } = address;
-    let name = format!("  {system_id}/{component_id} {}", what(address));
+    let name = format!("  {system_id}/{component_id} {}", what(address, vehicle));
     let (loss_words, age_words) = (percent(loss), seconds(age));
     let mark = if age > STALE_AFTER { STALE_MARK } else { " " };
     let text = if columns >= TABLE_COLUMNS {
@@ -168,9 +175,9 @@ fn source_line(source: &SourceFigures, theme: Theme, columns: usize) -> Line<'st
 }
 
 /// What a component is, as far as its ids say. Component ids: MAVLink's `MAV_COMPONENT`.
-fn what(address: Address) -> &'static str {
+fn what(address: Address, vehicle: Address) -> &'static str {
     match address {
-        VEHICLE => "vehicle",
+        _ if address == vehicle => "vehicle",
         Address { component_id: 190, .. } => "ground station",
         Address { component_id: 68, .. } => "radio",
         _ => "",
@@ -216,7 +223,7 @@ fn ages(model: &Model, now: Duration) -> Vec<(&'static str, Option<Duration>)> {
         .link
         .stats
         .messages(now)
-        .filter(|(source, ..)| *source == VEHICLE)
+        .filter(|(source, ..)| *source == model.settings.vehicle)
         .filter_map(|(_, id, age)| Some((message_name(id)?, age)))
         .collect();
     let age = |name| heard.iter().find(|(known, _)| *known == name).map(|(_, age)| *age);
