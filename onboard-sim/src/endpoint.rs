@@ -2,7 +2,9 @@
 //!
 //! Telemetry is scheduled within a radio's budget; answers and texts go first and count against it.
 
+mod latch;
 mod questions;
+mod uplink;
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -21,7 +23,8 @@ use protocol::signing::Rejection;
 use protocol::text;
 
 use crate::commands::{self, Command};
-use crate::craft::{Craft, Severity, VehicleEvent};
+use crate::craft::{Craft, Request, Severity, VehicleEvent};
+use crate::stations::Stations;
 use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
 
@@ -51,6 +54,12 @@ pub struct VehicleEndpoint {
     last_poll_s: f64,
     warned_of_twin: bool,
     say_rejected_after_s: f64,
+    /// Who is heard, and how well.
+    stations: Stations,
+    /// The vehicle starts by itself: no station has to be heard.
+    starts_by_itself: bool,
+    /// Aborts that were taken and are answered once their latch is seen.
+    latching: Vec<CommandRequest>,
     /// Whoever has sent anything yet; a newcomer is told the limits at once.
     known: BTreeSet<Address>,
 }
@@ -81,6 +90,9 @@ impl VehicleEndpoint {
             last_poll_s: 0.0,
             warned_of_twin: false,
             say_rejected_after_s: 0.0,
+            stations: Stations::default(),
+            starts_by_itself: false,
+            latching: Vec::new(),
             known: BTreeSet::new(),
         }
     }
@@ -100,6 +112,7 @@ impl VehicleEndpoint {
             }
             return;
         }
+        self.stations.accepted(frame, vehicle.time_s());
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
             self.streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
         }
@@ -137,6 +150,7 @@ impl VehicleEndpoint {
     /// Says that a command was not believed; now and then, because a flood of them must not fill the radio. It is not
     /// acknowledged: a forger could have the true ground's own command answered by it.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
+        self.stations.refused(frame.source(), why, self.last_poll_s);
         let Some(request) = CommandRequest::from_frame(frame).filter(|asked| VEHICLE.accepts(asked.target))
         else {
             return;
@@ -172,7 +186,11 @@ impl VehicleEndpoint {
         let earned = f64::from(RADIO_BUDGET_BYTES_S) * (now_s - self.last_poll_s).max(0.0);
         self.credit_bytes = (self.credit_bytes + earned).min(BURST_BYTES);
         self.last_poll_s = now_s;
+        self.answer_latched(vehicle);
         let mut frames = std::mem::take(&mut self.urgent);
+        for message in self.stations.due(now_s) {
+            frames.push(self.encoder.encode(&message));
+        }
         for message_id in self.streams.due(now_s) {
             let pending = self.bytes_of(&frames);
             // The heartbeat is what the ground believes us alive by: it is never held back.
@@ -207,8 +225,14 @@ impl VehicleEndpoint {
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
             Ok(Command::Vehicle(asked)) => {
+                let answer = self.put(asked, request.source, vehicle);
+                let result = commands::mav_result(&answer);
+                if asked == Request::Abort && result == MavResult::MAV_RESULT_ACCEPTED && !vehicle.aborted() {
+                    self.answer_when_latched(request);
+                    return;
+                }
                 // The vehicle says its reason itself, for the log and every ground.
-                (commands::mav_result(&vehicle.request(asked)), None)
+                (result, None)
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 self.streams.set_interval(message_id, interval_us, self.last_poll_s)

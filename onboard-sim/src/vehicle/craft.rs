@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flight::arming::{self, ArmingInput, Check, arming_checks};
+use flight::arming::{self, ArmingInput, Check, Uplink, arming_checks};
 use flight::controller::ControlLevel;
 use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
 use flight::profile::StateWeights;
@@ -10,8 +10,8 @@ use flight::verdict::LandingVerdict;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
-use super::{Severity, Vehicle};
-use crate::craft::{Craft, DEGRADED, Judged, LogState, Snapshot, VehicleEvent, words_of};
+use super::{AT_REST_S, Severity, Vehicle};
+use crate::craft::{Craft, DEGRADED, Judged, LogState, MotorWatch, Snapshot, VehicleEvent, words_of};
 use crate::streams::{STANDARD, Standard};
 
 impl Craft for Vehicle {
@@ -26,6 +26,15 @@ impl Craft for Vehicle {
 
     fn mode(&self) -> &Mode {
         &self.mode
+    }
+
+    fn is_over(&self) -> bool {
+        let in_phase_s = self.time_s() - self.mode.entered_at_s;
+        match self.mode.phase {
+            Phase::Touchdown => in_phase_s >= AT_REST_S,
+            Phase::Safed => true,
+            phase => phase.on_pad() && self.aborted(),
+        }
     }
 
     fn standard(&self) -> &'static [Standard] {
@@ -58,6 +67,7 @@ impl Craft for Vehicle {
             predicted_landing: rehearsed
                 .filter(|output| output.plan.len > 0)
                 .map(|output| LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state)),
+            uplink: self.uplink,
         };
         arming_checks(&self.profile.arming, &input)
     }
@@ -68,6 +78,14 @@ impl Craft for Vehicle {
 
     fn log_state(&mut self) -> &mut LogState {
         &mut self.log
+    }
+
+    fn uplink(&mut self) -> &mut Uplink {
+        &mut self.uplink
+    }
+
+    fn motor_watch(&mut self) -> &mut MotorWatch {
+        &mut self.motor_watch
     }
 
     fn happen(&mut self, event: Event) -> Option<Refusal> {
@@ -111,7 +129,7 @@ impl Craft for Vehicle {
 
     fn log(&self, changed: bool) -> Vec<Record> {
         // The waiting vehicle does not move: once a second and at every change of phase is enough to see that.
-        let moving = !self.mode.phase.on_pad() && self.mode.phase != Phase::Safed;
+        let moving = !self.mode.phase.on_pad() && !self.is_over();
         if moving || changed || (self.time_s().fract() < 0.015) {
             vec![Record::PlantTruth(Box::new(self.truth()))]
         } else {
