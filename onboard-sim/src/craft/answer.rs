@@ -99,6 +99,8 @@ pub(super) fn answer<C: Craft + ?Sized>(craft: &mut C, request: Request, asker: 
     }
     match craft.happen(event) {
         None | Some(Refusal::AlreadyAborted) => Answer::accepted(),
+        // Its first answer may have been lost: also under the parachute and on the ground an abort that is latched is so.
+        Some(_) if request == Request::Abort && locks.abort_latched => Answer::accepted(),
         Some(refusal) => {
             let reason = match refusal {
                 Refusal::ChecksFailed => arming::first_refusal(&checks).unwrap_or_else(|| refusal.reason()),

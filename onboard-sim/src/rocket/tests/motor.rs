@@ -26,7 +26,9 @@ fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
     let landed = rocket.snapshot();
     assert_eq!((landed.phase, landed.motor), (Phase::Touchdown, MotorStatus::Hot));
     let wait_s = landed.approach_wait_s.unwrap();
-    assert!((45.0..60.0).contains(&wait_s), "{wait_s}");
+    assert!((45.0..=60.0).contains(&wait_s), "{wait_s}");
+    let stood_s = rocket.time_s() - rocket.judged().unwrap().impact.time_s;
+    assert!((1.0..5.0).contains(&stood_s), "the flight is over {stood_s} s after the touchdown");
     wait(&mut rocket, wait_s - 0.1);
     assert_eq!(rocket.phase(), Phase::Touchdown);
     let events = wait(&mut rocket, 0.2);
