@@ -21,7 +21,7 @@ fn by_itself_it_lands_and_its_log_replays_to_the_bit() {
         .current_dir(folder.path());
     let flight = Running::to_end(&mut fly);
     assert_eq!(flight.code, Some(0), "{}", flight.output);
-    for words in ["no ascent is flown", "AERO_DESCENT", "POWERED", "SAFED", "LANDED", "Table 2"] {
+    for words in ["no ascent is flown", "AERO_DESCENT", "POWERED", "TOUCHDOWN", "LANDED", "Table 2"] {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
     verify(folder.path(), "flight.mcap");

@@ -3,8 +3,11 @@
 use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use e2e::{Bound, Ended, Program, Running, SerialLine, command_frame, program};
+use e2e::{Bound, Ended, Program, Running, SerialLine, command_frame, heartbeat_frame, program};
 use protocol::dialect::MavCmd;
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
@@ -79,6 +82,7 @@ fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
     let mut flight =
         Running::start(&mut vehicle(folder.path(), &format!("serial:{}:57600", line.near.display())));
     let mut radio = std::fs::File::options().write(true).open(&line.far).unwrap();
+    let station = Speaking::on(radio.try_clone().unwrap());
     let mut encoder = Encoder::new(GROUND);
     let mut command = |command, param1| {
         radio.write_all(command_frame(&mut encoder, command, param1).as_bytes()).unwrap();
@@ -89,6 +93,7 @@ fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
     command(MavCmd::MAV_CMD_MISSION_START, 0.0);
     // By the end of the countdown the vehicle has sent more than a terminal's buffer holds.
     flight.wait_for_line("to POWERED");
+    drop(station);
     command(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0);
     let before_burn_out = flight.wait_for_line("no cut-off exists");
     assert!(before_burn_out.contains("ABORT"), "{before_burn_out}");
@@ -97,6 +102,34 @@ fn an_abort_is_heard_while_nothing_the_vehicle_sends_is_taken() {
     let at =
         |words: &str| ended.output.find(words).unwrap_or_else(|| panic!("no {words} in {}", ended.output));
     assert!(at("no cut-off exists") < at("burn-out"), "{}", ended.output);
+}
+
+/// A ground station that says ten times a second that it is there, until it is dropped.
+struct Speaking(Arc<AtomicBool>);
+
+impl Speaking {
+    fn on(mut radio: std::fs::File) -> Self {
+        let over = Arc::new(AtomicBool::new(false));
+        let ends = Arc::clone(&over);
+        std::thread::Builder::new()
+            .name("heartbeats".to_owned())
+            .spawn(move || {
+                let mut encoder = Encoder::new(GROUND);
+                while !ends.load(Ordering::Relaxed)
+                    && radio.write_all(heartbeat_frame(&mut encoder).as_bytes()).is_ok()
+                {
+                    std::thread::sleep(Duration::from_millis(100));
+                }
+            })
+            .unwrap();
+        Self(over)
+    }
+}
+
+impl Drop for Speaking {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 #[test]

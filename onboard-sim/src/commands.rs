@@ -67,6 +67,12 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
         }
     } else if request.is(MavCmd::MAV_CMD_MISSION_START) {
         Ok(Command::Vehicle(Request::Start))
+    } else if request.is(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE) {
+        if param1 == 0.0 {
+            Ok(Command::Vehicle(Request::Hold))
+        } else {
+            unfit(MavResult::MAV_RESULT_DENIED, "a hold does not go on: start anew".to_owned())
+        }
     } else if request.is(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) {
         if param1 > 0.5 {
             Ok(Command::Vehicle(Request::Abort))
@@ -145,6 +151,14 @@ mod tests {
         assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(Request::Disarm)));
         for param1 in [0.5, 2.0, -1.0, f32::NAN, f32::INFINITY, 1.000_000_1] {
             assert_eq!(result_of(&command(400, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
+        }
+    }
+
+    #[test]
+    fn a_pause_holds_and_nothing_continues() {
+        assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(Request::Hold)));
+        for param1 in [1.0, 0.5, -1.0, f32::NAN] {
+            assert_eq!(result_of(&command(193, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
     }
 

@@ -5,9 +5,11 @@
 
 mod budget;
 mod lane;
+mod latch;
 mod lists;
 mod questions;
 mod refusals;
+mod uplink;
 
 use std::collections::BTreeSet;
 
@@ -30,6 +32,7 @@ use self::lane::{Answer, Lane};
 use self::refusals::{Refusals, Warnings};
 use crate::commands::{self, Command};
 use crate::craft::{Craft, Request, Severity, VehicleEvent};
+use crate::stations::Stations;
 use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
 
@@ -52,10 +55,14 @@ pub struct VehicleEndpoint {
     text_id: u16,
     now_s: f64,
     warned_of_twin: bool,
+    /// Who is heard, and how well.
+    stations: Stations,
+    /// The vehicle starts by itself: no station has to be heard.
+    starts_by_itself: bool,
+    /// Aborts that were taken and are answered once their latch is seen, with the links they came over.
+    latching: Vec<(usize, CommandRequest)>,
     /// Whoever has sent anything yet; a newcomer is told what stands still at once.
     known: BTreeSet<Address>,
-    /// The station that armed; nobody else sets rates until it is disarmed.
-    armed_by: Option<Address>,
     refusals: Refusals,
     warnings: Warnings,
     told: Option<Told>,
@@ -83,12 +90,13 @@ struct Told {
     phase: Phase,
     interlocks: Interlocks,
     counting_down: bool,
+    held: bool,
 }
 
 impl From<&Mode> for Told {
     fn from(mode: &Mode) -> Self {
-        let Mode { phase, interlocks, countdown_end_s, .. } = *mode;
-        Self { phase, interlocks, counting_down: countdown_end_s.is_some() }
+        let Mode { phase, interlocks, countdown_end_s, hold, .. } = *mode;
+        Self { phase, interlocks, counting_down: countdown_end_s.is_some(), held: hold.is_some() }
     }
 }
 
@@ -124,7 +132,9 @@ impl VehicleEndpoint {
             now_s: 0.0,
             warned_of_twin: false,
             known: BTreeSet::new(),
-            armed_by: None,
+            stations: Stations::default(),
+            starts_by_itself: false,
+            latching: Vec::new(),
             refusals: Refusals::default(),
             warnings: Warnings::default(),
             told: None,
@@ -171,6 +181,7 @@ impl VehicleEndpoint {
             }
             return;
         }
+        self.stations.accepted(frame, vehicle.time_s());
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
@@ -210,6 +221,7 @@ impl VehicleEndpoint {
     /// Says that a command was not believed. It is not acknowledged: a forger could have the true ground's own command
     /// answered by it.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
+        self.stations.refused(frame.source(), why, self.now_s);
         let Some(request) = CommandRequest::from_frame(frame).filter(|asked| self.us.accepts(asked.target))
         else {
             return;
@@ -238,6 +250,12 @@ impl VehicleEndpoint {
         }
         let context = Context { now_s: self.now_s, boot_number: self.boot_number };
         let mut snapshot = None;
+        self.answer_latched(vehicle);
+        for message in self.stations.due(self.now_s) {
+            for lane in &mut self.lanes {
+                lane.tell_of_uplink(message.clone());
+            }
+        }
         self.lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, &mut snapshot)).collect()
     }
 
@@ -249,7 +267,7 @@ impl VehicleEndpoint {
             self.hurry(TD_FLIGHT_STATUS_DATA::ID);
         }
         if !told.interlocks.armed {
-            self.armed_by = None;
+            self.stations.set_armed_by(None);
         }
         if told.interlocks.abort_latched {
             let aborted_at_s = *self.aborted_at_s.get_or_insert(self.now_s);
@@ -281,10 +299,10 @@ impl VehicleEndpoint {
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
             // The vehicle says its reason itself, for the log and every ground.
-            Ok(Command::Vehicle(asked)) => (self.ask(asked, request.source, vehicle), None),
+            Ok(Command::Vehicle(asked)) => (commands::mav_result(&self.put(asked, request.source, vehicle)), None),
             Ok(Command::ForcedDisarm) => {
                 let asked = if aborts { Request::Abort } else { Request::Disarm };
-                (self.ask(asked, request.source, vehicle), None)
+                (commands::mav_result(&self.put(asked, request.source, vehicle)), None)
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 match self.rates_forbidden(request.source, vehicle) {
@@ -303,7 +321,9 @@ impl VehicleEndpoint {
         };
         let answer = CommandAnswer::to(request, result);
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
-        if aborts {
+        if aborts && !refused && !vehicle.aborted() {
+            self.answer_when_latched(link, request);
+        } else if aborts {
             self.lane(link).answer_abort(answer);
         } else if !refused || self.refusals.may_answer(request.source, self.now_s) {
             self.lane(link).answer(Answer::Command(answer));
@@ -313,20 +333,11 @@ impl VehicleEndpoint {
         }
     }
 
-    fn ask(&mut self, asked: Request, station: Address, vehicle: &mut dyn Craft) -> MavResult {
-        let was_armed = vehicle.mode().interlocks.armed;
-        let result = commands::mav_result(&vehicle.request(asked));
-        if asked == Request::Arm && !was_armed && vehicle.mode().interlocks.armed {
-            self.armed_by = Some(station);
-        }
-        result
-    }
-
     /// Why this station may not set rates now, if so: while the vehicle is armed, only the station that armed it may. Of
     /// a vehicle that armed itself everybody may.
     fn rates_forbidden(&self, station: Address, vehicle: &dyn Craft) -> Option<String> {
         let Address { system_id, component_id } =
-            self.armed_by.filter(|armed_by| vehicle.mode().interlocks.armed && *armed_by != station)?;
+            self.stations.armed_by().filter(|by| vehicle.mode().interlocks.armed && *by != station)?;
         Some(format!("while armed, only {system_id}/{component_id}, which armed, sets rates"))
     }
 

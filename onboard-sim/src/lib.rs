@@ -29,6 +29,7 @@ pub mod plant;
 pub mod rocket;
 pub mod scatter;
 pub mod solve_times;
+pub mod stations;
 pub mod streams;
 pub mod telemetry;
 pub mod vehicle;

@@ -30,6 +30,8 @@ pub struct Weather {
     pub eats_answers: bool,
     /// Nothing arrives.
     pub silent: bool,
+    /// Nothing that the ground says arrives.
+    pub uplink_silent: bool,
 }
 
 /// A proxy between one vehicle and one ground station, which both speak to it first. One that starts again takes the
@@ -70,9 +72,11 @@ impl Air {
         let (state, over) = (Arc::new(Mutex::new(state)), Arc::new(AtomicBool::new(false)));
         let clone = |socket: &UdpSocket| socket.try_clone().expect("a descriptor");
         let (from, to) = (clone(&to_vehicle), clone(&to_ground));
-        let down = Way { from, to, state: Arc::clone(&state), over: Arc::clone(&over), dice: Dice(1) };
+        let down =
+            Way { from, to, up: false, state: Arc::clone(&state), over: Arc::clone(&over), dice: Dice(1) };
         let (from, to) = (clone(&to_ground), clone(&to_vehicle));
-        let up = Way { from, to, state: Arc::clone(&state), over: Arc::clone(&over), dice: Dice(2) };
+        let up =
+            Way { from, to, up: true, state: Arc::clone(&state), over: Arc::clone(&over), dice: Dice(2) };
         let spawn = |name: &str, run: Box<dyn FnOnce() + Send>| {
             std::thread::Builder::new().name(name.to_owned()).spawn(run).expect("a thread")
         };
@@ -97,6 +101,14 @@ impl Air {
     /// The socket has no address.
     pub fn ground_link(&self) -> String {
         format!("udpout:{}", self.to_ground.local_addr().expect("bound"))
+    }
+
+    /// Where a ground station of the test's own speaks to.
+    ///
+    /// # Panics
+    /// The socket has no address.
+    pub fn ground_address(&self) -> SocketAddr {
+        self.to_ground.local_addr().expect("bound")
     }
 
     /// From now on.
@@ -170,6 +182,8 @@ fn holds_answer(datagram: &[u8]) -> bool {
 struct Way {
     from: UdpSocket,
     to: UdpSocket,
+    /// From the ground to the vehicle.
+    up: bool,
     state: Arc<Mutex<State>>,
     over: Arc<AtomicBool>,
     dice: Dice,
@@ -210,8 +224,9 @@ impl Way {
     }
 
     fn launch(&mut self, datagram: &[u8], weather: Weather, flying: &mut Vec<(Instant, Vec<u8>)>) {
+        let silent = weather.silent || (weather.uplink_silent && self.up);
         let mut happens = |of_thousand| self.dice.next() % 1_000 < of_thousand;
-        if happens(weather.lost) || weather.silent || (weather.eats_answers && holds_answer(datagram)) {
+        if happens(weather.lost) || silent || (weather.eats_answers && holds_answer(datagram)) {
             return;
         }
         let copies = if happens(weather.doubled) { 2 } else { 1 };

@@ -1,17 +1,22 @@
 //! A ground station of sockets and frames alone, to ask the vehicle what the real one would never ask.
 
 use std::net::{SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
 
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
-    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage, TD_FLIGHT_STATUS_DATA, TdPhase,
+    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavType, TD_FLIGHT_STATUS_DATA,
+    TdPhase,
 };
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::text::printable;
 
-use crate::PATIENCE;
 use crate::process::{left, now};
+use crate::{Air, PATIENCE};
+
+/// How often it says that it is there while it waits: as a ground station does while a vehicle is armed.
+const BEATS_EVERY: Duration = Duration::from_millis(100);
 
 /// A bound UDP port that a vehicle speaks to.
 pub struct BareGround {
@@ -19,6 +24,7 @@ pub struct BareGround {
     vehicle: Option<SocketAddr>,
     framer: Framer,
     encoder: Encoder,
+    beats_at: Instant,
     /// Everything the vehicle has said in words.
     pub texts: Vec<String>,
 }
@@ -41,8 +47,17 @@ impl BareGround {
             vehicle: None,
             framer: Framer::new(),
             encoder: Encoder::new(GROUND),
+            beats_at: now(),
             texts: Vec::new(),
         }
+    }
+
+    /// One that speaks through the air, first.
+    ///
+    /// # Panics
+    /// There is no free port.
+    pub fn through(air: &Air) -> Self {
+        Self { vehicle: Some(air.ground_address()), ..Self::new() }
     }
 
     /// What the vehicle is to be given for `--mavlink`.
@@ -76,12 +91,27 @@ impl BareGround {
             }
             let wait = left(deadline);
             assert!(!wait.is_zero(), "waited in vain for {what}; heard: {:?}", self.texts);
+            self.beat_if_due();
+            // A time limit of nought would be none.
+            let wait = wait.min(left(self.beats_at)).max(Duration::from_millis(1));
             self.socket.set_read_timeout(Some(wait)).expect("a time limit");
             if let Ok((count, from)) = self.socket.recv_from(&mut datagram) {
                 self.vehicle = Some(from);
                 self.framer.push(&datagram[..count]);
             }
         }
+    }
+
+    /// Its heartbeat, once the vehicle has been heard.
+    fn beat_if_due(&mut self) {
+        if !left(self.beats_at).is_zero() {
+            return;
+        }
+        self.beats_at = now() + BEATS_EVERY;
+        let Some(vehicle) = self.vehicle else { return };
+        let frame = heartbeat_frame(&mut self.encoder);
+        // A vehicle that has ended is waited for in vain, which is what is then said.
+        let _ = self.socket.send_to(frame.as_bytes(), vehicle);
     }
 
     /// Waits until the vehicle reports this phase.
@@ -118,6 +148,16 @@ impl BareGround {
         let vehicle = self.vehicle.expect("a vehicle that has been heard");
         self.socket.send_to(frame.as_bytes(), vehicle).expect("sent");
     }
+}
+
+/// The heartbeat of a ground station.
+pub fn heartbeat_frame(encoder: &mut Encoder) -> Frame {
+    encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_GCS,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+        mavlink_version: 3,
+        ..HEARTBEAT_DATA::default()
+    }))
 }
 
 /// COMMAND_LONG to the vehicle.

@@ -13,7 +13,7 @@ mod terminal;
 mod window;
 
 pub use air::{Air, Weather};
-pub use bare_ground::{BareGround, command_frame};
+pub use bare_ground::{BareGround, command_frame, heartbeat_frame};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
 pub use ports::Bound;

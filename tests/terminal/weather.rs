@@ -7,8 +7,14 @@ use e2e::Weather;
 use crate::stage::{ABORT, ARM, START, Stage};
 
 /// A third of everything lost, a fifth doubled, all of it late.
-const BAD: Weather =
-    Weather { lost: 300, doubled: 200, late: Duration::from_millis(200), eats_answers: false, silent: false };
+const BAD: Weather = Weather {
+    lost: 300,
+    doubled: 200,
+    late: Duration::from_millis(200),
+    eats_answers: false,
+    silent: false,
+    uplink_silent: false,
+};
 
 #[test]
 fn through_heavy_loss_the_ladder_arms_and_the_abort_arrives() {

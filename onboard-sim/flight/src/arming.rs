@@ -1,8 +1,23 @@
 //! The checks before arming on the pad.
 
 pub use crate::check::{Check, all_passed, first_refusal};
+use crate::phase::UPLINK_SILENT_S;
 use crate::profile::ArmingLimits;
 use crate::verdict::LandingVerdict;
+
+/// How well the station that asks for arming is heard.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Uplink {
+    /// The vehicle starts by itself: there is no station.
+    NotNeeded,
+    /// No heartbeat of it was ever accepted.
+    NeverHeard,
+    /// Its last heartbeat was accepted so long ago.
+    Heard {
+        /// Age, s.
+        age_s: f64,
+    },
+}
 
 /// What the arming checks look at.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +52,8 @@ pub struct ArmingInput {
     pub controller_found: String,
     /// The rehearsal's end judged against the touchdown limits; `None` without a rehearsal.
     pub predicted_landing: Option<LandingVerdict>,
+    /// How well the station that asks is heard.
+    pub uplink: Uplink,
 }
 
 /// Every arming check with the value found, in the order an operator fixes them.
@@ -72,7 +89,25 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             required: "a converged rehearsal".to_owned(),
         },
         predicted_landing(input.predicted_landing.as_ref()),
+        uplink(input.uplink),
     ]
+}
+
+/// The name of the check of the uplink, the only one that asks about the ground.
+pub const UPLINK_CHECK: &str = "uplink";
+
+fn uplink(uplink: Uplink) -> Check {
+    let (passed, found) = match uplink {
+        Uplink::NotNeeded => (true, "not needed: the vehicle starts by itself".to_owned()),
+        Uplink::NeverHeard => (false, "no heartbeat of this station".to_owned()),
+        Uplink::Heard { age_s } => (age_s <= UPLINK_SILENT_S, format!("heartbeat {age_s:.1} s old")),
+    };
+    Check {
+        name: UPLINK_CHECK,
+        passed,
+        found,
+        required: format!("a heartbeat of the asking station in the last {UPLINK_SILENT_S} s"),
+    }
 }
 
 fn predicted_landing(verdict: Option<&LandingVerdict>) -> Check {
@@ -113,6 +148,7 @@ mod tests {
             controller_warm: true,
             controller_found: "converged".to_owned(),
             predicted_landing: Some(LandingVerdict::judge(&TouchdownLimits::from_profile(&profile), &down)),
+            uplink: Uplink::Heard { age_s: UPLINK_SILENT_S },
         }
     }
 
@@ -121,6 +157,9 @@ mod tests {
         let checks = arming_checks(&ArmingLimits::default(), &ready());
         assert!(all_passed(&checks));
         assert_eq!(first_refusal(&checks), None);
+        // Without a crew nobody has to be heard.
+        let alone = ArmingInput { uplink: Uplink::NotNeeded, ..ready() };
+        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone)));
     }
 
     /// A reading spoilt on purpose, and the check that must refuse it.
@@ -128,7 +167,7 @@ mod tests {
 
     #[test]
     fn each_check_refuses_alone_and_names_itself_and_the_value() {
-        let spoilings: [Spoiling; 14] = [
+        let spoilings: [Spoiling; 17] = [
             ("abort latch: found latched", |input| {
                 input.abort_latched = true;
             }),
@@ -170,6 +209,15 @@ mod tests {
             }),
             ("predicted touchdown: found no prediction", |input| {
                 input.predicted_landing = None;
+            }),
+            ("uplink: found no heartbeat", |input| {
+                input.uplink = Uplink::NeverHeard;
+            }),
+            ("uplink: found heartbeat 2.1 s old", |input| {
+                input.uplink = Uplink::Heard { age_s: 2.1 };
+            }),
+            ("uplink: found heartbeat NaN s old", |input| {
+                input.uplink = Uplink::Heard { age_s: f64::NAN };
             }),
         ];
         for (expected, spoil) in spoilings {

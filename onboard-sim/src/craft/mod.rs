@@ -5,21 +5,23 @@
 
 mod answer;
 mod events;
+mod motor;
 mod self_test;
 mod snapshot;
 mod words;
 
 use std::time::Duration;
 
-use flight::arming::Check;
-use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
+use flight::arming::{Check, Uplink};
+use flight::phase::{Effect, Event, HOLD_LIMIT_S, Mode, Phase, Refusal, transition};
 use flight::profile::StateWeights;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
-pub use answer::{Answer, Request, Result};
+pub use answer::{Answer, Asker, Request, Result};
 pub use campaign::fly::Radio;
 pub use events::{Severity, Tick, VehicleEvent};
+pub use motor::MotorWatch;
 pub(crate) use self_test::{ANSWERING_RAD, SelfTest, TestStep};
 pub use snapshot::{
     AbortEffect, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS, Path,
@@ -62,10 +64,9 @@ pub trait Craft {
         self.mode().interlocks.abort_latched
     }
 
-    /// Whether nothing more will happen in this flight.
-    fn is_over(&self) -> bool {
-        self.phase() == Phase::Safed || (self.phase().on_pad() && self.aborted())
-    }
+    /// Whether nothing more will happen in this flight: it lies on the ground and is judged, or was aborted on the pad.
+    /// SAFED may come much later, or never: that is a matter of its motor.
+    fn is_over(&self) -> bool;
 
     /// Every message that is sent unasked.
     fn standard(&self) -> &'static [Standard];
@@ -97,6 +98,32 @@ pub trait Craft {
         let before = core::mem::replace(self.log_state(), log);
         if before.running && !log.running {
             self.say(Severity::Error, LOG_STOPPED.to_owned());
+        }
+    }
+
+    /// How well the ground is heard. [`Uplink::NotNeeded`] where the vehicle starts by itself.
+    fn uplink(&mut self) -> &mut Uplink;
+
+    /// What the crew was told of the landing motor.
+    fn motor_watch(&mut self) -> &mut MotorWatch;
+
+    /// What time alone brings about, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
+    fn keep_time(&mut self) {
+        let (mode, time_s) = (*self.mode(), self.time_s());
+        if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
+            self.say(Severity::Warning, format!("held for {HOLD_LIMIT_S} s without a new start"));
+            self.happen(Event::HoldElapsed);
+        }
+        if mode.phase == Phase::Touchdown && self.is_over() {
+            if mode.interlocks.armed {
+                self.happen(Event::DisarmRequested);
+            }
+            if mode.may_be_safed(time_s).is_ok() {
+                self.happen(Event::SafingDone);
+            }
+        }
+        if let Some((severity, words)) = self.motor_watch().news(&mode, time_s) {
+            self.say(severity, words);
         }
     }
 
@@ -137,9 +164,14 @@ pub trait Craft {
         Radio::default()
     }
 
-    /// Answers a request and acts on it.
+    /// Answers a request of the vehicle's own programme and acts on it.
     fn request(&mut self, request: Request) -> Answer {
-        answer::answer(self, request)
+        self.request_by(request, Asker::NO_STATION)
+    }
+
+    /// Answers a request and acts on it.
+    fn request_by(&mut self, request: Request, asker: Asker) -> Answer {
+        answer::answer(self, request, asker)
     }
 
     /// Whether a plan to land can be had under thrust; true as long as nobody has tried.

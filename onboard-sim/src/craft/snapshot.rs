@@ -5,7 +5,7 @@
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarState;
 use flight::nmpc::SolveStatus;
-use flight::phase::{Interlocks, Phase};
+use flight::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use flight::rigid::RigidState;
 use flight::site::Site;
 use flight::verdict::{LandingVerdict, TouchdownLimits};
@@ -55,6 +55,12 @@ pub struct Snapshot {
     pub since_ignition_s: Option<f64>,
     /// Time before the pad may be approached, s.
     pub pad_wait_s: Option<f64>,
+    /// What is known of the landing motor.
+    pub motor: MotorStatus,
+    /// Time before anybody may approach the vehicle, s; `None` while that cannot be said.
+    pub approach_wait_s: Option<f64>,
+    /// Why the last countdown was held, and the time left until the vehicle disarms, s.
+    pub held: Option<(HoldCause, f64)>,
     /// Bit k: arming check k fails now. Nought off the pad.
     pub checks_failed: u16,
     /// What an abort would do.

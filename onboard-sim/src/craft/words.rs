@@ -1,7 +1,7 @@
 //! What the crew is told as the phase table does something.
 
-use flight::arming::Check;
-use flight::phase::{Effect, Interlocks};
+use flight::arming::{Check, UPLINK_CHECK};
+use flight::phase::{Effect, HOLD_LIMIT_S, Interlocks};
 
 use super::Severity;
 
@@ -18,6 +18,10 @@ pub(crate) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
             return Some((Severity::Notice, format!("countdown started: release in {countdown_s} s")));
         }
         Effect::CancelCountdown => (Severity::Warning, "countdown cancelled"),
+        Effect::HoldCountdown => {
+            let words = format!("HOLD: no countdown; start anew or it disarms in {HOLD_LIMIT_S} s");
+            return Some((Severity::Critical, words));
+        }
         Effect::ShowPadWait => (Severity::Critical, "ABORT on the pad: keep away for 60 s"),
         Effect::RecordLoss => (Severity::Critical, "vehicle will be lost: landing motor inhibited"),
         Effect::DeployChute => (Severity::Critical, "parachute deployed"),
@@ -48,9 +52,10 @@ pub(crate) fn self_test_failed(fins_answering: usize) -> String {
 pub(crate) struct Readiness(Option<&'static str>);
 
 impl Readiness {
-    /// What stands in the way now, in words, if that has changed.
+    /// What stands in the way now, in words, if that has changed. The uplink comes and goes with every lost heartbeat,
+    /// and each station is told of its own without being asked: it is not spoken of here.
     pub(crate) fn news(&mut self, checks: &[Check]) -> Option<String> {
-        let failing = checks.iter().find(|check| !check.passed);
+        let failing = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK);
         let complaint = failing.map(|check| check.name);
         let changed = complaint != std::mem::replace(&mut self.0, complaint);
         failing.filter(|_| changed).and_then(Check::refusal).map(|reason| format!("not ready: {reason}"))

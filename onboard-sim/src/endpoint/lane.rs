@@ -13,6 +13,7 @@ use protocol::identity::Address;
 use super::budget::{BRIEFLY_S, WINDOW_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::craft::{Craft, Snapshot};
+use crate::stations::MAX_STATIONS;
 use crate::streams::{Due, Streams, kept_free_bytes, share_bytes_s};
 use crate::{parameters, telemetry};
 
@@ -50,6 +51,8 @@ pub(super) struct Lane {
     answered: Window,
     /// Of that, texts.
     said: Window,
+    /// How the vehicle hears its stations, as told last; not yet sent.
+    uplinks: VecDeque<MavMessage>,
     /// Answers to aborts; one for each station at most.
     aborts: VecDeque<CommandAnswer>,
     abort_answered_s: f64,
@@ -78,6 +81,7 @@ impl Lane {
             answers_briefly: Window::of(BRIEFLY_S),
             answered: Window::of(WINDOW_S),
             said: Window::of(WINDOW_S),
+            uplinks: VecDeque::new(),
             aborts: VecDeque::new(),
             abort_answered_s: f64::NEG_INFINITY,
             texts: VecDeque::new(),
@@ -110,6 +114,12 @@ impl Lane {
         if !self.aborts.contains(&answer) && self.aborts.len() < MAX_WAITING {
             self.aborts.push_back(answer);
         }
+    }
+
+    /// How the vehicle hears a station. What could not be sent before is old news.
+    pub(super) fn tell_of_uplink(&mut self, message: MavMessage) {
+        self.uplinks.truncate(MAX_STATIONS - 1);
+        self.uplinks.push_front(message);
     }
 
     pub(super) fn answer(&mut self, answer: Answer) {
@@ -168,6 +178,11 @@ impl Lane {
             self.put(frame, now_s, &mut frames);
             self.abort_answered_s = now_s;
             self.aborts.pop_front();
+        }
+        while let Some(message) = self.uplinks.front().cloned() {
+            let Some(frame) = self.encode(&message.into(), self.room()) else { break };
+            self.put(frame, now_s, &mut frames);
+            self.uplinks.pop_front();
         }
         while let Some(answer) = self.answers.front().cloned() {
             let room = self.room_for_answers().min(self.answered.room());

@@ -18,6 +18,8 @@ struct Bench {
     vehicle: Vehicle,
     endpoint: VehicleEndpoint,
     ground: Encoder,
+    /// The ground speaks, as often as it does to an armed vehicle.
+    beats: bool,
 }
 
 impl Bench {
@@ -26,7 +28,8 @@ impl Bench {
         let mut vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
         vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
         vehicle.pull_pin();
-        let mut bench = Self { vehicle, endpoint: VehicleEndpoint::new(), ground: Encoder::new(GROUND) };
+        let mut bench =
+            Self { vehicle, endpoint: VehicleEndpoint::new(), ground: Encoder::new(GROUND), beats: false };
         bench.run(0.5);
         bench
     }
@@ -36,6 +39,11 @@ impl Bench {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = Vec::new();
         while self.vehicle.time_s() < end_s {
+            // Frames of 20 ms: ten heartbeats a second.
+            if self.beats && ((self.vehicle.time_s() * 50.0).round() as u64).is_multiple_of(5) {
+                self.beat();
+            }
+            self.endpoint.watch_the_uplink(&mut self.vehicle);
             for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
                 self.endpoint.on_event(&event);
             }
@@ -44,7 +52,19 @@ impl Bench {
         sent
     }
 
+    fn beat(&mut self) {
+        let beat = self.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        self.endpoint.on_frame(&beat, &mut self.vehicle);
+    }
+
+    /// Asks as a ground station does that is heard.
     fn ask(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+        self.beats = true;
+        self.beat();
+        self.ask_once(command, param1, param2)
+    }
+
+    fn ask_once(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
         let mut payload = COMMAND_LONG_DATA {
             param1,
             param2,
@@ -323,3 +343,4 @@ mod links;
 mod manners;
 mod questions;
 mod rocket;
+mod uplink;

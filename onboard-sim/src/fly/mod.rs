@@ -25,7 +25,7 @@ pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
 pub use self::pace::Lateness;
-use self::pace::Pace;
+use self::pace::{Pace, Waiting};
 pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
 use crate::craft::{Craft, Judged};
@@ -38,7 +38,8 @@ use crate::vehicle::{DeadlinePolicy, VehicleError, VehicleEvent};
 pub enum Speed {
     /// This many times real time.
     Factor(f64),
-    /// As fast as the machine can; in real time only while the vehicle waits for its crew.
+    /// As fast as the machine can. On its pad with a crew a vehicle is never faster than real time, however fast it is to
+    /// be: its uplink is judged by the age of what it heard.
     Max,
 }
 
@@ -76,8 +77,8 @@ pub struct FlyOptions {
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
     pub auto_start: bool,
-    /// End once the flight is over; otherwise keep serving the links until told to stop. After an abort on the pad links
-    /// are served in any case: the crew has to see the wait run down.
+    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to stop. After an abort on
+    /// the pad links are served in any case: the crew has to see the wait run down.
     pub exit_when_safed: bool,
     /// What a late controller output leads to.
     pub deadline_policy: DeadlinePolicy,
@@ -233,6 +234,10 @@ pub async fn fly_observed(
         .of_system(options.system_id)
         .booted(options.on_the_wire.boot_number.get())
         .over_links(&capacities_bytes_s);
+    if options.auto_start {
+        endpoint = endpoint.starting_by_itself();
+    }
+    let crewed = !options.links.is_empty() && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
@@ -252,6 +257,7 @@ pub async fn fly_observed(
                 Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
+        endpoint.watch_the_uplink(craft);
         pilot.act(craft);
         let stopwatch = pace.clock();
         let events = craft.advance_frame(&mut || stopwatch.elapsed());
@@ -288,10 +294,13 @@ pub async fn fly_observed(
         {
             break false;
         }
-        let waiting = over || (craft.phase().on_pad() && craft.mode().countdown_end_s.is_none());
-        let crewed = !options.links.is_empty() && !options.auto_start;
+        let waiting = match () {
+            () if over => Waiting::Over,
+            () if crewed && craft.phase().on_pad() => Waiting::Crew,
+            () => Waiting::Nobody,
+        };
         tokio::select! {
-            () = pace.wait(waiting && (crewed || over)) => {}
+            () = pace.wait(waiting) => {}
             changed = stop.changed() => {
                 // A stop sender that is gone can ask for nothing any more; the flight ends with its owner.
                 if changed.is_err() || *stop.borrow() { break true; }

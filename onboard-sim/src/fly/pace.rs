@@ -4,6 +4,17 @@ use std::time::{Duration, Instant};
 
 use super::Speed;
 
+/// Who waits meanwhile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Waiting {
+    /// Nobody: as fast as was asked for.
+    Nobody,
+    /// A crew around the pad: never faster than real time, in which its station speaks.
+    Crew,
+    /// The flight is over.
+    Over,
+}
+
 /// Paces the frames.
 pub(super) struct Pace {
     speed: Speed,
@@ -83,15 +94,16 @@ impl Pace {
     }
 
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]
-    pub(super) async fn wait(&mut self, real_time: bool) {
-        let factor = match self.speed {
-            Speed::Max if real_time => 1.0,
-            Speed::Max => {
+    pub(super) async fn wait(&mut self, waiting: Waiting) {
+        let factor = match (self.speed, waiting) {
+            (Speed::Max, Waiting::Nobody) => {
                 tokio::task::yield_now().await;
                 self.due = Instant::now();
                 return;
             }
-            Speed::Factor(factor) => factor,
+            (Speed::Max, Waiting::Crew | Waiting::Over) => 1.0,
+            (Speed::Factor(factor), Waiting::Crew) => factor.min(1.0),
+            (Speed::Factor(factor), Waiting::Nobody | Waiting::Over) => factor,
         };
         self.due += self.frame.div_f64(factor);
         let now = Instant::now();

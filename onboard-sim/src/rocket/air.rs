@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use campaign::sortie::Sortie;
 use flight::controller::ControlLevel;
-use flight::phase::{Effect, Event, Mode, Phase};
+use flight::phase::{Effect, Interlocks, Mode, Motor, Phase};
 use flight::pilot::{FRAMES_PER_PLAN, Sensed};
 use world::RestOutcome;
 
@@ -12,8 +12,8 @@ use super::{Air, FRAME_S, Rocket};
 use crate::craft::{Craft as _, Judged, Severity, VehicleEvent, words_of, words_of_landing_here};
 use crate::plant::Impact;
 
-/// Time on the ground before everything is shut down, s.
-const SAFING_S: f64 = 1.0;
+/// Time on the ground after which nothing more is flown, s.
+const AT_REST_S: f64 = 1.0;
 /// A flight computer that does not notice within this time that it lies on the ground is waited for no longer, s.
 const UNNOTICED_S: f64 = 15.0;
 
@@ -29,6 +29,7 @@ impl Air {
             touched: false,
             took_s: 0.0,
             judged: None,
+            over: false,
             given_up: false,
         }
     }
@@ -44,7 +45,7 @@ impl Rocket {
     pub(super) fn fly_frame(&mut self, stopwatch: &mut dyn FnMut() -> Duration) {
         let time_s = self.time_s();
         let Some(air) = &mut self.air else { return };
-        air.flown = self.mode.phase != Phase::Safed && !air.given_up;
+        air.flown = !air.over && !air.given_up;
         if !air.flown {
             return;
         }
@@ -52,7 +53,14 @@ impl Rocket {
         let flight = air.sortie.flight();
         let pilot = flight.pilot();
         let before = self.mode;
-        self.mode = Mode { entered_at_s: air.released_at_s + pilot.mode().entered_at_s, ..*pilot.mode() };
+        let piloted = pilot.mode().on_clock_ahead_by(air.released_at_s);
+        // The pin is moved by hand, and on the ground a crew may disarm: neither is its pilot's to know.
+        let interlocks = Interlocks {
+            pin_out: before.interlocks.pin_out,
+            armed: before.interlocks.armed && piloted.interlocks.armed,
+            ..piloted.interlocks
+        };
+        self.mode = Mode { interlocks, ..piloted };
         if let Some(input) = flight.input() {
             if let Sensed::Measured(measurements) = &input.sensed {
                 self.watch.take(measurements, self.frame);
@@ -106,7 +114,7 @@ impl Rocket {
         }
     }
 
-    /// Judges a vehicle that lies still, and shuts it down.
+    /// Judges a vehicle that lies still, and ends the flight. SAFED comes when its motor is safe.
     fn watch_the_ground(&mut self, time_s: f64) {
         let Some(air) = &mut self.air else { return };
         if air.goes_on {
@@ -132,8 +140,9 @@ impl Rocket {
             self.say(Severity::Notice, words);
         }
         if self.mode.phase == Phase::Touchdown {
-            if time_s - self.mode.entered_at_s >= SAFING_S {
-                self.happen(Event::SafingDone);
+            let burning = self.mode.motor == Motor::Burning && waited_s <= UNNOTICED_S;
+            if let Some(air) = &mut self.air {
+                air.over = !burning && time_s - self.mode.entered_at_s >= AT_REST_S;
             }
         } else if waited_s > UNNOTICED_S {
             self.give_up();

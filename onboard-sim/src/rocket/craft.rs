@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use campaign::sortie::Sortie;
-use flight::arming::{ArmingInput, Check, arming_checks};
+use flight::arming::{ArmingInput, Check, Uplink, arming_checks};
 use flight::controller::ControlLevel;
 use flight::phase::{Event, Mode, Phase, Refusal, StartPoint, transition};
 use flight::profile::StateWeights;
@@ -12,7 +12,8 @@ use protocol::log::v1;
 
 use super::{Air, FRAME_S, Rocket};
 use crate::craft::{
-    Craft, Judged, LogState, Radio, Severity, Snapshot, TestStep, VehicleEvent, self_test_failed, words_of,
+    Craft, Judged, LogState, MotorWatch, Radio, Severity, Snapshot, TestStep, VehicleEvent, self_test_failed,
+    words_of,
 };
 use crate::streams::{FROM_APOGEE, Standard};
 use crate::{from_apogee, pilot_log};
@@ -32,8 +33,8 @@ impl Craft for Rocket {
     }
 
     fn is_over(&self) -> bool {
-        let given_up = self.air.as_ref().is_some_and(|air| air.given_up);
-        given_up || self.mode.phase == Phase::Safed || (self.mode.phase.on_pad() && self.aborted())
+        let landed = self.air.as_ref().is_some_and(|air| air.over || air.given_up);
+        landed || (self.mode.phase.on_pad() && self.aborted())
     }
 
     fn standard(&self) -> &'static [Standard] {
@@ -65,6 +66,7 @@ impl Craft for Rocket {
             controller_found: rehearsed
                 .map_or_else(|| "no rehearsal yet".to_owned(), |rehearsed| rehearsed.found.clone()),
             predicted_landing: rehearsed.and_then(|rehearsed| rehearsed.landing),
+            uplink: self.uplink,
         };
         arming_checks(&self.flight.order.mission.arming, &input)
     }
@@ -80,6 +82,14 @@ impl Craft for Rocket {
 
     fn log_state(&mut self) -> &mut LogState {
         &mut self.log
+    }
+
+    fn uplink(&mut self) -> &mut Uplink {
+        &mut self.uplink
+    }
+
+    fn motor_watch(&mut self) -> &mut MotorWatch {
+        &mut self.motor_watch
     }
 
     /// In the air the flight computer moves through the table itself: of what is put to it from outside, it takes the
@@ -135,6 +145,7 @@ impl Craft for Rocket {
         } else {
             self.wait_on_the_pad();
         }
+        self.keep_time();
         core::mem::take(&mut self.events)
     }
 

@@ -22,6 +22,7 @@ use campaign::fly::FlyError;
 use campaign::order::Order;
 use campaign::sortie::Sortie;
 use flight::airframe::MassModel;
+use flight::arming::Uplink;
 use flight::controller::ControlLevel;
 use flight::phase::Mode;
 use flight::thrust_curve::ThrustCurve;
@@ -31,7 +32,7 @@ use self::limits::Limits;
 use self::pad::Pad;
 use self::rehearsal::Rehearsal;
 use self::sensed::SensorWatch;
-use crate::craft::{Judged, LogState, Readiness, VehicleEvent};
+use crate::craft::{Judged, LogState, MotorWatch, Readiness, VehicleEvent};
 
 /// Which flight is flown.
 #[derive(Debug, Clone)]
@@ -51,6 +52,8 @@ pub struct Rocket {
     frame: u64,
     mode: Mode,
     log: LogState,
+    uplink: Uplink,
+    motor_watch: MotorWatch,
     pad: Pad,
     rehearsal: Rehearsal,
     readiness: Readiness,
@@ -74,6 +77,8 @@ struct Air {
     took_s: f64,
     /// By what the legs take, and by Table 2.
     judged: Option<(Judged, Judged)>,
+    /// It lies on the ground and is judged: nothing more is flown.
+    over: bool,
     given_up: bool,
 }
 
@@ -96,6 +101,8 @@ impl Rocket {
             frame: 0,
             mode: Mode::power_up(0.0),
             log: LogState { running: false, space_bytes: 0 },
+            uplink: Uplink::NotNeeded,
+            motor_watch: MotorWatch::default(),
             readiness: Readiness::default(),
             watch: SensorWatch::default(),
             air: None,

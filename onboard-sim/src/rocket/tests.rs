@@ -1,12 +1,13 @@
 //! The rocket as its crew meets it: pad, arming, flight from apogee; and an abort in every phase it passes.
 
 mod aborts;
+mod motor;
 
 use std::time::Duration;
 
 use campaign::dispersion::Dispersion;
 use campaign::sortie;
-use flight::phase::{Effect, Event, Interlocks, Phase, transition};
+use flight::phase::{Effect, Event, Interlocks, MotorStatus, Phase, transition};
 use flight::pilot::FRAMES_PER_PLAN;
 use protocol::log::record::Record;
 
@@ -102,7 +103,6 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
             Phase::Ignition,
             Phase::Powered,
             Phase::Touchdown,
-            Phase::Safed,
         ];
         assert_eq!(phases(&events), expected);
         assert!(said(&events, "no ascent is flown") && said(&events, "limits of the legs kept"));

@@ -1,10 +1,11 @@
 //! The messages of our own dialect that every craft sends.
 
-use flight::phase::{Interlocks, Phase};
+use flight::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdLimit, TdPhase, TdSolverStatus, TdVehicleFlag,
+    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLimit, TdMotor, TdPhase, TdSolverStatus,
+    TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres};
@@ -20,6 +21,14 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
         interlocks: interlocks(locks),
         checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
         pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| s.ceil() as u16),
+        approach_wait_s: snapshot.approach_wait_s.map_or(u16::MAX, |s| s.ceil() as u16),
+        motor: td_motor(snapshot.motor),
+        hold: match snapshot.held {
+            None => TdHold::TD_HOLD_NONE,
+            Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
+            Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
+        },
+        hold_left_s: snapshot.held.map_or(0, |(_, left_s)| left_s.ceil() as u8),
         phase: td_phase(snapshot.phase),
         abort_effect,
         abort_impact_m_s,
@@ -51,6 +60,16 @@ fn interlocks(locks: Interlocks) -> TdInterlock {
     bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
     bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
     bits
+}
+
+fn td_motor(status: MotorStatus) -> TdMotor {
+    match status {
+        MotorStatus::PinIn => TdMotor::TD_MOTOR_PIN_IN,
+        MotorStatus::Live => TdMotor::TD_MOTOR_LIVE,
+        MotorStatus::Burning => TdMotor::TD_MOTOR_BURNING,
+        MotorStatus::Hot => TdMotor::TD_MOTOR_HOT,
+        MotorStatus::Burnt => TdMotor::TD_MOTOR_BURNT,
+    }
 }
 
 fn td_phase(phase: Phase) -> TdPhase {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flight::arming::{self, ArmingInput, Check, arming_checks};
+use flight::arming::{self, ArmingInput, Check, Uplink, arming_checks};
 use flight::controller::ControlLevel;
 use flight::dynamics::PlanarParams;
 use flight::phase::{Effect, Event, Mode, Phase, Refusal, transition};
@@ -12,8 +12,10 @@ use flight::vertical::fall_ends_m_s;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
-use super::{Severity, Vehicle};
-use crate::craft::{Craft, Judged, LogState, Snapshot, VehicleEvent, words_of, words_of_landing_here};
+use super::{AT_REST_S, Severity, Vehicle};
+use crate::craft::{
+    Craft, Judged, LogState, MotorWatch, Snapshot, VehicleEvent, words_of, words_of_landing_here,
+};
 use crate::streams::{STANDARD, Standard};
 
 impl Craft for Vehicle {
@@ -28,6 +30,15 @@ impl Craft for Vehicle {
 
     fn mode(&self) -> &Mode {
         &self.mode
+    }
+
+    fn is_over(&self) -> bool {
+        let in_phase_s = self.time_s() - self.mode.entered_at_s;
+        match self.mode.phase {
+            Phase::Touchdown => in_phase_s >= AT_REST_S,
+            Phase::Safed => true,
+            phase => phase.on_pad() && self.aborted(),
+        }
     }
 
     fn standard(&self) -> &'static [Standard] {
@@ -60,6 +71,7 @@ impl Craft for Vehicle {
             predicted_landing: rehearsed
                 .filter(|output| output.plan.len > 0)
                 .map(|output| LandingVerdict::judge_plan(&self.limits, &output.predicted_touchdown.state)),
+            uplink: self.uplink,
         };
         arming_checks(&self.profile.arming, &input)
     }
@@ -70,6 +82,14 @@ impl Craft for Vehicle {
 
     fn log_state(&mut self) -> &mut LogState {
         &mut self.log
+    }
+
+    fn uplink(&mut self) -> &mut Uplink {
+        &mut self.uplink
+    }
+
+    fn motor_watch(&mut self) -> &mut MotorWatch {
+        &mut self.motor_watch
     }
 
     fn happen(&mut self, event: Event) -> Option<Refusal> {
@@ -124,7 +144,7 @@ impl Craft for Vehicle {
 
     fn log(&self, changed: bool) -> Vec<Record> {
         // The waiting vehicle does not move: once a second and at every change of phase is enough to see that.
-        let moving = !self.mode.phase.on_pad() && self.mode.phase != Phase::Safed;
+        let moving = !self.mode.phase.on_pad() && !self.is_over();
         if moving || changed || (self.time_s().fract() < 0.015) {
             vec![Record::PlantTruth(Box::new(self.truth()))]
         } else {

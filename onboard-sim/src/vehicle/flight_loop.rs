@@ -5,13 +5,11 @@ use std::time::Duration;
 use flight::arming::Check;
 use flight::controller::{self, ControlLevel, ControllerInput};
 use flight::dynamics::PlanarParams;
-use flight::phase::{Event, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
+use flight::phase::{Event, Motor, NO_THRUST_TIMEOUT_S, Phase, StartPoint};
 use flight::thrust_estimate::ThrustSample;
 use flight::verdict::LandingVerdict;
 
-use super::{
-    DeadlinePolicy, REHEARSAL_PERIOD_S, SAFING_S, Severity, THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent,
-};
+use super::{DeadlinePolicy, REHEARSAL_PERIOD_S, Severity, THRUST_CONFIRM_S, Tick, Vehicle, VehicleEvent};
 use crate::craft::{Craft as _, Judged, TestStep, self_test_failed};
 use crate::plant::Impact;
 
@@ -27,6 +25,7 @@ impl Vehicle {
         }
         self.frame += 1;
         self.look_around();
+        self.keep_time();
     }
 
     /// The part that falls on a controller sample: actuators first, then phases, then the controller.
@@ -60,7 +59,7 @@ impl Vehicle {
     fn controller_is_due(&self, sample: u64) -> bool {
         let between = (REHEARSAL_PERIOD_S / self.profile.nmpc.sample_time_s).round().max(1.0) as u64;
         match self.mode.phase {
-            Phase::Safed => false,
+            _ if self.is_over() => false,
             phase if phase.on_pad() => {
                 let rehearsed =
                     self.output.as_ref().is_some_and(|output| output.level == ControlLevel::Rehearsal);
@@ -177,13 +176,10 @@ impl Vehicle {
             {
                 self.happen(Event::NoThrustTimeout);
             }
-            Phase::Powered if !self.burned_out && self.plant.thrust_n() <= 0.0 => {
-                self.burned_out = true;
+            Phase::Powered | Phase::Touchdown
+                if self.mode.motor == Motor::Burning && self.plant.thrust_n() <= 0.0 =>
+            {
                 self.happen(Event::Burnout);
-                self.say(Severity::Info, "burn-out".to_owned());
-            }
-            Phase::Touchdown if in_phase_s >= SAFING_S => {
-                self.happen(Event::SafingDone);
             }
             _ => {}
         }

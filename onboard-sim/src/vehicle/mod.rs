@@ -10,7 +10,7 @@ mod snapshot;
 #[cfg(test)]
 mod tests;
 
-use flight::arming::Check;
+use flight::arming::{Check, Uplink};
 use flight::controller::{ControllerConfig, ControllerOutput, ControllerState};
 use flight::gate::{GateInput, gate_checks};
 use flight::phase::{Mode, StartPoint};
@@ -20,7 +20,7 @@ use flight::verdict::TouchdownLimits;
 
 pub use crate::craft::{Severity, Tick, VehicleEvent};
 
-use crate::craft::{ANSWERING_RAD, Judged, LogState, Readiness, SelfTest};
+use crate::craft::{ANSWERING_RAD, Judged, LogState, MotorWatch, Readiness, SelfTest};
 use crate::plant::{Impact, Plant, STEP_S};
 use crate::scatter::Draw;
 
@@ -30,8 +30,8 @@ const FRAME_MIN_S: f64 = 0.02;
 const REHEARSAL_PERIOD_S: f64 = 1.0;
 /// Thrust is believed once it has been sensed for this long: one spike is not a burning motor.
 const THRUST_CONFIRM_S: f64 = 0.04;
-/// Time on the ground before everything is shut down.
-const SAFING_S: f64 = 1.0;
+/// Time on the ground after which the flight is over and its controller stands still, s.
+const AT_REST_S: f64 = 1.0;
 
 /// Why a profile cannot be flown here.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -76,6 +76,8 @@ pub struct Vehicle {
     controller: ControllerState,
     policy: DeadlinePolicy,
     log: LogState,
+    uplink: Uplink,
+    motor_watch: MotorWatch,
     frame: u64,
     frames_per_sample: u64,
     substeps_per_frame: u64,
@@ -98,7 +100,6 @@ pub struct Vehicle {
     in_time: Option<ControllerOutput>,
     misses: usize,
     impacts: Vec<Impact>,
-    burned_out: bool,
     verdict: Option<Judged>,
     events: Vec<VehicleEvent>,
 }
@@ -133,6 +134,8 @@ impl Vehicle {
             controller: ControllerState::new(&config),
             policy,
             log: LogState { running: false, space_bytes: 0 },
+            uplink: Uplink::NotNeeded,
+            motor_watch: MotorWatch::default(),
             frame: 0,
             frames_per_sample: substeps / substeps_per_frame,
             substeps_per_frame,
@@ -151,7 +154,6 @@ impl Vehicle {
             in_time: None,
             misses: 0,
             impacts: Vec::new(),
-            burned_out: false,
             verdict: None,
             events: Vec::new(),
             profile: profile.clone(),

@@ -22,6 +22,9 @@ impl Vehicle {
                 until_s - sample as f64 * self.profile.nmpc.sample_time_s
             }),
             pad_wait_s: self.mode.pad_wait_remaining_s(time_s),
+            motor: self.mode.motor_status(time_s),
+            approach_wait_s: self.mode.approach_wait_s(time_s),
+            held: self.mode.held(time_s),
             checks_failed: if on_pad {
                 bits(self.arming_checks().iter().map(|check| !check.passed))
             } else {

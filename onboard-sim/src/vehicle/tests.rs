@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flight::phase::Phase;
+use flight::phase::{Event, MotorStatus, Phase};
 use flight::profile::Profile;
 
 use flight::controller::ControlLevel;
@@ -29,7 +29,8 @@ fn vehicle() -> Vehicle {
 
 fn run_until(vehicle: &mut Vehicle, mut done: impl FnMut(&Vehicle) -> bool) -> Vec<VehicleEvent> {
     let mut events = Vec::new();
-    for _ in 0..2_000 {
+    // Longer than a burnt motor stays hot.
+    for _ in 0..5_000 {
         if done(vehicle) {
             return events;
         }
@@ -66,12 +67,58 @@ fn the_nominal_flight_passes_its_phases_and_lands_inside_table_2() {
     let mut vehicle = in_phase(Phase::PadArmed);
     vehicle.request(Request::Start);
     let events = run_until(&mut vehicle, Vehicle::is_over);
-    let expected =
-        [Phase::PadArmed, Phase::LandArmed, Phase::Ignition, Phase::Powered, Phase::Touchdown, Phase::Safed];
+    let expected = [Phase::PadArmed, Phase::LandArmed, Phase::Ignition, Phase::Powered, Phase::Touchdown];
     assert_eq!(phases(&events), expected);
     let judged = vehicle.judged().unwrap();
     assert!(judged.landed && judged.verdict.landed(), "{:?}: {}", judged.impact, judged.verdict.summary());
     assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict { .. })));
+}
+
+#[test]
+fn a_landed_vehicle_is_over_at_once_and_safed_when_its_motor_has_cooled() {
+    let mut vehicle = in_phase(Phase::PadArmed);
+    vehicle.request(Request::Start);
+    let flown = run_until(&mut vehicle, Vehicle::is_over);
+    assert!(said(&flown, "burn-out: motor hot for 60 s"), "{flown:?}");
+    let over_at_s = vehicle.time_s();
+    assert_eq!((vehicle.phase(), vehicle.snapshot().motor), (Phase::Touchdown, MotorStatus::Hot));
+    let wait_s = vehicle.snapshot().approach_wait_s.unwrap();
+    let afterwards = run_until(&mut vehicle, |v| v.phase() == Phase::Safed);
+    assert!((vehicle.time_s() - over_at_s - wait_s).abs() < 0.05, "{} s, said {wait_s}", vehicle.time_s());
+    assert!(wait_s > 50.0 && vehicle.is_over());
+    assert!(
+        !afterwards.iter().any(|event| matches!(event, VehicleEvent::Tick(_))),
+        "the controller stands still"
+    );
+    let after = vehicle.snapshot();
+    assert_eq!((after.motor, after.approach_wait_s), (MotorStatus::Burnt, Some(0.0)));
+    assert!(!after.interlocks.armed);
+}
+
+#[test]
+fn a_motor_that_was_never_lit_is_live_until_its_pin_is_put_back() {
+    let mut profile = Profile::builtin("paper-calibrated").unwrap();
+    profile.gate.tilt_max_deg = 1.0;
+    profile.dispersion.pitch_deg = 20.0;
+    let mut vehicle = vehicle_of(&profile);
+    run_until(&mut vehicle, |v| v.phase() == Phase::PadIdle);
+    vehicle.request(Request::Arm);
+    vehicle.request(Request::Start);
+    let flown = run_until(&mut vehicle, Vehicle::is_over);
+    assert!(said(&flown, "LIVE MOTOR: do not approach for 60 s"), "{flown:?}");
+    let mut later = Vec::new();
+    for _ in 0..10_000 {
+        later.extend(vehicle.advance_frame(&mut still()));
+    }
+    assert!(said(&later, "LIVE MOTOR: the wait is over"), "{later:?}");
+    assert_eq!((vehicle.phase(), vehicle.snapshot().motor), (Phase::Touchdown, MotorStatus::Live));
+    assert_eq!(vehicle.happen(Event::PinInserted), None);
+    let safed = run_until(&mut vehicle, |v| v.phase() == Phase::Safed);
+    assert!(said(&safed, "pin in"), "{safed:?}");
+}
+
+fn said(events: &[VehicleEvent], words: &str) -> bool {
+    events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What can happen to a vehicle, what follows from it, and why it may be refused.
 
-use super::{Phase, StartPoint};
+use super::{HoldCause, Phase, StartPoint};
 
 /// Something that happened or was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +23,13 @@ pub enum Event {
         /// Length of the countdown, s.
         countdown_s: f64,
     },
+    /// Hold the countdown: the station that armed the vehicle has fallen silent, or a station asks for it.
+    Hold {
+        /// Why.
+        cause: HoldCause,
+    },
+    /// A hold has lasted [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).
+    HoldElapsed,
     /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the air sends
     /// [`Event::ReleasedAt`] instead.
     CountdownElapsed,
@@ -30,7 +37,7 @@ pub enum Event {
     ReleasedAt(StartPoint),
     /// Left the pad.
     LiftOff,
-    /// The burning motor ended.
+    /// The burning motor ended; the landing motor may do so on the ground.
     Burnout,
     /// Vertical speed changed sign.
     Apogee,
@@ -59,7 +66,7 @@ pub enum Event {
         /// Thrust is below the weight, so the vehicle will stay down.
         thrust_below_weight: bool,
     },
-    /// On the ground, every actuator and igniter line is shut down.
+    /// On the ground, every actuator and igniter line is shut down. Accepted only once the motor is safe as well.
     SafingDone,
 }
 
@@ -73,6 +80,8 @@ impl Event {
             Self::ArmRequested { .. } => "arm",
             Self::DisarmRequested => "disarm",
             Self::StartRequested { .. } => "start",
+            Self::Hold { .. } => "hold",
+            Self::HoldElapsed => "hold elapsed",
             Self::CountdownElapsed => "countdown elapsed",
             Self::ReleasedAt(_) => "release",
             Self::LiftOff => "lift-off",
@@ -114,11 +123,13 @@ pub enum Effect {
     ShowPadWait = 8,
     /// The vehicle is being lost: record it as such.
     RecordLoss = 9,
+    /// The countdown was held: it is gone, the vehicle is still armed.
+    HoldCountdown = 10,
 }
 
 impl Effect {
     /// Every effect, in index order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::IgniteAscentMotor,
         Self::IgniteLandingMotor,
         Self::InhibitLandingMotor,
@@ -129,6 +140,7 @@ impl Effect {
         Self::CancelCountdown,
         Self::ShowPadWait,
         Self::RecordLoss,
+        Self::HoldCountdown,
     ];
 }
 
@@ -185,6 +197,12 @@ pub enum Refusal {
     LandingMotorInhibited,
     /// A countdown runs already.
     CountdownRunning,
+    /// There is no countdown to hold.
+    NoCountdown,
+    /// The countdown is held already.
+    AlreadyHeld,
+    /// No hold has lasted its time.
+    HoldNotOver,
     /// The countdown has not ended, or was never started.
     CountdownNotElapsed,
     /// The countdown's length is not a number of seconds.
@@ -193,6 +211,14 @@ pub enum Refusal {
     AlreadyAborted,
     /// Contact with thrust above the weight: the vehicle will not stay down yet.
     ThrustAboveWeight,
+    /// The landing motor was not lit, and its pin is out.
+    MotorLive,
+    /// The landing motor burns.
+    MotorBurning,
+    /// The landing motor has burnt out and is hot.
+    MotorHot,
+    /// The landing motor was not lit, and may still light late.
+    MisfireWait,
 }
 
 impl Refusal {
@@ -208,10 +234,17 @@ impl Refusal {
             Self::NotArmed => "not armed".to_owned(),
             Self::LandingMotorInhibited => "the landing motor is inhibited".to_owned(),
             Self::CountdownRunning => "a countdown is running: disarm to cancel it".to_owned(),
+            Self::NoCountdown => "no countdown is running".to_owned(),
+            Self::AlreadyHeld => "already held".to_owned(),
+            Self::HoldNotOver => "no hold has lasted its time".to_owned(),
             Self::CountdownNotElapsed => "the countdown has not ended".to_owned(),
             Self::BadCountdown => "the countdown must be a number of seconds, 0 or more".to_owned(),
             Self::AlreadyAborted => "already aborted".to_owned(),
             Self::ThrustAboveWeight => "contact with thrust above weight: not down yet".to_owned(),
+            Self::MotorLive => "the landing motor is live: put the pin in".to_owned(),
+            Self::MotorBurning => "the landing motor burns".to_owned(),
+            Self::MotorHot => "the landing motor is hot".to_owned(),
+            Self::MisfireWait => "the landing motor may still light late".to_owned(),
         }
     }
 }

@@ -6,10 +6,14 @@
 
 mod digest;
 mod event;
+mod hold;
+mod motor;
 mod transition;
 
 pub use crate::profile::StartPoint;
 pub use event::{Effect, Effects, Event, Refusal};
+pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, UPLINK_SILENT_S};
+pub use motor::{MISFIRE_WAIT_S, MOTOR_HOT_S, Motor, MotorStatus};
 pub use transition::{Transition, transition};
 
 /// How long nobody approaches the pad after an abort there, s.
@@ -44,7 +48,7 @@ pub enum Phase {
     Powered = 9,
     /// On the ground, thrust below weight.
     Touchdown = 10,
-    /// On the ground, everything inhibited.
+    /// On the ground, everything inhibited, and the motor safe to walk up to: burnt out and cooled, or its pin in.
     Safed = 11,
     /// Under the parachute.
     Chute = 12,
@@ -135,7 +139,7 @@ pub struct Interlocks {
     pub lands_here: bool,
 }
 
-/// Phase and latches: all the state the table has.
+/// Phase, latches, countdown and motor: all the state the table has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {
     /// Where in its flight the vehicle is.
@@ -146,6 +150,10 @@ pub struct Mode {
     pub entered_at_s: f64,
     /// When the running countdown ends, vehicle time, s; `None` if none runs.
     pub countdown_end_s: Option<f64>,
+    /// The last countdown was held and none was started since.
+    pub hold: Option<Hold>,
+    /// Where the landing motor is in its life.
+    pub motor: Motor,
 }
 
 impl Mode {
@@ -156,6 +164,23 @@ impl Mode {
             interlocks: Interlocks::default(),
             entered_at_s: time_s,
             countdown_end_s: None,
+            hold: None,
+            motor: Motor::Unlit,
+        }
+    }
+
+    /// The same on a clock that shows so much more, s.
+    #[must_use]
+    pub fn on_clock_ahead_by(&self, ahead_s: f64) -> Self {
+        Self {
+            entered_at_s: self.entered_at_s + ahead_s,
+            countdown_end_s: self.countdown_end_s.map(|end_s| end_s + ahead_s),
+            hold: self.hold.map(|hold| Hold { at_s: hold.at_s + ahead_s, ..hold }),
+            motor: match self.motor {
+                Motor::BurntOut { at_s } => Motor::BurntOut { at_s: at_s + ahead_s },
+                motor => motor,
+            },
+            ..*self
         }
     }
 

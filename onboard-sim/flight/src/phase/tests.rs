@@ -23,6 +23,9 @@ fn every_event() -> Vec<Event> {
         Event::ThrustConfirmed,
         Event::NoThrustTimeout,
         Event::SafingDone,
+        Event::Hold { cause: HoldCause::UplinkSilent },
+        Event::Hold { cause: HoldCause::Commanded },
+        Event::HoldElapsed,
     ];
     for flag in flags {
         events.push(Event::ArmRequested { checks_passed: flag });
@@ -41,8 +44,14 @@ fn in_order(phase: Phase) -> Mode {
     Mode {
         phase,
         interlocks: Interlocks { pin_out: true, armed, ..Interlocks::default() },
-        entered_at_s: 0.0,
-        countdown_end_s: None,
+        motor: match phase {
+            Phase::Ignition => Motor::Commanded,
+            Phase::Powered => Motor::Burning,
+            // Cooled at `LATER_S`.
+            Phase::Touchdown | Phase::Safed => Motor::BurntOut { at_s: LATER_S - MOTOR_HOT_S },
+            _ => Motor::Unlit,
+        },
+        ..Mode::power_up(0.0)
     }
 }
 
@@ -62,9 +71,8 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
     use Phase as P;
     let next: (Phase, &'static [Effect]) = match (phase, event) {
         (P::Safe, E::SelfTestPassed) => (P::PadIdle, &[]),
-        (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) | (P::Safe | P::PadIdle, E::PinInserted) => {
-            (phase, &[])
-        }
+        (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::PinPulled)
+        | (P::Safe | P::PadIdle | P::Touchdown | P::Safed, E::PinInserted) => (phase, &[]),
         (P::PadArmed, E::PinInserted | E::DisarmRequested) => (P::PadIdle, &[Disarm]),
         (P::PadIdle, E::ArmRequested { checks_passed: true }) => (P::PadArmed, &[]),
         (P::PadArmed, E::StartRequested { .. }) => (P::PadArmed, &[StartCountdown]),
@@ -103,6 +111,7 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
             | P::Chute,
             E::Contact { thrust_below_weight: true },
         ) => (P::Touchdown, &[InhibitLandingMotor]),
+        (P::Touchdown, E::DisarmRequested) => (phase, &[Disarm]),
         (P::Touchdown, E::SafingDone) => (P::Safed, &[Disarm]),
         _ => return None,
     };
@@ -156,8 +165,12 @@ fn a_simulation_released_at_ignition_flies_to_safed() {
         Event::ThrustConfirmed,
         Event::Burnout,
         Event::Contact { thrust_below_weight: true },
-        Event::SafingDone,
     ]));
+    let burnt_out_at_s = 7.0;
+    assert_eq!(mode.motor, Motor::BurntOut { at_s: burnt_out_at_s });
+    let hot = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S - 0.1);
+    assert_eq!(hot.refusal, Some(Refusal::MotorHot));
+    let mode = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S).mode;
     assert_eq!(mode.phase, Phase::Safed);
     assert!(!mode.interlocks.armed && mode.interlocks.landing_motor_inhibited);
 }
@@ -291,6 +304,9 @@ fn a_set_of_effects_lists_what_it_was_made_of() {
     assert_eq!(effects.iter().collect::<Vec<_>>(), [Effect::IgniteAscentMotor, Effect::RecordLoss]);
 }
 
+mod ground;
+mod holds;
+
 fn any_event() -> impl Strategy<Value = Event> {
     prop::sample::select(every_event())
 }
@@ -306,6 +322,9 @@ fn likely_event() -> impl Strategy<Value = Event> {
         Event::IgnitionGate { open: true },
         Event::LiftOff,
         Event::Apogee,
+        Event::Hold { cause: HoldCause::UplinkSilent },
+        Event::ThrustConfirmed,
+        Event::Contact { thrust_below_weight: true },
     ]);
     prop_oneof![prop::sample::select(leading), any_event()]
 }

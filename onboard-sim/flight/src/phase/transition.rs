@@ -1,6 +1,6 @@
 //! The transition table.
 
-use super::{Effect, Effects, Event, Interlocks, Mode, Phase, Refusal, StartPoint};
+use super::{Effect, Effects, Event, Hold, Interlocks, Mode, Motor, Phase, Refusal, StartPoint};
 
 /// What an event leads to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +26,14 @@ enum Row {
 pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
     match row(mode, event, time_s) {
         Row::Go(mut next, phase, effects) => {
+            // Whichever row lights it.
+            if effects.contains(Effect::IgniteLandingMotor) {
+                next.motor = Motor::Commanded;
+            }
+            // A hold is one of an armed vehicle on the pad: whatever ends that, ends it.
+            if phase != Phase::PadArmed {
+                next.hold = None;
+            }
             if phase != mode.phase {
                 next.phase = phase;
                 next.entered_at_s = time_s;
@@ -63,7 +71,16 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }
         (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
-        (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the pad only"),
+        // After the flight a person may put it back, and pull it again: a motor that was not lit is live without it.
+        (P::Touchdown | P::Safed, E::PinInserted) => {
+            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        }
+        (P::Touchdown | P::Safed, E::PinPulled) => {
+            let burnt = matches!(mode.motor, Motor::BurntOut { .. });
+            let to = if burnt { phase } else { P::Touchdown };
+            Row::Go(latch(Interlocks { pin_out: true, ..locks }), to, Effects::NONE)
+        }
+        (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the ground only"),
 
         (P::PadIdle, E::ArmRequested { checks_passed }) => match () {
             () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
@@ -74,18 +91,39 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
         (P::PadArmed, E::DisarmRequested) => disarmed(mode),
-        (_, E::DisarmRequested) => wrong("disarm", "only PAD_ARMED disarms"),
+        // On the ground again nothing is lit any more; that makes no motor safe.
+        (P::Touchdown, E::DisarmRequested) => {
+            Row::Go(latch(Interlocks { armed: false, ..locks }), phase, Effects::of(&[Effect::Disarm]))
+        }
+        (_, E::DisarmRequested) => wrong("disarm", "only PAD_ARMED and TOUCHDOWN disarm"),
 
         (P::PadArmed, E::StartRequested { countdown_s }) => match mode.countdown_end_s {
             Some(_) => Row::Refuse(Refusal::CountdownRunning),
             None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
             None => Row::Go(
-                Mode { countdown_end_s: Some(time_s + countdown_s), ..*mode },
+                Mode { countdown_end_s: Some(time_s + countdown_s), hold: None, ..*mode },
                 phase,
                 Effects::of(&[Effect::StartCountdown]),
             ),
         },
         (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
+
+        // A hold takes the countdown away: nothing but a new start counts down again.
+        (P::PadArmed, E::Hold { cause }) => match (mode.countdown_end_s, mode.hold) {
+            (Some(_), _) => Row::Go(
+                Mode { countdown_end_s: None, hold: Some(Hold { cause, at_s: time_s }), ..*mode },
+                phase,
+                Effects::of(&[Effect::HoldCountdown]),
+            ),
+            (None, Some(_)) => Row::Refuse(Refusal::AlreadyHeld),
+            (None, None) => Row::Refuse(Refusal::NoCountdown),
+        },
+        (_, E::Hold { .. }) => wrong("hold", "only a countdown in PAD_ARMED is held"),
+        (P::PadArmed, E::HoldElapsed) => match mode.held(time_s) {
+            Some((_, left_s)) if left_s <= 0.0 => disarmed(mode),
+            _ => Row::Refuse(Refusal::HoldNotOver),
+        },
+        (_, E::HoldElapsed) => wrong("end a hold", "only PAD_ARMED is held"),
 
         // From here on nobody approaches or disarms it: a motor that lights late is still a motor that lights.
         (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
@@ -114,9 +152,12 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Boost, E::LiftOff) => go(phase),
         (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED and BOOST lift off"),
         (P::Boost, E::Burnout) => go(P::Coast),
-        // The landing motor ended; contact decides what follows.
+        // The landing motor ended; contact decides what follows. It ends once.
+        (P::Powered | P::Touchdown, E::Burnout) if mode.motor == Motor::Burning => {
+            Row::Go(Mode { motor: Motor::BurntOut { at_s: time_s }, ..*mode }, phase, Effects::NONE)
+        }
         (P::Powered, E::Burnout) => go(phase),
-        (_, E::Burnout) => wrong("burn out", "only BOOST and POWERED burn"),
+        (_, E::Burnout) => wrong("burn out", "only BOOST, POWERED and a motor still burning in TOUCHDOWN do"),
         (P::Boost | P::Coast, E::Apogee) if locks.abort_latched => go_with(P::Chute, &[Effect::DeployChute]),
         (P::Boost | P::Coast, E::Apogee) => go_with(P::Deploy, &[Effect::FinsOpen]),
         (_, E::Apogee) => wrong("pass apogee", "only BOOST and COAST rise"),
@@ -136,7 +177,9 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
 
         // Landing burn. A late light after "no light" is thrust all the same.
-        (P::Ignition, E::ThrustConfirmed) => go(P::Powered),
+        (P::Ignition, E::ThrustConfirmed) => {
+            Row::Go(Mode { motor: Motor::Burning, ..*mode }, P::Powered, Effects::NONE)
+        }
         (_, E::ThrustConfirmed) => wrong("confirm thrust", "only IGNITION waits for it"),
         (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => Row::Go(
             latch(Interlocks { no_light_latched: true, landing_motor_inhibited: true, ..locks }),
@@ -160,9 +203,13 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             P::Touchdown,
             Effects::of(&[Effect::InhibitLandingMotor]),
         ),
-        (P::Touchdown, E::SafingDone) => {
-            Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, Effects::of(&[Effect::Disarm]))
-        }
+        (P::Touchdown, E::SafingDone) => match mode.may_be_safed(time_s) {
+            Err(refusal) => Row::Refuse(refusal),
+            Ok(()) => {
+                let effects = if locks.armed { Effects::of(&[Effect::Disarm]) } else { Effects::NONE };
+                Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, effects)
+            }
+        },
         (_, E::SafingDone) => wrong("safe", "only TOUCHDOWN is made safe"),
     }
 }

@@ -14,7 +14,7 @@ use crate::estimator::{Estimate, VehicleNow};
 use crate::fins::{Allocation, FinCommand, Moments, OpeningRange};
 use crate::gate::{GateInput, gate_checks};
 use crate::motor_estimate::MotorSample;
-use crate::phase::{Effect, Event, NO_THRUST_TIMEOUT_S, Phase, transition};
+use crate::phase::{Effect, Event, Motor, NO_THRUST_TIMEOUT_S, Phase, transition};
 
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
@@ -199,6 +199,9 @@ impl Pilot {
             let thrust_n = burning_s.map_or(0.0, |burning_s| self.known.burn().thrust_n(burning_s));
             let thrust_below_weight = thrust_n < mass.mass_kg * self.known.mission.gravity_m_s2;
             self.happen(Event::Contact { thrust_below_weight }, time_s);
+        }
+        if self.mode.motor == Motor::Burning && self.known.burn_is_over(time_s) {
+            self.happen(Event::Burnout, time_s);
         }
     }
 

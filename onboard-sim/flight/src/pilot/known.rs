@@ -57,6 +57,12 @@ impl Known {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
     }
 
+    /// Whether the motor has burnt as long as it does: also one that went out early is not called burnt out before.
+    pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
+        let whole_s = self.motor.burn_time_stretch() * self.curve.burn_time_s();
+        self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
+    }
+
     pub(super) fn mass_now(&self, burning_s: Option<f64>) -> MassProperties {
         self.mass.at(burning_s.map_or(0.0, |burning_s| self.burn().burnt_kg(burning_s)))
     }

@@ -1,0 +1,361 @@
+//! The uplink as a fact of its own: arming waits for it, a countdown is held without it, and every station is told of it.
+
+use campaign::dispersion::Dispersion;
+use flight::arming::{UPLINK_CHECK, all_passed};
+use flight::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
+use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdMotor};
+
+use super::*;
+use crate::fly::{LoadedFlight, load_profile};
+use crate::rocket::Rocket;
+use crate::streams::FROM_APOGEE;
+
+const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+const HOLD: MavCmd = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
+const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+
+const SPARE: Address = Address { system_id: 254, component_id: 190 };
+
+/// Any craft on its pad, and stations that speak to it.
+struct Pad {
+    craft: Box<dyn Craft>,
+    endpoint: VehicleEndpoint,
+    stations: [Encoder; 2],
+    /// The stations that send heartbeats, ten a second.
+    speaking: Vec<usize>,
+    sent: Vec<Frame>,
+    events: Vec<VehicleEvent>,
+    /// Frames until the next heartbeat.
+    beat_in: u32,
+}
+
+/// The crew's own station, the first of a [`Pad`]'s.
+const CREW: usize = 0;
+const OTHER: usize = 1;
+
+impl Pad {
+    fn of(mut craft: Box<dyn Craft>, endpoint: VehicleEndpoint) -> Self {
+        craft.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+        craft.pull_pin();
+        let stations = [Encoder::new(GROUND), Encoder::new(SPARE)];
+        let mut pad = Self {
+            craft,
+            endpoint,
+            stations,
+            speaking: vec![CREW],
+            sent: Vec::new(),
+            events: Vec::new(),
+            beat_in: 0,
+        };
+        while !all_passed(&pad.craft.arming_checks()) {
+            assert!(pad.craft.time_s() < 20.0, "{:?}", pad.craft.arming_checks());
+            pad.run(0.1);
+        }
+        pad
+    }
+
+    fn planar() -> Self {
+        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+        Self::of(Box::new(vehicle), VehicleEndpoint::new())
+    }
+
+    fn in_space() -> Self {
+        let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").unwrap() else {
+            panic!("from apogee")
+        };
+        flight.order.dispersion = Dispersion::builtin("none").unwrap();
+        Self::of(Box::new(Rocket::new(&flight).unwrap()), VehicleEndpoint::sending(&FROM_APOGEE))
+    }
+
+    /// As the run loop does it.
+    fn frame(&mut self) {
+        if self.beat_in == 0 {
+            for station in self.speaking.clone() {
+                let beat = self.stations[station].encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+                self.endpoint.on_frame(&beat, self.craft.as_mut());
+            }
+            self.beat_in = (0.1 / self.craft.frame_s()).round() as u32;
+        }
+        self.beat_in -= 1;
+        self.endpoint.watch_the_uplink(self.craft.as_mut());
+        for event in self.craft.advance_frame(&mut || Duration::ZERO) {
+            self.endpoint.on_event(&event);
+            self.events.push(event);
+        }
+        self.sent.extend(self.endpoint.poll(self.craft.as_ref()));
+    }
+
+    fn run(&mut self, duration_s: f64) {
+        let end_s = self.craft.time_s() + duration_s - 1e-9;
+        while self.craft.time_s() < end_s {
+            self.frame();
+        }
+    }
+
+    fn tell(&mut self, station: usize, command: MavCmd, param1: f32) {
+        let message = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+            param1,
+            command,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        });
+        let frame = self.stations[station].encode(&message);
+        self.sent.clear();
+        self.endpoint.on_frame(&frame, self.craft.as_mut());
+    }
+
+    fn answers(&self) -> Vec<u8> {
+        self.sent.iter().filter_map(CommandAnswer::from_frame).map(|answer| answer.result).collect()
+    }
+
+    /// Sends a command, and returns its result.
+    fn ask(&mut self, station: usize, command: MavCmd, param1: f32) -> u8 {
+        self.tell(station, command, param1);
+        self.frame();
+        let answers = self.answers();
+        assert_eq!(answers.len(), 1, "{answers:?}");
+        answers[0]
+    }
+
+    fn count_down(&mut self) {
+        assert_eq!(self.ask(CREW, ARM, 1.0), ACCEPTED);
+        assert_eq!(self.ask(CREW, START, 0.0), ACCEPTED);
+    }
+
+    fn counting(&self) -> bool {
+        self.craft.mode().countdown_end_s.is_some()
+    }
+
+    fn status(&mut self) -> TD_FLIGHT_STATUS_DATA {
+        self.sent.clear();
+        self.run(0.3);
+        let status = self.sent.iter().rev().find_map(|frame| match frame.decode() {
+            Ok(MavMessage::TD_FLIGHT_STATUS(status)) => Some(status),
+            _ => None,
+        });
+        status.expect("five a second")
+    }
+
+    fn said(&self, words: &str) -> usize {
+        let says =
+            |event: &&VehicleEvent| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words));
+        self.events.iter().filter(says).count()
+    }
+}
+
+const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
+const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
+const NOT_NOW: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+
+fn uplinks(frames: &[Frame]) -> Vec<TD_UPLINK_DATA> {
+    let read = |frame: &Frame| match frame.decode() {
+        Ok(MavMessage::TD_UPLINK(uplink)) => Some(uplink),
+        _ => None,
+    };
+    frames.iter().filter_map(read).collect()
+}
+
+#[test]
+fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
+    for mut pad in [Pad::planar(), Pad::in_space()] {
+        // Somebody is heard, but not who asks.
+        assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
+        assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
+        pad.speaking = vec![OTHER];
+        pad.run(UPLINK_SILENT_S + 0.2);
+        assert_eq!(pad.ask(CREW, ARM, 1.0), NOT_NOW);
+        assert_eq!(pad.said("arm refused: uplink: found heartbeat 2."), 1);
+        assert_eq!(pad.ask(OTHER, ARM, 1.0), ACCEPTED);
+    }
+}
+
+#[test]
+fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not_complained_of() {
+    let mut pad = Pad::planar();
+    assert!(pad.status().checks_failed.is_empty());
+    pad.speaking.clear();
+    pad.run(3.0);
+    let bits: Vec<_> = pad.status().checks_failed.iter_names().map(|(name, _)| name).collect();
+    assert_eq!(bits, ["TD_CHECK_UPLINK"]);
+    assert_eq!(pad.said(UPLINK_CHECK), 0);
+}
+
+#[test]
+fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
+    for mut pad in [Pad::planar(), Pad::in_space()] {
+        let countdown_s = pad.craft.countdown_s();
+        pad.count_down();
+        pad.run(1.0);
+        // Another station that goes on speaking does not stand in for it.
+        pad.speaking = vec![OTHER];
+        pad.run(UPLINK_SILENT_S - 0.2);
+        assert!(pad.counting(), "a gap shorter than the limit holds nothing");
+        pad.run(0.4);
+        assert!(!pad.counting());
+        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        assert_eq!((pad.said("nothing heard of 255/190 for 2 s"), pad.said("HOLD: no countdown")), (1, 1));
+        let status = pad.status();
+        assert_eq!((status.hold, status.countdown_ms), (TdHold::TD_HOLD_UPLINK_SILENT, i32::MAX));
+        assert!((58..=60).contains(&status.hold_left_s), "{}", status.hold_left_s);
+        // It speaks again: that starts nothing.
+        pad.speaking = vec![CREW];
+        pad.run(2.0 * countdown_s);
+        assert_eq!((pad.craft.phase(), pad.counting()), (Phase::PadArmed, false));
+        assert_eq!(pad.ask(CREW, HOLD, 1.0), DENIED, "nor does a command to continue");
+        // A new start counts down whole, and is flown.
+        assert_eq!(pad.ask(CREW, START, 0.0), ACCEPTED);
+        let left_s = pad.craft.mode().countdown_remaining_s(pad.craft.time_s()).unwrap();
+        assert!(left_s > countdown_s - 0.1, "{left_s}");
+        assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
+        pad.run(countdown_s);
+        assert!(!pad.craft.phase().on_pad(), "{:?}", pad.craft.phase());
+    }
+}
+
+#[test]
+fn after_the_release_silence_holds_nothing() {
+    let mut pad = Pad::in_space();
+    pad.count_down();
+    pad.run(pad.craft.countdown_s() - 0.5);
+    pad.speaking.clear();
+    pad.run(5.0);
+    assert!(!pad.craft.phase().on_pad() && pad.said("HOLD") == 0);
+}
+
+#[test]
+fn a_held_vehicle_disarms_after_a_minute() {
+    for mut pad in [Pad::planar(), Pad::in_space()] {
+        pad.count_down();
+        pad.speaking.clear();
+        pad.run(UPLINK_SILENT_S + 0.2);
+        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        pad.run(HOLD_LIMIT_S - 1.0);
+        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        pad.run(1.1);
+        assert_eq!(pad.craft.phase(), Phase::PadIdle);
+        assert!(!pad.craft.aborted() && pad.said("held for 60 s without a new start") == 1);
+        assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
+    }
+}
+
+#[test]
+fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
+    for mut pad in [Pad::planar(), Pad::in_space()] {
+        assert_eq!(pad.ask(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
+        pad.count_down();
+        assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
+        assert_eq!((pad.counting(), pad.said("station 254/190 asks for a hold")), (false, 1));
+        assert_eq!(pad.status().hold, TdHold::TD_HOLD_COMMANDED);
+        let complaints = pad.said("refused");
+        for _ in 0..10 {
+            assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
+        }
+        assert_eq!((pad.said("refused"), pad.said("HOLD: no countdown")), (complaints, 1));
+        assert!(pad.craft.mode().interlocks.armed);
+    }
+}
+
+#[test]
+fn a_vehicle_that_starts_by_itself_needs_no_station() {
+    let mut pad = Pad::planar();
+    pad.endpoint = VehicleEndpoint::new().starting_by_itself();
+    pad.speaking.clear();
+    pad.craft.request(crate::craft::Request::Arm);
+    pad.craft.request(crate::craft::Request::Start);
+    pad.run(pad.craft.countdown_s() + 0.5);
+    assert!(!pad.craft.phase().on_pad(), "{:?}", pad.craft.phase());
+}
+
+#[test]
+fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
+    let profile = Profile::builtin("paper-calibrated").unwrap();
+    let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+    let mut endpoint = VehicleEndpoint::new();
+    let mut stranger = Encoder::new(SPARE);
+    let beat = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    let first = endpoint.poll(&vehicle);
+    let [told] = &uplinks(&first)[..] else { panic!("one message") };
+    assert_eq!((told.target_system, told.target_component, told.accepted_age_ms), (0, 0, u16::MAX));
+    endpoint.on_rejected(&beat, Rejection::Unsigned);
+
+    let mut pad = Pad::of(Box::new(vehicle), endpoint);
+    pad.sent.clear();
+    pad.speaking = vec![CREW, OTHER];
+    pad.run(5.0);
+    let told = uplinks(&pad.sent);
+    for (station, system_id) in [(CREW, 255), (OTHER, 254)] {
+        let his: Vec<_> = told.iter().filter(|uplink| uplink.target_system == system_id).collect();
+        assert!((9..=11).contains(&his.len()), "station {station}: {} in 5 s", his.len());
+        assert!(his.iter().all(|uplink| uplink.accepted_age_ms <= 120), "{his:?}");
+        assert!(his.iter().all(|uplink| uplink.refusal == TdFrameRefusal::TD_FRAME_REFUSAL_UNSIGNED));
+        assert!(his.iter().all(|uplink| uplink.refused_count == 1 && uplink.refused_system == 254));
+    }
+    assert_eq!(pad.ask(CREW, ARM, 1.0), ACCEPTED);
+    pad.sent.clear();
+    pad.run(1.0);
+    let commands =
+        uplinks(&pad.sent).iter().map(|uplink| (uplink.target_system, uplink.commands)).collect::<Vec<_>>();
+    assert!(commands.contains(&(255, 1)) && commands.contains(&(254, 0)), "{commands:?}");
+}
+
+#[test]
+fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
+    let mut pad = Pad::in_space();
+    pad.count_down();
+    pad.run(pad.craft.countdown_s() + 1.0);
+    assert!(pad.craft.phase().in_descent());
+    pad.tell(CREW, ABORT, 1.0);
+    // The flight computer takes it at its next frame: until then nothing is latched and nothing acknowledged.
+    let before = pad.endpoint.poll(pad.craft.as_ref());
+    assert!(!pad.craft.aborted());
+    assert!(before.iter().all(|frame| CommandAnswer::from_frame(frame).is_none()));
+    pad.tell(CREW, ABORT, 1.0);
+    pad.frame();
+    assert!(pad.craft.aborted());
+    assert_eq!(pad.answers(), [ACCEPTED], "once, though it was repeated");
+    assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED, "and at once ever after");
+}
+
+#[test]
+fn the_motor_and_its_wait_are_on_the_wire_until_it_is_safe() {
+    let mut pad = Pad::planar();
+    let status = pad.status();
+    assert_eq!((status.motor, status.approach_wait_s), (TdMotor::TD_MOTOR_LIVE, 0));
+    pad.count_down();
+    assert_eq!(pad.status().approach_wait_s, u16::MAX, "armed");
+    while pad.craft.phase() != Phase::Powered {
+        pad.frame();
+    }
+    let status = pad.status();
+    assert_eq!((status.motor, status.approach_wait_s), (TdMotor::TD_MOTOR_BURNING, u16::MAX));
+    while !pad.craft.is_over() {
+        pad.frame();
+    }
+    let status = pad.status();
+    assert_eq!(
+        (status.phase, status.motor),
+        (protocol::dialect::TdPhase::TD_PHASE_TOUCHDOWN, TdMotor::TD_MOTOR_HOT)
+    );
+    assert!((50..=60).contains(&status.approach_wait_s), "{}", status.approach_wait_s);
+    pad.run(f64::from(status.approach_wait_s));
+    let status = pad.status();
+    assert_eq!(
+        (status.phase, status.motor),
+        (protocol::dialect::TdPhase::TD_PHASE_SAFED, TdMotor::TD_MOTOR_BURNT)
+    );
+    assert_eq!(status.approach_wait_s, 0);
+}
+
+#[test]
+fn two_stations_and_everything_else_stay_within_the_radio_s_budget() {
+    let mut pad = Pad::in_space();
+    pad.speaking = vec![CREW, OTHER];
+    pad.run(1.0);
+    pad.sent.clear();
+    pad.run(10.0);
+    let bytes: usize = pad.sent.iter().map(|frame| frame.as_bytes().len()).sum();
+    assert!(bytes as f64 <= 10.0 * f64::from(RADIO_BUDGET_BYTES_S) + BURST_BYTES, "{bytes} B in 10 s");
+}

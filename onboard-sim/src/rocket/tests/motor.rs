@@ -1,0 +1,58 @@
+//! After the flight: what is said of the motor, and when the rocket is SAFED.
+
+use super::*;
+
+/// Flown to its end.
+fn flown(flight: &RocketFlight) -> (Rocket, Vec<VehicleEvent>) {
+    let mut rocket = in_phase(flight, Phase::Deploy);
+    let events = run_until(&mut rocket, Rocket::is_over);
+    (rocket, events)
+}
+
+fn wait(rocket: &mut Rocket, duration_s: f64) -> Vec<VehicleEvent> {
+    let end_s = rocket.time_s() + duration_s;
+    let mut events = Vec::new();
+    while rocket.time_s() < end_s {
+        events.extend(rocket.advance_frame(&mut still()));
+        assert!(rocket.log(false).is_empty(), "nothing is flown any more");
+    }
+    events
+}
+
+#[test]
+fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
+    let (mut rocket, events) = flown(&flight_of("field", &[]));
+    assert!(said(&events, "burn-out: motor hot for 60 s"), "{events:?}");
+    let landed = rocket.snapshot();
+    assert_eq!((landed.phase, landed.motor), (Phase::Touchdown, MotorStatus::Hot));
+    let wait_s = landed.approach_wait_s.unwrap();
+    assert!((45.0..=60.0).contains(&wait_s), "{wait_s}");
+    let stood_s = rocket.time_s() - rocket.judged().unwrap().impact.time_s;
+    assert!((1.0..5.0).contains(&stood_s), "the flight is over {stood_s} s after the touchdown");
+    wait(&mut rocket, wait_s - 0.1);
+    assert_eq!(rocket.phase(), Phase::Touchdown);
+    let events = wait(&mut rocket, 0.2);
+    assert_eq!(phases(&events), [Phase::Safed]);
+    assert!(said(&events, "burnt out and cooled"), "{events:?}");
+    assert_eq!((rocket.snapshot().motor, rocket.is_over()), (MotorStatus::Burnt, true));
+}
+
+#[test]
+fn a_motor_that_was_not_lit_or_did_not_light_is_live_until_its_pin_is_back() {
+    for faults in [&["abort@descent+1"][..], &["no-light@apogee"]] {
+        let (mut rocket, events) = flown(&flight_of("none", faults));
+        assert!(said(&events, "LIVE MOTOR: do not approach for 60 s"), "{faults:?}: {events:?}");
+        let landed = rocket.snapshot();
+        assert_eq!((landed.phase, landed.motor), (Phase::Touchdown, MotorStatus::Live), "{faults:?}");
+        assert!((50.0..60.0).contains(&landed.approach_wait_s.unwrap()), "{faults:?}");
+        // Too soon: its time has to pass all the same.
+        assert_eq!(rocket.happen(Event::PinInserted), None);
+        wait(&mut rocket, 20.0);
+        assert_eq!((rocket.phase(), rocket.snapshot().motor), (Phase::Touchdown, MotorStatus::PinIn));
+        assert_eq!(rocket.happen(Event::PinPulled), None);
+        assert!(said(&wait(&mut rocket, 200.0), "LIVE MOTOR: the wait is over"));
+        assert_eq!((rocket.phase(), rocket.snapshot().motor), (Phase::Touchdown, MotorStatus::Live));
+        assert_eq!(rocket.happen(Event::PinInserted), None);
+        assert_eq!(phases(&wait(&mut rocket, 0.1)), [Phase::Safed]);
+    }
+}
