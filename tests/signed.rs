@@ -126,11 +126,20 @@ impl Asker {
 
     /// Whether this is answered at once.
     fn is_answered(&self, question: &[u8]) -> bool {
-        // Nobody may be listening yet.
+        // Nobody may be listening yet, which either the next call to send or the next to receive says.
         let _ = self.socket.send(question);
         let mut datagram = [0; 2048];
         let mut framer = Framer::new();
-        while let Ok(count) = self.socket.recv(&mut datagram) {
+        loop {
+            let count = match self.socket.recv(&mut datagram) {
+                Ok(count) => count,
+                Err(error) => {
+                    if error.kind() == std::io::ErrorKind::ConnectionRefused {
+                        std::thread::sleep(Duration::from_millis(100));
+                    }
+                    return false;
+                }
+            };
             framer.push_datagram(&datagram[..count]);
             while let Some(frame) = framer.next_frame() {
                 if let Ok(MavMessage::TIMESYNC(sync)) = frame.decode()
@@ -141,7 +150,6 @@ impl Asker {
                 }
             }
         }
-        false
     }
 
     /// Asks anew until it is answered, and returns the question that was.
