@@ -49,12 +49,7 @@ fn a_planar_landing_with_an_abort_verifies() {
 /// Earlier flights flew upright after an abort, and their logs say nothing of landing here.
 #[test]
 fn a_planar_flight_of_an_earlier_build_with_an_abort_verifies() {
-    let (mut ticks, _) = verified(|input| input.degraded = input.tick >= 20);
-    for tick in &mut ticks {
-        assert_eq!(tick.input.lands_here.take(), Some(false));
-    }
-    let directory = tempfile::tempdir().unwrap();
-    let log = directory.path().join("earlier.mcap");
-    std::fs::write(&log, write_log(&ticks, &Recipe::default()).bytes).unwrap();
-    assert_eq!(verify(&log).unwrap().outcome, Outcome::Identical);
+    let (ticks, outcome) = verified(|input| input.degraded = input.tick >= 20);
+    assert!(ticks.iter().all(|tick| tick.input.lands_here.is_none()), "as an earlier build wrote them");
+    assert_eq!(outcome, Outcome::Identical);
 }
