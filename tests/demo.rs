@@ -42,7 +42,11 @@ fn the_papers_landing_alone_is_asked_for_by_name() {
     let arguments = ["--profile", "paper-calibrated", "--speed", "4"];
     let flight = Running::to_end(program(Program::Ground).args(arguments).current_dir(folder.path()));
     assert_eq!(flight.code, Some(0), "{}", flight.output);
-    assert!(flight.output.contains("POWERED") && !flight.output.contains("AERO_DESCENT"), "{}", flight.output);
+    assert!(
+        flight.output.contains("POWERED") && !flight.output.contains("AERO_DESCENT"),
+        "{}",
+        flight.output
+    );
 }
 
 #[test]

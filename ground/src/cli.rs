@@ -258,10 +258,8 @@ impl Cli {
 
     /// A flag that means nothing to a command which has no vehicle, no log and no end of its own.
     pub fn ignored_flag(&self) -> Option<&'static str> {
-        let ignores = matches!(
-            self.command,
-            Some(Command::Attach { .. } | Command::Status | Command::Stop { .. })
-        );
+        let ignores =
+            matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
         let given = [
             ("--connect", !self.connect.is_empty()),
             ("--key", self.key.is_some()),

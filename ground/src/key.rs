@@ -122,12 +122,7 @@ impl Key {
 fn may_repeat(code: KeyCode) -> bool {
     matches!(
         code,
-        KeyCode::Up
-            | KeyCode::Down
-            | KeyCode::Left
-            | KeyCode::Right
-            | KeyCode::PageUp
-            | KeyCode::PageDown
+        KeyCode::Up | KeyCode::Down | KeyCode::Left | KeyCode::Right | KeyCode::PageUp | KeyCode::PageDown
     )
 }
 

@@ -66,7 +66,9 @@ fn stations_are_listed_and_ended_and_an_armed_one_only_by_force() {
     let held = Held::new();
     let mut screen = held.attach("anna");
     let listed = held.run(&["status"]);
-    for words in [held.link.as_str(), "vehicle 1/1", "PAD_IDLE disarmed", "log held.mcap", "screen 1, anna", ".sock"] {
+    for words in
+        [held.link.as_str(), "vehicle 1/1", "PAD_IDLE disarmed", "log held.mcap", "screen 1, anna", ".sock"]
+    {
         assert!(listed.output.contains(words), "no {words} in:\n{}", listed.output);
     }
     screen.type_by_hand(b"AARM\r");

@@ -68,7 +68,9 @@ fn the_rest_of_a_paste_does_not_reach_the_shell() {
     // A read that waits a second for one more byte, as often as there is one.
     let script = "\"$0\" \"$@\"; stty -icanon min 0 time 10; dd bs=4096 count=1000 of=rest 2>/dev/null";
     shell.args(["-c", script]).arg(station.get_program()).args(station.get_args());
-    shell.current_dir(folder.path()).envs(station.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    shell
+        .current_dir(folder.path())
+        .envs(station.get_envs().filter_map(|(name, value)| Some((name, value?))));
     let mut terminal = Terminal::start(&shell, SIZE, false);
     terminal.wait_for("[1Pad]");
     let text = long_text().replace('\n', "\r");

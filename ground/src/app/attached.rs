@@ -182,7 +182,9 @@ fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
             model.alarms.acknowledge();
             return;
         }
-        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) | Asked::Status | Asked::Stop { .. } => return,
+        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) | Asked::Status | Asked::Stop { .. } => {
+            return;
+        }
     };
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }

@@ -37,7 +37,10 @@ mod tests {
     #[test]
     fn an_operator_is_a_user_and_where_from() {
         assert_eq!(described(Some("anna"), None, Some("/dev/pts/3")), "anna on pts/3");
-        assert_eq!(described(Some("anna"), Some("10.0.0.7 5022 22"), Some("/dev/pts/3")), "anna from 10.0.0.7");
+        assert_eq!(
+            described(Some("anna"), Some("10.0.0.7 5022 22"), Some("/dev/pts/3")),
+            "anna from 10.0.0.7"
+        );
         assert_eq!(described(None, None, Some("pipe:[7]")), "somebody");
         assert_eq!(operator(Some("Anna \u{1b}[2J")).chars().filter(|c| c.is_control()).count(), 0);
     }

@@ -39,7 +39,8 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> Status {
     let armed = vehicle.armed().is_some_and(|armed| armed.value);
     let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
     let own = model.crew.seats().iter().find(|seat| **seat == settings.seat).map(Seat::to_string);
-    let attached = screens.iter().map(|(seat, watch)| format!("{seat}{}", if *watch { " (watches)" } else { "" }));
+    let attached =
+        screens.iter().map(|(seat, watch)| format!("{seat}{}", if *watch { " (watches)" } else { "" }));
     Status {
         pid: std::process::id(),
         link: settings.link_name.clone(),
@@ -117,7 +118,9 @@ pub(super) async fn the_station(named: Option<&Path>) -> anyhow::Result<PathBuf>
     match found.len() {
         0 => anyhow::bail!("no ground station of yours runs; start one with `ground daemon`"),
         1 => Ok(found.remove(0).0),
-        _ => anyhow::bail!("several ground stations of yours run; name one with --socket:\n{}", listed(&found)),
+        _ => {
+            anyhow::bail!("several ground stations of yours run; name one with --socket:\n{}", listed(&found))
+        }
     }
 }
 
@@ -135,7 +138,9 @@ fn listed(found: &[Found]) -> String {
         // Writing into a String cannot fail.
         let _ = match status {
             Ok(status) => {
-                let or = |text: &str, other: &str| if text.is_empty() { other.to_owned() } else { text.to_owned() };
+                let or = |text: &str, other: &str| {
+                    if text.is_empty() { other.to_owned() } else { text.to_owned() }
+                };
                 let Status { pid, link, vehicle, phase, log, screens, .. } = status;
                 let (log, screens) = (or(log, "none"), or(screens, "none"));
                 writeln!(
@@ -159,7 +164,10 @@ pub(super) async fn beside() -> Option<String> {
         [(_, Ok(Status { pid, link, .. }))] => {
             Some(format!("a station runs: pid {pid}, {link}; `ground attach` shows it"))
         }
-        _ => Some(format!("{} stations run: `ground status` lists them, `ground attach` shows one", found.len())),
+        _ => Some(format!(
+            "{} stations run: `ground status` lists them, `ground attach` shows one",
+            found.len()
+        )),
     }
 }
 
@@ -171,7 +179,8 @@ pub(super) async fn explain(error: anyhow::Error, endpoints: &[Endpoint]) -> any
     if !error.chain().any(in_use) {
         return error;
     }
-    let places: Vec<String> = endpoints.iter().map(|endpoint| listening_place(&endpoint.to_string())).collect();
+    let places: Vec<String> =
+        endpoints.iter().map(|endpoint| listening_place(&endpoint.to_string())).collect();
     let found = stations().await.unwrap_or_default();
     let holder = found.iter().find_map(|(_, status)| {
         let status = status.as_ref().ok()?;

@@ -98,8 +98,7 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
         return true;
     }
     // Who has begun an abort means the abort; and twice Ctrl-X, once complete, nothing takes back.
-    let complete =
-        if key == Key::Enter { model.abort_chord.confirm(now) } else { model.abort_chord.end() };
+    let complete = if key == Key::Enter { model.abort_chord.confirm(now) } else { model.abort_chord.end() };
     if complete {
         abort(model, now);
     }

@@ -9,9 +9,9 @@ use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
 use super::theme::{Role, Theme};
-use crate::model::{self, Model};
 use crate::model::dialog::{ARM_WORD, Dialog, QUIT_WORD, START_WORD};
 use crate::model::words;
+use crate::model::{self, Model};
 
 const BOX_COLUMNS: u16 = 68;
 const ANY_OTHER_KEY: &str = "Any other key cancels. Nothing is sent before Enter.";

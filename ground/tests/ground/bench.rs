@@ -5,6 +5,7 @@ mod telemetry;
 use std::time::Duration;
 
 use ground::key::Key;
+use ground::model::hand::Hand;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
 use ground::view::theme::Theme;
@@ -12,8 +13,7 @@ use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
-    TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase,
-    TdVehicleFlag,
+    TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase, TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -22,9 +22,6 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
-
-/// Between two keys of an unhurried hand.
-const FINGER: Duration = Duration::from_millis(130);
 
 pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
 
@@ -78,9 +75,9 @@ impl Bench {
         self.actions.extend(actions);
     }
 
-    /// A key, some time after the one before: a finger's.
+    /// A key by an unhurried finger: as if some time had passed since the one before.
     pub(crate) fn key(&mut self, key: Key) {
-        self.now += FINGER;
+        self.model.hand = Hand::default();
         self.press(key);
     }
 

@@ -47,7 +47,11 @@ fn records(bench: &Bench) -> String {
 fn each_command_names_its_screen_and_operator_in_event_and_record() {
     let mut bench = with_anna();
     bench.keys(&ladder());
-    assert!(bench.events().contains("ARM commanded, attempt 1 (screen 1, anna on pts/3)"), "{}", bench.events());
+    assert!(
+        bench.events().contains("ARM commanded, attempt 1 (screen 1, anna on pts/3)"),
+        "{}",
+        bench.events()
+    );
     bench.answer(ARM, 0);
     bench.armed = true;
     bench.phase = TdPhase::TD_PHASE_PAD_ARMED;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
 use ground::key::Key;
-use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::Role;
+use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::dialog::{ARM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT, START_TIME_LIMIT};
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdPhase};
@@ -539,7 +539,7 @@ fn nothing_takes_back_a_complete_abort_chord() {
 #[test]
 fn the_second_press_acts_at_once_where_the_terminal_tells_repeats() {
     // A busy machine may hand over both at once.
-    for pause_s in [0.0, 0.1, 0.3, 1.8] {
+    for pause_s in [0.0, 0.1, 0.3, 1.9] {
         let mut bench = Bench::crewed();
         bench.model.repeats_told = true;
         bench.key(Key::CtrlX);

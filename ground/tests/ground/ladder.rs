@@ -80,7 +80,12 @@ fn ends_in_quit(history: &[Came]) -> bool {
 #[derive(Debug, Clone)]
 enum Stream {
     ByHand(Vec<Key>),
-    Held { key: Key, delay_ms: u64, period_ms: u64, repeats: usize },
+    Held {
+        key: Key,
+        delay_ms: u64,
+        period_ms: u64,
+        repeats: usize,
+    },
     /// In one read.
     Together(Vec<Key>),
     /// One by one, so far apart.
@@ -309,7 +314,8 @@ proptest! {
         for (keys, pause_ms) in steps {
             bench.run((pause_ms / 100) as f64 / 10.0);
             for key in keys {
-                bench.key(key);
+                bench.now += Duration::from_millis(130);
+                bench.press(key);
                 history.push(Came { key: Some(key), at: bench.now, together: false });
                 let asks = bench.actions.contains(&Action::Request(Asked::Command(CommandKind::Arm)));
                 let complete = ends_in_ladder(&history, &[Key::Char('A')], "ARM", 10);

@@ -195,7 +195,10 @@ fn completions_and_the_manual_come_from_the_command_line_itself() {
 #[test]
 fn the_telemetry_log_holds_the_same_flight() {
     let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--profile", "paper-calibrated", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"]);
+    let output = ground(
+        directory.path(),
+        &["--profile", "paper-calibrated", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     let verdict = |file: &str| {
         let output = ground(directory.path(), &["--replay", file]);
