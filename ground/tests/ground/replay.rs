@@ -34,13 +34,13 @@ static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
         bytes.extend((1_000_000 * second).to_be_bytes());
         bytes.extend(encoder.encode(&MavMessage::HEARTBEAT(heartbeat)).as_bytes());
     }
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("heartbeats.tlog"), bytes).unwrap();
+    let directory = tempfile::tempdir().expect("a directory for the log");
+    std::fs::write(directory.path().join("heartbeats.tlog"), bytes).expect("a log");
     directory
 });
 
 fn film() -> Film {
-    load(&HEARTBEATS.path().join("heartbeats.tlog")).unwrap()
+    load(&HEARTBEATS.path().join("heartbeats.tlog")).expect("a film")
 }
 
 fn load(path: &Path) -> Result<Film, FilmError> {
@@ -49,8 +49,8 @@ fn load(path: &Path) -> Result<Film, FilmError> {
 
 /// Every scene of a film with its time.
 fn scenes(film: &Film) -> Vec<(Duration, Scene)> {
-    let mut reel = film.reel().unwrap();
-    std::iter::from_fn(|| reel.next_scene().unwrap()).collect()
+    let mut reel = film.reel().expect("the film's file");
+    std::iter::from_fn(|| reel.next_scene().expect("the film's file")).collect()
 }
 
 fn player() -> Player {

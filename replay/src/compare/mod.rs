@@ -130,9 +130,9 @@ pub fn compare(
     })
 }
 
-/// Samples that are missing or added beyond what is tolerated: a line for each table, of its worst signal.
+/// Samples that are missing or added beyond what is tolerated: a line for each table, of the signal with most of them.
 fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Vec<String> {
-    let mut worst: BTreeMap<(&str, bool), (f64, String)> = BTreeMap::new();
+    let mut worst: BTreeMap<(&str, bool), (usize, String)> = BTreeMap::new();
     for signal in signals {
         let (table, samples) = (signal.signal.split('.').next().unwrap_or_default(), signal.samples_of_both);
         let (missing, added) = tolerances.samples_of(&signal.signal);
@@ -141,13 +141,13 @@ fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Ve
             ("missing", samples.missing_share(), missing, samples.missing, samples.expected),
             ("added", samples.added_share(), added, samples.added, all),
         ] {
-            let known = worst.get(&(table, word == "added")).map_or(0.0, |(share, _)| *share);
-            if share > limit && share > known {
+            let known = worst.get(&(table, word == "added")).map_or(0, |(count, _)| *count);
+            if share > limit && count > known {
                 let words = format!(
                     "{table}: {count} of {of} samples are {word} (tolerated {} %)",
                     libm::round(1e6 * limit) / 1e4
                 );
-                worst.insert((table, word == "added"), (share, words));
+                worst.insert((table, word == "added"), (count, words));
             }
         }
     }
