@@ -34,14 +34,13 @@ fn landed(flight: Running, station: Running) -> String {
 fn over_tcp_they_land_whoever_connects() {
     let listen = ["tcpin:127.0.0.1:0".to_owned()];
     let connect = |to: &mut Running| [format!("tcpout:127.0.0.1:{}", to.bound_port(Bound::Tcp))];
-    let folder = tempfile::tempdir().unwrap();
-    let mut flight = vehicle(folder.path(), &listen);
-    let station = ground(folder.path(), &connect(&mut flight));
-    landed(flight, station);
-    let folder = tempfile::tempdir().unwrap();
-    let mut station = ground(folder.path(), &listen);
-    let flight = vehicle(folder.path(), &connect(&mut station));
-    landed(flight, station);
+    let [first, second] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut listening_flight = vehicle(first.path(), &listen);
+    let station = ground(first.path(), &connect(&mut listening_flight));
+    let mut listening_station = ground(second.path(), &listen);
+    let flight = vehicle(second.path(), &connect(&mut listening_station));
+    landed(listening_flight, station);
+    landed(flight, listening_station);
 }
 
 #[test]

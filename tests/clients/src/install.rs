@@ -144,7 +144,7 @@ fn node() -> PathBuf {
 }
 
 /// Where everything is installed: `target/clients`.
-fn clients() -> PathBuf {
+pub(crate) fn clients() -> PathBuf {
     let test = std::env::current_exe().expect("the path of this test");
     // target/<profile>/deps/<test>
     test.ancestors().nth(3).expect("the target folder").join("clients")

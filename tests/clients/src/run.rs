@@ -4,6 +4,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::install::clients;
+
 /// The account without rights; its number is the same on every Linux.
 const NOBODY: u32 = 65_534;
 
@@ -20,7 +22,8 @@ pub fn found(names: &[&str], package: &str) -> PathBuf {
     })
 }
 
-/// A program that sees none of the user's settings: a bare environment, and a home that holds nothing.
+/// A program that sees none of the user's settings: a bare environment, and a home of ours below the target folder. A home
+/// that does not exist would not do: run by root, these programs make it.
 pub fn outside(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.env_clear();
@@ -29,7 +32,9 @@ pub fn outside(program: impl AsRef<OsStr>) -> Command {
             command.env(kept, value);
         }
     }
-    command.env("HOME", "/nonexistent").env("LANG", "C.UTF-8");
+    let home = clients().join("home");
+    std::fs::create_dir_all(&home).expect("a folder");
+    command.env("HOME", home).env("LANG", "C.UTF-8");
     // Lines come as they are written, and no file is left beside our scripts.
     command.env("PYTHONUNBUFFERED", "1").env("PYTHONDONTWRITEBYTECODE", "1");
     command
@@ -39,7 +44,7 @@ pub fn outside(program: impl AsRef<OsStr>) -> Command {
 pub fn tshark(folder: &Path) -> Command {
     let mut command = outside(found(&["tshark"], "tshark"));
     // Names are not looked up: a reader of files asks nobody.
-    command.arg("-n").current_dir(folder);
+    command.arg("-n").current_dir(folder).env("HOME", folder.join("no-home"));
     // A dissector that was installed for the whole machine may have our dissector's name.
     command.env("WIRESHARK_PLUGIN_DIR", folder.join("no-plugins"));
     if nix::unistd::geteuid().is_root() {

@@ -72,6 +72,8 @@ fn install_and_look(folder: &Path) {
     let names: Vec<&str> =
         seen.lines().filter_map(|line| line.split_once('=')).map(|(name, _)| name).collect();
     let ours = ["PATH", "TMPDIR", "HOME", "LANG", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE"];
+    let home = seen.lines().find_map(|line| line.strip_prefix("HOME=")).unwrap();
+    assert!(Path::new(home).is_dir() && Some(Path::new(home)) != std::env::home_dir().as_deref(), "{home}");
     assert!(!names.is_empty() && names.iter().all(|name| ours.contains(name)), "{names:?}");
 }
 
