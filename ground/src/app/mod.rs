@@ -118,13 +118,14 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
     let mut model = Model::new(Settings {
-        link_name: links.join(" and "),
         // Of several links, each has its own.
         link_capacity_bytes_s: wire
             .endpoints()
             .next()
             .filter(|_| links.len() == 1)
             .and_then(Endpoint::capacity_bytes_s),
+        vehicle_name: demo.as_ref().map(|_| cli.profile.clone()),
+        demo: demo.is_some(),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         role: Role::Station,
@@ -132,6 +133,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool) -> anyhow::Resul
         // A daemon, too, goes on after a flight.
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
+        ..Settings::on_screen(links.join(" and "))
     });
     let output = Output::open(interactive, config)?;
     model.repeats_told = output.tells_repeats();

@@ -53,7 +53,7 @@ impl Station {
         loop {
             let redraw_at = self.output.redraw_at();
             let (demo, server) = (&mut self.demo, &mut self.server);
-            let chord_at = model.abort_chord.acts_at();
+            let wakes_at = model.wakes_at();
             let msgs = tokio::select! {
                 // In this order. Keys before the clock: one that waits may show that Ctrl-X is held. The
                 // link last: it alone can be busy all the time, and it is read until nothing waits.
@@ -61,7 +61,7 @@ impl Station {
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 asked = server_asks(server) => self.asked(asked),
                 msg = self.output.input() => vec![msg],
-                () = self.clock.sleep_until(chord_at) => vec![Msg::Tick],
+                () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
                 _ = ticks.tick() => self.tick_msgs(model),
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
@@ -129,7 +129,7 @@ impl Station {
     fn asked(&self, asked: Asked) -> Vec<Msg> {
         match asked {
             Asked::Command(kind) => vec![Msg::Requested(kind)],
-            Asked::Acknowledge => vec![Msg::Acknowledged],
+            Asked::Acknowledge(kind) => vec![Msg::Acknowledged(kind)],
             Asked::Parameters => vec![Msg::ParametersWanted],
             Asked::Hello { .. } => Vec::new(),
             Asked::Key(name) => {

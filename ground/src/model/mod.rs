@@ -1,6 +1,7 @@
 //! Everything the ground knows, as plain data.
 
 pub mod alarm;
+pub mod boot;
 pub mod chord;
 pub mod command;
 mod course;
@@ -11,6 +12,7 @@ pub mod history;
 pub mod judgement;
 pub mod link;
 pub mod motion;
+pub mod motor;
 pub mod outcome;
 pub mod page;
 pub mod parameters;
@@ -18,16 +20,18 @@ pub mod reckoning;
 pub mod telemetry;
 pub mod too_late;
 pub mod trend;
+pub mod uplink;
 pub mod vehicle;
 pub mod words;
 
 use std::time::Duration;
 
+use protocol::identity::GROUND;
 use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
 use crate::update::Action;
-use alarm::Alarms;
+use alarm::{Alarm, Alarms};
 use chord::AbortChord;
 use command::Commands;
 use dialog::Dialog;
@@ -46,6 +50,12 @@ pub struct Settings {
     pub link_name: String,
     /// What the link can carry, bytes per second; `None` where nothing is known to bound it.
     pub link_capacity_bytes_s: Option<u32>,
+    /// The station's name: which of several this is.
+    pub station_name: String,
+    /// What flies, where that is known beforehand.
+    pub vehicle_name: Option<String>,
+    /// The vehicle is the one in this process.
+    pub demo: bool,
     /// The log's path; `None` without a log.
     pub log_path: Option<String>,
     /// The telemetry log's path (`.tlog`); `None` without one.
@@ -66,6 +76,9 @@ impl Settings {
         Self {
             link_name: link_name.into(),
             link_capacity_bytes_s: None,
+            station_name: format!("{}/{}", GROUND.system_id, GROUND.component_id),
+            vehicle_name: None,
+            demo: false,
             log_path: None,
             tlog_path: None,
             role: Role::Station,
@@ -124,7 +137,7 @@ pub struct LogHealth {
 }
 
 /// When what is repeated is due next.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) heartbeat: Duration,
     pub(crate) timesync: Duration,
@@ -159,6 +172,8 @@ pub struct Model {
     pub link: Link,
     /// Commands under way and done.
     pub commands: Commands,
+    /// Who may command, by name, where several screens may; empty where it is this screen alone.
+    pub crew: Vec<String>,
     /// The open dialog.
     pub dialog: Dialog,
     /// How far the abort chord is.
@@ -200,6 +215,7 @@ impl Model {
             vehicle: Vehicle::default(),
             link: Link::default(),
             commands: Commands::default(),
+            crew: Vec::new(),
             dialog: Dialog::Closed,
             abort_chord: AbortChord::default(),
             repeats_told: false,
@@ -224,9 +240,23 @@ impl Model {
         self.alarms.history_ends();
     }
 
+    /// When time alone brings something to do before the next tick: the chord, or a command that is sent again.
+    pub fn wakes_at(&self) -> Option<Duration> {
+        let times = [self.abort_chord.acts_at(), self.commands.due_at()];
+        times.into_iter().flatten().min()
+    }
+
     /// The screen to show.
     pub fn page(&self) -> Page {
         self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
+    }
+
+    /// The alarm that is acknowledged next: the chosen one of the list, or the foremost.
+    pub fn pointed_at(&self) -> Option<&Alarm> {
+        let listed = self.page() == Page::Alarms;
+        let chosen = self.pages.chosen.filter(|_| listed);
+        let chosen = chosen.and_then(|kind| self.alarms.list().iter().find(|alarm| alarm.kind == kind));
+        chosen.or_else(|| self.alarms.foremost())
     }
 
     /// Notes an event for the list, the lines and the log.

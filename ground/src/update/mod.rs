@@ -19,6 +19,7 @@ use protocol::signing::SigningCounters;
 
 use crate::attach::codec::Asked;
 use crate::key::Key;
+use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
@@ -35,8 +36,8 @@ pub enum Msg {
     Commanded(CommandKind),
     /// The crew has climbed the whole ladder of this on a screen elsewhere.
     Requested(CommandKind),
-    /// The crew has seen the alarms, on a screen elsewhere.
-    Acknowledged,
+    /// The crew has seen this alarm, on a screen elsewhere.
+    Acknowledged(AlarmKind),
     /// A screen elsewhere wants the parameters.
     ParametersWanted,
     /// Time passes on a screen whose station runs elsewhere: its dialogs and chord expire.
@@ -120,7 +121,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Key(key) => keys::on_key(model, key, now),
         Msg::Commanded(kind) => commands::submit(model, kind, now),
         Msg::Requested(kind) => keys::command(model, kind, now),
-        Msg::Acknowledged => keys::acknowledge(model, now),
+        Msg::Acknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => {
             keys::expire(model, now);
