@@ -6,6 +6,7 @@ pub mod clock;
 pub mod lines;
 pub mod log;
 mod output;
+pub mod pace;
 mod paper;
 pub mod print;
 pub mod replaying;

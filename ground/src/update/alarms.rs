@@ -62,9 +62,18 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
         LinkState::NeverHeard => known_for > RED_AFTER,
         LinkState::Alive(_) | LinkState::Doubtful(_) => false,
     };
+    // While nothing comes down, nobody tells: what is known already stays.
+    let told = match model.link.state(now) {
+        LinkState::Alive(_) => true,
+        LinkState::Doubtful(_) => {
+            let mut alarms = model.alarms.list().iter();
+            alarms.any(|alarm| alarm.kind == AlarmKind::UplinkLost && alarm.is_active())
+        }
+        LinkState::NeverHeard | LinkState::Lost(_) => false,
+    };
     // A flight that was recorded before vehicles told of it has no uplink to lose.
     let recorded = model.settings.role == Role::Replaying && !model.link.uplink.is_told();
-    silent && !recorded && model.link.state(now).carries()
+    silent && told && !recorded
 }
 
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {

@@ -2,7 +2,9 @@
 
 mod alarms;
 mod auto;
+mod bad_air;
 mod bench;
+mod bytes;
 mod daemon;
 mod disarm;
 mod flown;
@@ -16,3 +18,5 @@ mod radio;
 mod replay;
 mod screens;
 mod terminal;
+mod uplink;
+mod whose;
