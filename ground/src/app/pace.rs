@@ -25,9 +25,9 @@ const WINDOW: Duration = Duration::from_secs(1);
 /// Cells of an 80x24 terminal.
 const SMALL_CELLS: u32 = 80 * 24;
 /// Bytes that frames which can wait may bring any second to. What is left below the 5 and 8 kB of every second is for the one
-/// frame that cannot: another page, whole, takes up to 2.6 kB at 80x24.
-const SMALL_ROOM_BYTES: usize = 2_300;
-const LARGE_ROOM_BYTES: usize = 3_300;
+/// frame that cannot: another page, whole, takes up to 3 kB at 80x24.
+const SMALL_ROOM_BYTES: usize = 1_400;
+const LARGE_ROOM_BYTES: usize = 2_200;
 
 /// What is drawn at once when it changes.
 #[derive(Debug, Clone, Copy, PartialEq)]

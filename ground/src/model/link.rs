@@ -102,6 +102,8 @@ pub struct Link {
     pub uplink: Uplink,
     /// Round trip, measured by TIMESYNC.
     pub round_trip: Option<Duration>,
+    /// Since when the vehicle is heard without a break that counts as one.
+    pub(crate) alive_since: Option<Duration>,
     pub(crate) lost_said: bool,
     pub(crate) twin_said_at: Option<Duration>,
     pub(crate) strangers: Vec<Address>,

@@ -39,7 +39,7 @@ impl KeepAway {
         let wait_s = approach_s.map(|wait_s| wait_s.max(status.pad_wait_s));
         let danger = match status.motor {
             _ if !concerns(status) => return None,
-            TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) => Danger::LiveWaited,
+            TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,
             TdMotor::TD_MOTOR_LIVE => Danger::Live,
             TdMotor::TD_MOTOR_BURNING => Danger::Burning,
             TdMotor::TD_MOTOR_HOT => Danger::Hot,
@@ -57,16 +57,16 @@ impl KeepAway {
     /// For the crew, with the time.
     pub fn words(&self) -> String {
         let until = match self.wait_s {
-            Some(wait_s) => format!("for {wait_s} s"),
-            None => "until it says otherwise".to_owned(),
+            Some(wait_s) if wait_s > 0 => format!(" for {wait_s} s"),
+            _ => String::new(),
         };
         match self.danger {
-            Danger::Live => format!("LIVE MOTOR: do not approach {until}"),
+            Danger::Live => format!("LIVE MOTOR: do not approach{until}"),
             Danger::LiveWaited => "LIVE MOTOR: do not approach, but to put the pin in".to_owned(),
             Danger::Burning => "MOTOR BURNING: do not approach".to_owned(),
             Danger::NotReported => "MOTOR NOT REPORTED: take it for live, do not approach".to_owned(),
-            Danger::Hot => format!("MOTOR HOT: burnt out, do not touch {until}"),
-            Danger::Wait => format!("STAY OFF THE PAD {until}"),
+            Danger::Hot => format!("MOTOR HOT: burnt out, do not touch{until}"),
+            Danger::Wait => format!("STAY OFF THE PAD{until}"),
         }
     }
 }
@@ -92,7 +92,7 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
 /// Why the countdown was held and what follows from it; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
-    let whom = if armed_here { "this station" } else { "the station that armed it" };
+    let whom = if armed_here { "this station" } else { "its station" };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
         TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 2 s"),

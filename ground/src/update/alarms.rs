@@ -56,10 +56,10 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
 
 /// The vehicle is heard, and so it is known that it does not hear.
 fn is_unheard(model: &Model, now: Duration) -> bool {
-    let known_for = model.link.first_heartbeat_at.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    // What it told before a silence says nothing of now: it has this long to tell.
+    let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
     let silent = match model.link.uplink.state(now) {
-        LinkState::Lost(_) => true,
-        LinkState::NeverHeard => known_for > RED_AFTER,
+        LinkState::Lost(_) | LinkState::NeverHeard => heard_for > RED_AFTER,
         LinkState::Alive(_) | LinkState::Doubtful(_) => false,
     };
     // While nothing comes down, nobody tells: what is known already stays.

@@ -99,6 +99,8 @@ fn heartbeat(model: &mut Model, now: Duration) {
 }
 
 fn note_loss(model: &mut Model, now: Duration) {
+    let since = model.link.alive_since.unwrap_or(now);
+    model.link.alive_since = model.link.state(now).carries().then_some(since);
     if let LinkState::Lost(age) = model.link.state(now)
         && !model.link.lost_said
     {

@@ -12,7 +12,7 @@ use crate::model::{self, Model, words};
 /// `REPLAY SIM`, its spaces included.
 const MODE_COLUMNS: u16 = 12;
 /// `system 1 boot 1A2B3C4D mk2`, likewise.
-const VEHICLE_COLUMNS: u16 = 28;
+const VEHICLE_COLUMNS: u16 = 27;
 /// `by ` and a few names.
 const CREW_COLUMNS: u16 = 14;
 
@@ -68,7 +68,7 @@ fn vehicle(model: &Model) -> String {
 fn crew(model: &Model, theme: Theme) -> Span<'static> {
     if let Some(other) = model.link.uplink.other {
         let text = format!("armed {}/{}", other.system_id, other.component_id);
-        return Span::styled(text, theme.style(Role::Caution));
+        return Span::styled(format!(" {text}"), theme.style(Role::Caution));
     }
     let text = match model.settings.role {
         model::Role::Replaying => "nobody".to_owned(),
@@ -77,5 +77,5 @@ fn crew(model: &Model, theme: Theme) -> Span<'static> {
         _ if model.link.uplink.commands => "armed here".to_owned(),
         _ => "commands here".to_owned(),
     };
-    Span::styled(text, theme.style(Role::Plain))
+    Span::styled(format!(" {text}"), theme.style(Role::Plain))
 }

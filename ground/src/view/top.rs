@@ -131,7 +131,7 @@ pub fn keep_away(model: &Model, theme: Theme, now: Duration) -> Option<Line<'sta
 /// That the countdown was held, why, and what follows.
 fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let words = hold_words(&model.vehicle, model.link.uplink.commands)?;
-    Some(Line::styled(format!(" {words}"), theme.style(Role::Alarm)))
+    Some(Line::styled(words, theme.style(Role::Alarm)))
 }
 
 /// The three facts for narrow screens.

@@ -127,6 +127,6 @@ fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
         );
         println!("{told}");
         assert!(bytes < most, "{told}");
-        assert!(flown.len() as f64 / span_s > 2.0, "it must still move: {told}");
+        assert!(flown.len() as f64 / span_s > 1.0, "it must still move: {told}");
     }
 }

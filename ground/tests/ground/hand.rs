@@ -140,6 +140,7 @@ fn ctrl_x_and_enter_abort_at_once_from_every_dialog_and_close_it() {
         assert!(sent.len() == 1 && is_abort(&sent[0]), "{opening:?}: {sent:?}");
         assert_eq!(bench.model.dialog, Dialog::Closed);
         bench.answer(ABORT, ACCEPTED);
+        bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
         bench.key(Key::Enter);
         bench.run(3.0);
         assert!(bench.take_commands().is_empty(), "once");

@@ -89,7 +89,7 @@ fn loss_is_told_by_component() {
             bench.msg(Msg::Frame(frame));
         }
     }
-    assert_eq!(line(&bench, "1/1 vehicle"), "1/1 vehicle 11.0 0.0 % 0.0 s");
+    assert_eq!(line(&bench, "1/1 vehicle"), "1/1 vehicle 13.0 0.0 % 0.0 s");
     assert_eq!(line(&bench, "51/68 radio"), "51/68 radio 31.0 24.4 % 0.0 s");
     bench.speaks = false;
     bench.run(2.0);
