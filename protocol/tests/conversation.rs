@@ -44,26 +44,24 @@ fn an_ordinary_command_is_sent_again_three_times_half_a_second_apart() {
 }
 
 #[test]
-fn an_abort_is_sent_until_it_is_answered() {
+fn an_abort_is_sent_until_it_is_withdrawn() {
     let mut sender = CommandSender::new();
-    sender.submit(VEHICLE, ABORT, [1.0; 7], Resend::UntilAnswered, ms(0));
+    let ticket = sender.submit(VEHICLE, ABORT, [1.0; 7], Resend::UntilWithdrawn, ms(0));
     let mut confirmations = Vec::new();
-    for now in (0..200_000).step_by(100) {
+    for now in (0..200_000).step_by(50) {
         for message in sender.poll(ms(now)) {
             let MavMessage::COMMAND_LONG(command) = message else { panic!("{message:?}") };
             confirmations.push(command.confirmation);
         }
     }
-    assert_eq!(confirmations.len(), 400);
+    // Twenty in the first second, five in each of the 199 after it.
+    assert_eq!(confirmations.len(), 20 + 5 * 199);
     assert_eq!(&confirmations[..3], &[0, 1, 2]);
     assert_eq!(confirmations.last(), Some(&255), "the count of resends saturates");
-    assert!(sender.is_pending(ABORT));
-    // An answer to something else does not end it.
-    sender.on_answer(&answer(ARM, MavResult::MAV_RESULT_ACCEPTED), ms(200_000));
-    assert!(sender.is_pending(ABORT));
     sender.on_answer(&answer(ABORT, MavResult::MAV_RESULT_ACCEPTED), ms(200_000));
-    assert!(!sender.is_pending(ABORT));
-    assert!(sender.poll(ms(300_000)).is_empty());
+    assert!(sender.is_pending(ABORT), "an answer does not end it");
+    sender.withdraw_one(ticket, ms(200_100));
+    assert!(sender.poll(ms(300_000)).is_empty() && sender.due_at().is_none());
 }
 
 #[test]

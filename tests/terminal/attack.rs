@@ -73,7 +73,7 @@ fn what_a_vehicle_says_never_commands_the_terminal() {
     let mut stage = Stage::set("paper-calibrated");
     stage.terminal.wait_for("GO: every arming check passes");
     let mut encoder = Encoder::new(VEHICLE);
-    for page in ["[1Pad]", "[6Messages]", "[7Params]"] {
+    for page in ["[1Pad]", "[6Texts]", "[7Params]"] {
         stage.terminal.type_bytes(&page.as_bytes()[1..2]);
         stage.terminal.wait_for(page);
         for (attack, index) in ATTACKS.iter().zip(0..) {
@@ -84,7 +84,7 @@ fn what_a_vehicle_says_never_commands_the_terminal() {
             }
         }
         wait_for_newest(&stage, page, word_of(ATTACKS[ATTACKS.len() - 1]));
-        if page == "[6Messages]" {
+        if page == "[6Texts]" {
             let window = stage.terminal.look();
             let missing: Vec<&str> =
                 ATTACKS.iter().map(|attack| word_of(attack)).filter(|word| !window.shows(word)).collect();
@@ -131,7 +131,7 @@ fn wait_for_newest(stage: &Stage, page: &str, word: &str) {
     stage.terminal.wait_until(&format!("{word} on {page}"), |window| {
         let rows = window.rows();
         let said = rows[rows.len() - 2].contains(word);
-        (said && rows[rows.len() - 1].contains(page) && rows[0].starts_with(" PAD_IDLE")).then_some(())
+        (said && rows[rows.len() - 1].contains(page) && rows[1].starts_with(" PAD_IDLE")).then_some(())
     });
 }
 

@@ -129,7 +129,7 @@ fn a_terminal_that_takes_nothing_stops_neither_link_nor_abort_nor_log() {
     stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     stage.terminal.wait_until("everything in its place", |window| {
         let rows = window.rows();
-        (rows[0].contains(" disarmed ") && rows[23].starts_with("[1Pad] 2Descent")).then_some(())
+        (rows[1].contains(" disarmed ") && rows[23].starts_with("[1Pad] 2Descent")).then_some(())
     });
     stage.terminal.signal(Signal::SIGTERM);
     assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");

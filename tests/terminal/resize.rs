@@ -26,8 +26,8 @@ fn assert_whole(stage: &mut Stage, size: (u16, u16)) {
     stage.terminal.type_bytes(b"z");
     let (before, written) = stage.terminal.wait_until("everything in its place", |window| {
         let shown = window.rows();
-        let heard = shown.iter().take(2).any(|row| row.contains("link ok"));
-        let found = shown.len() == usize::from(size.1) && shown[0].starts_with(" PAD_IDLE") && heard;
+        let heard = shown.iter().take(3).any(|row| row.contains(" down 0s up 0s"));
+        let found = shown.len() == usize::from(size.1) && shown[1].starts_with(" PAD_IDLE") && heard;
         (found && !window.shows("ENTER ABORTS")).then(|| (without_numbers(window), window.bytes().len()))
     });
     stage.terminal.type_bytes(b"\x0c");

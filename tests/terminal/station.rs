@@ -61,8 +61,8 @@ fn an_abort_without_a_station_is_said_on_every_screen_and_goes_to_the_next_stati
         // The second station's clock is another than the first's: nothing is old, nothing is lost.
         shown.wait_until("the abort, by the second station", |window| {
             let rows = window.rows();
-            let heard = rows[0].contains("link ok") && rows[0].starts_with(" PAD_IDLE ");
-            (heard && rows[1].contains("acknowledged accepted  observed yes")).then_some(())
+            let heard = rows[1].contains(" down 0s up 0s") && rows[1].starts_with(" PAD_IDLE ");
+            (heard && rows[2].contains("acknowledged accepted  observed yes")).then_some(())
         });
     }
     assert!(field.sent(ABORT) >= 1);

@@ -27,7 +27,10 @@ fn through_heavy_loss_the_ladder_arms_and_the_abort_arrives() {
     let attempts = stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     assert_eq!(attempts, stage.sent(ABORT, 1.0), "the screen counts what went out");
     stage.terminal.wait_for(" disarmed");
-    stage.terminal.wait_for("STAY OFF THE PAD");
+    stage.terminal.wait_until("that nobody may come near", |window| {
+        let rows = window.rows().concat();
+        (rows.contains("STAY OFF THE PAD") || rows.contains("do not approach")).then_some(())
+    });
     assert_eq!(stage.sent(START, 0.0), 0);
 
     // A latched abort refuses the next arming, and says why.
@@ -85,7 +88,7 @@ fn in_silence_everything_is_old_the_path_is_a_prediction_and_an_abort_goes_on() 
     stage.wait_for_fact("ABORT", "acknowledged waiting  observed not yet");
     stage.air.set(Weather::default());
     // By now it stands on the ground, or is about to.
-    stage.terminal.wait_for("link ok");
+    stage.terminal.wait_for(" down 0s up 0s");
     let attempts = stage.wait_for_fact("ABORT", "acknowledged ");
     assert!(attempts >= 5, "{attempts}");
     stage.terminal.wait_until("an answer to the abort", |window| {

@@ -178,8 +178,8 @@ fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
             "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
         }
         Asked::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),
-        Asked::Acknowledge => {
-            model.alarms.acknowledge();
+        Asked::Acknowledge(kind) => {
+            model.alarms.acknowledge(*kind);
             return;
         }
         Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) | Asked::Status | Asked::Stop { .. } => {

@@ -8,6 +8,7 @@ use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 use protocol::log::recorder::RecorderError;
 
 use crate::model::Model;
+use crate::model::motor::KeepAway;
 use crate::model::vehicle::Verdict;
 use crate::view::number::fixed;
 use crate::view::touchdown::verdict_word;
@@ -67,6 +68,10 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
         Some(verdict) => text.push_str(&verdict_table(&verdict.value, model.vehicle.limits.as_ref())),
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}
+    }
+    // The last thing said before somebody walks up to it.
+    if let Some(away) = KeepAway::of(&model.vehicle) {
+        let _ = writeln!(text, "{}", away.words());
     }
     if model.log.dropped > 0 {
         let _ = writeln!(text, "log: {} records dropped", model.log.dropped);

@@ -7,6 +7,7 @@ pub mod lines;
 pub mod log;
 mod operator;
 mod output;
+pub mod pace;
 mod paper;
 pub mod print;
 pub mod replaying;
@@ -151,13 +152,13 @@ async fn start(
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
     let mut model = Model::new(Settings {
-        link_name: links.join(" and "),
         // Of several links, each has its own.
         link_capacity_bytes_s: wire
             .endpoints()
             .next()
             .filter(|_| links.len() == 1)
             .and_then(Endpoint::capacity_bytes_s),
+        vehicle_name: demo.as_ref().map(|_| cli.demonstration().0.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: cli.us(),
@@ -169,6 +170,7 @@ async fn start(
         // A daemon, too, goes on after a flight.
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
+        ..Settings::on_screen(links.join(" and "))
     });
     let server = serve(cli, &mut model, interactive, &clock).await?;
     if demo.is_some()

@@ -66,6 +66,11 @@ impl Paper {
         Ok(WRITING.load(Ordering::Acquire))
     }
 
+    /// How many bytes stand on the page.
+    pub(super) fn waiting(&self) -> usize {
+        self.page.with(|page| page.len())
+    }
+
     /// Hands over what stands on the page; later, while the frame before is still on its way.
     pub(super) fn send(&self) {
         let bytes = self.page.with(std::mem::take);

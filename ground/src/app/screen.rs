@@ -24,6 +24,7 @@ use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
+use super::pace::Pace;
 use super::paper::{self, Page, Paper};
 use crate::config::{Characters, Colour, Config};
 use crate::key::Key;
@@ -31,13 +32,6 @@ use crate::model::Model;
 use crate::update::Msg;
 use crate::view::theme::Theme;
 use crate::view::view;
-
-/// At most ten frames a second, while it matters.
-const FRAME: Duration = Duration::from_millis(100);
-/// On the pad and after a flight, for what only the radio brings: a slow line has other things to carry.
-const CALM_FRAME: Duration = Duration::from_millis(500);
-/// Ages grow even if nothing arrives.
-const IDLE_FRAME: Duration = Duration::from_secs(1);
 
 /// Keys told at once, at most: a paste must not hold up link and clock. What is beyond comes together again.
 const TOGETHER_MAX: usize = 1_024;
@@ -64,8 +58,7 @@ pub struct Screen {
     events: EventStream,
     theme: Theme,
     bell: bool,
-    wait: Duration,
-    drawn_at: Option<Duration>,
+    pace: Pace,
     /// The next frame is written whole.
     whole: bool,
     /// Came behind keys that are told first.
@@ -88,8 +81,7 @@ impl Screen {
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
-            wait: Duration::ZERO,
-            drawn_at: None,
+            pace: Pace::default(),
             whole: false,
             waiting: None,
             input_ended: false,
@@ -98,31 +90,17 @@ impl Screen {
 
     /// Something to see has changed, and a person waits for it.
     pub fn mark_changed(&mut self) {
-        self.wait = self.wait.min(FRAME);
-    }
-
-    /// Something to see has changed that can wait a moment.
-    pub fn mark_changed_calmly(&mut self) {
-        self.wait = self.wait.min(CALM_FRAME);
+        self.pace.mark_changed();
     }
 
     /// A message was taken into the model: how soon it must be seen.
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
-        match msg {
-            // Time and what was sent change nothing that must be seen before the next second.
-            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
-            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
-                self.mark_changed();
-            }
-            Msg::Frame(_) | Msg::Received { .. } => self.mark_changed_calmly(),
-            _ => self.mark_changed(),
-        }
+        self.pace.mark_message(msg, model);
     }
 
     /// When the next frame is due.
     pub fn redraw_at(&self) -> Duration {
-        self.drawn_at.map_or(Duration::ZERO, |at| at + self.wait)
+        self.pace.redraw_at()
     }
 
     /// Draws if a frame is due. Ages count to `model_now`, the same moment by the model's clock.
@@ -130,12 +108,12 @@ impl Screen {
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
+        self.pace.look(model);
         if now < self.redraw_at() {
             return Ok(());
         }
         if self.paper.is_busy()? {
-            // Looks again soon; what is drawn then is as it is then.
-            (self.drawn_at, self.wait) = (Some(now), FRAME);
+            self.pace.put_off(now);
             return Ok(());
         }
         if std::mem::take(&mut self.whole) {
@@ -144,10 +122,10 @@ impl Screen {
             let size = self.terminal.size()?;
             self.terminal.resize(size.into())?;
         }
-        self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
+        let drawn = self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
+        let cells = drawn.area.area();
+        self.pace.drew(model, cells, self.paper.waiting(), now);
         self.paper.send();
-        self.wait = IDLE_FRAME;
-        self.drawn_at = Some(now);
         Ok(())
     }
 

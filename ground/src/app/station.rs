@@ -66,7 +66,7 @@ impl Station {
         loop {
             let redraw_at = self.output.redraw_at();
             let (demo, server) = (&mut self.demo, &mut self.server);
-            let chord_at = model.abort_chord.acts_at();
+            let wakes_at = model.wakes_at();
             let msgs = tokio::select! {
                 // In this order. Keys before the clock: one that waits may show that Ctrl-X is held. The
                 // link last: it alone can be busy all the time, and it is read until nothing waits.
@@ -74,7 +74,7 @@ impl Station {
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 news = server_hears(server) => self.hear(news, model),
                 msg = self.output.input() => vec![msg],
-                () = self.clock.sleep_until(chord_at) => vec![Msg::Tick],
+                () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
                 _ = ticks.tick() => self.tick_msgs(model),
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
@@ -165,7 +165,7 @@ impl Station {
                 Vec::new()
             }
             News::Asked(by, Asked::Command(kind)) => vec![Msg::Requested { kind, by }],
-            News::Asked(_, Asked::Acknowledge) => vec![Msg::Acknowledged],
+            News::Asked(_, Asked::Acknowledge(kind)) => vec![Msg::Acknowledged(kind)],
             News::Asked(_, Asked::Parameters) => vec![Msg::ParametersWanted],
             News::Asked(by, Asked::Key(name)) => {
                 self.record_operator("key", format!("{name}{}", by.in_brackets()));

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::identity::VEHICLE;
 use protocol::transport::Endpoint;
 use tokio::io::AsyncWriteExt as _;
 
@@ -35,7 +34,7 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> Status {
         false => "LIVE",
     };
     let heard = vehicle.heartbeat.is_some();
-    let named = format!("{}/{} {kind}{boot}", VEHICLE.system_id, VEHICLE.component_id);
+    let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
     let armed = vehicle.armed().is_some_and(|armed| armed.value);
     let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
     let own = model.crew.seats().iter().find(|seat| **seat == settings.seat).map(Seat::to_string);

@@ -12,6 +12,7 @@ use std::time::Duration;
 use protocol::frame::FramerCounters;
 
 use crate::model::LogHealth;
+use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::seat::Seat;
 use crate::update::Msg;
@@ -114,8 +115,8 @@ pub enum Asked {
     },
     /// The crew's whole ladder was climbed.
     Command(CommandKind),
-    /// The alarms were seen.
-    Acknowledge,
+    /// This alarm was seen.
+    Acknowledge(AlarmKind),
     /// The parameters are wanted.
     Parameters,
     /// A key was pressed: for the log.
@@ -170,7 +171,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::SimulatorEnded(why) => {
             out.kind(10).u8(u8::from(why.is_some())).text(why.as_deref().unwrap_or_default());
         }
-        Msg::Acknowledged => drop(out.kind(11)),
+        Msg::Acknowledged(kind) => drop(out.kind(11).u8(alarm_number(*kind))),
         Msg::ParametersWanted => drop(out.kind(12)),
         Msg::ScreenGone => drop(out.kind(13)),
         Msg::HeardOver(number) => drop(out.kind(14).u64(*number as u64)),
@@ -234,7 +235,7 @@ pub fn decode_told(bytes: &[u8]) -> Result<(Told, Duration), CodecError> {
             let why = rest.text()?;
             Told::Msg(Msg::SimulatorEnded(failed.then_some(why)))
         }
-        11 => Told::Msg(Msg::Acknowledged),
+        11 => Told::Msg(Msg::Acknowledged(alarm_of(rest.u8()?)?)),
         12 => Told::Msg(Msg::ParametersWanted),
         13 => Told::Msg(Msg::ScreenGone),
         14 => Told::Msg(Msg::HeardOver(rest.size()?)),
@@ -297,7 +298,7 @@ pub fn encode_asked(asked: &Asked) -> Vec<u8> {
     match asked {
         Asked::Hello { watch, operator } => out.kind(0).u32(VERSION).u8(u8::from(*watch)).text(operator),
         Asked::Command(kind) => out.kind(1).u8(number_of(*kind)),
-        Asked::Acknowledge => out.kind(2),
+        Asked::Acknowledge(kind) => out.kind(2).u8(alarm_number(*kind)),
         Asked::Parameters => out.kind(3),
         Asked::Key(name) => out.kind(4).text(name),
         Asked::Status => out.kind(5),
@@ -320,7 +321,7 @@ pub fn decode_asked(bytes: &[u8]) -> Result<Asked, CodecError> {
             Asked::Hello { watch: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? }
         }
         1 => Asked::Command(kind_of(rest.u8()?)?),
-        2 => Asked::Acknowledge,
+        2 => Asked::Acknowledge(alarm_of(rest.u8()?)?),
         3 => Asked::Parameters,
         4 => Asked::Key(words(&mut rest, KEY_MAX)?),
         5 => Asked::Status,
@@ -370,6 +371,15 @@ fn kind_of(number: u8) -> Result<CommandKind, CodecError> {
         .into_iter()
         .find(|kind| number_of(*kind) == number)
         .ok_or(CodecError("an unknown command"))
+}
+
+fn alarm_number(kind: AlarmKind) -> u8 {
+    let place = AlarmKind::all().position(|known| known == kind);
+    place.and_then(|place| u8::try_from(place).ok()).unwrap_or(u8::MAX)
+}
+
+fn alarm_of(number: u8) -> Result<AlarmKind, CodecError> {
+    AlarmKind::all().nth(number.into()).ok_or(CodecError("an unknown alarm"))
 }
 
 fn open(bytes: &[u8]) -> Result<(u8, Duration, Reader<'_>), CodecError> {

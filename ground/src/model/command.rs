@@ -50,7 +50,7 @@ impl CommandKind {
         match self {
             Self::Arm => Resend::Never,
             Self::Disarm | Self::Start => Resend::Times(3),
-            Self::Abort => Resend::UntilAnswered,
+            Self::Abort => Resend::UntilWithdrawn,
         }
     }
 
@@ -65,9 +65,11 @@ impl CommandKind {
                 let counting = status.value.countdown_ms != i32::MAX;
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
+            // The latch itself: a stabiliser that flies without an abort shows the same degradation.
             Self::Abort => {
+                let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
-                    || status.is_some_and(|status| is_aborted(status.value.interlocks))
+                    || status.is_some_and(|status| status.value.interlocks.contains(latched))
             }
         }
     }
@@ -148,7 +150,6 @@ pub struct Commands {
     pub(crate) sender: CommandSender,
     /// The latest of each kind, in the order they were asked.
     pub tracks: Vec<Track>,
-    pub(crate) abort_again_at: Option<Duration>,
 }
 
 impl Commands {
@@ -162,8 +163,13 @@ impl Commands {
         self.tracks.iter().find(|track| track.kind == kind)
     }
 
-    /// Whether an abort waits for its answer.
+    /// Whether an abort is still being sent.
     pub fn is_aborting(&self) -> bool {
-        self.of(CommandKind::Abort).is_some_and(|track| track.acknowledged_at.is_none())
+        self.sender.is_pending(CommandKind::Abort.wire().0)
+    }
+
+    /// When something is to be sent next.
+    pub(crate) fn due_at(&self) -> Option<Duration> {
+        self.sender.due_at()
     }
 }

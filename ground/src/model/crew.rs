@@ -33,6 +33,15 @@ impl Crew {
         &self.seats
     }
 
+    /// Their names, short.
+    pub fn names(&self) -> Vec<String> {
+        let name = |seat: &Seat| match seat.operator.split_whitespace().next() {
+            Some(name) => name.to_owned(),
+            None => seat.to_string(),
+        };
+        self.seats.iter().map(name).collect()
+    }
+
     /// Whether the last one has been gone for too long.
     pub fn is_gone(&self, now: Duration) -> bool {
         self.gone_at.is_some_and(|at| now.saturating_sub(at) >= ALONE_MAX)

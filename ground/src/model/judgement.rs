@@ -88,6 +88,16 @@ impl Standard {
         })
     }
 
+    /// By what a vehicle of these limits judges, in words.
+    pub fn whose(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> String {
+        match limits.map(Self::of) {
+            Some(Some(standard)) if standard == LEGS => "the legs".to_owned(),
+            Some(Some(standard)) => standard.name.to_owned(),
+            Some(None) => "its own".to_owned(),
+            None => "the vehicle".to_owned(),
+        }
+    }
+
     /// Limit by limit, in state order: distance, altitude, pitch, speed along, speed across, rate.
     pub fn judge(&self, contact: &Touchdown, in_space: bool) -> [Held; 6] {
         let (along, across) = self.speeds_m_s(contact, in_space);

@@ -8,29 +8,44 @@ use protocol::identity::Address;
 use protocol::link::{LinkFigures, LinkStats, SourceFigures};
 use protocol::signing::SigningCounters;
 
-/// Without a heartbeat for this long the link is doubtful.
+use super::uplink::Uplink;
+
+/// Without a frame for this long a direction of the link is doubtful: a heartbeat a second, and half of one.
 pub const AMBER_AFTER: Duration = Duration::from_millis(1_500);
-/// Without a heartbeat for this long the link is lost.
-pub const RED_AFTER: Duration = Duration::from_millis(3_500);
+/// Without a frame for longer than this a direction of the link is lost: three heartbeats.
+pub const RED_AFTER: Duration = Duration::from_secs(3);
 
 /// What a radio said of itself is shown for this long.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
-/// Whether the vehicle is heard. Only its heartbeat counts: a radio that reports about itself is not
-/// the vehicle.
+/// Whether one direction of the link works, by the age of the last frame that arrived on it. A radio that reports about
+/// itself is not the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkState {
-    /// No heartbeat ever.
+    /// Nothing ever.
     NeverHeard,
-    /// Heard just now; the age of the last heartbeat.
+    /// Just now.
     Alive(Duration),
-    /// A heartbeat is missing.
+    /// Something is missing.
     Doubtful(Duration),
     /// Lost.
     Lost(Duration),
 }
 
 impl LinkState {
+    /// By when the last frame arrived.
+    pub fn of(last_at: Option<Duration>, now: Duration) -> Self {
+        let Some(at) = last_at else { return Self::NeverHeard };
+        let age = now.saturating_sub(at);
+        if age > RED_AFTER {
+            Self::Lost(age)
+        } else if age >= AMBER_AFTER {
+            Self::Doubtful(age)
+        } else {
+            Self::Alive(age)
+        }
+    }
+
     /// Whether a command may be expected to arrive.
     pub fn carries(self) -> bool {
         matches!(self, Self::Alive(_) | Self::Doubtful(_))
@@ -81,10 +96,14 @@ pub struct Link {
     pub abort_unsent: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
-    /// The last heartbeat of the vehicle.
-    pub heartbeat_at: Option<Duration>,
+    /// The last frame of the vehicle, of any kind.
+    pub heard_at: Option<Duration>,
+    /// What the vehicle hears of this station.
+    pub uplink: Uplink,
     /// Round trip, measured by TIMESYNC.
     pub round_trip: Option<Duration>,
+    /// Since when the vehicle is heard without a break that counts as one.
+    pub(crate) alive_since: Option<Duration>,
     pub(crate) lost_said: bool,
     pub(crate) twin_said_at: Option<Duration>,
     pub(crate) strangers: Vec<Address>,
@@ -97,16 +116,13 @@ impl Link {
         report.map(|report| report.name.as_str())
     }
 
-    /// Whether the vehicle is heard.
+    /// Whether the vehicle is heard: the direction down. It is known as a vehicle by its first heartbeat.
     pub fn state(&self, now: Duration) -> LinkState {
-        let Some(at) = self.heartbeat_at else { return LinkState::NeverHeard };
-        let age = now.saturating_sub(at);
-        if age >= RED_AFTER {
-            LinkState::Lost(age)
-        } else if age >= AMBER_AFTER {
-            LinkState::Doubtful(age)
-        } else {
-            LinkState::Alive(age)
-        }
+        LinkState::of(self.first_heartbeat_at.and(self.heard_at), now)
+    }
+
+    /// What of the last frames was lost, as a share; `None` where nothing arrives that it could be told by.
+    pub fn loss(&self, now: Duration) -> Option<f64> {
+        self.state(now).carries().then(|| self.stats.figures(now).loss)
     }
 }

@@ -1,6 +1,7 @@
 //! Everything the ground knows, as plain data.
 
 pub mod alarm;
+pub mod boot;
 pub mod chord;
 pub mod command;
 mod course;
@@ -13,6 +14,7 @@ pub mod history;
 pub mod judgement;
 pub mod link;
 pub mod motion;
+pub mod motor;
 pub mod outcome;
 pub mod page;
 pub mod parameters;
@@ -21,6 +23,7 @@ pub mod seat;
 pub mod telemetry;
 pub mod too_late;
 pub mod trend;
+pub mod uplink;
 pub mod vehicle;
 pub mod words;
 
@@ -31,7 +34,7 @@ use protocol::log::record::EventLevel;
 use protocol::text::Reassembler;
 
 use crate::update::Action;
-use alarm::Alarms;
+use alarm::{Alarm, Alarms};
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
@@ -53,6 +56,8 @@ pub struct Settings {
     pub link_name: String,
     /// What the link can carry, bytes per second; `None` where nothing is known to bound it.
     pub link_capacity_bytes_s: Option<u32>,
+    /// What flies, where that is known beforehand.
+    pub vehicle_name: Option<String>,
     /// The log's path; `None` without a log.
     pub log_path: Option<String>,
     /// The telemetry log's path (`.tlog`); `None` without one.
@@ -81,6 +86,7 @@ impl Settings {
         Self {
             link_name: link_name.into(),
             link_capacity_bytes_s: None,
+            vehicle_name: None,
             log_path: None,
             tlog_path: None,
             us: GROUND,
@@ -143,7 +149,7 @@ pub struct LogHealth {
 }
 
 /// When what is repeated is due next.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) heartbeat: Duration,
     pub(crate) timesync: Duration,
@@ -258,9 +264,23 @@ impl Model {
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
     }
 
+    /// When time alone brings something to do before the next tick: the chord, or a command that is sent again.
+    pub fn wakes_at(&self) -> Option<Duration> {
+        let times = [self.abort_chord.acts_at(), self.commands.due_at()];
+        times.into_iter().flatten().min()
+    }
+
     /// The screen to show.
     pub fn page(&self) -> Page {
         self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
+    }
+
+    /// The alarm that is acknowledged next: the chosen one of the list, or the foremost.
+    pub fn pointed_at(&self) -> Option<&Alarm> {
+        let listed = self.page() == Page::Alarms;
+        let chosen = self.pages.chosen.filter(|_| listed);
+        let chosen = chosen.and_then(|kind| self.alarms.list().iter().find(|alarm| alarm.kind == kind));
+        chosen.or_else(|| self.alarms.foremost())
     }
 
     /// Notes an event for the list, the lines and the log.

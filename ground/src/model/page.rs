@@ -2,6 +2,8 @@
 
 use protocol::dialect::TdPhase;
 
+use super::alarm::AlarmKind;
+
 /// One screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {
@@ -21,12 +23,14 @@ pub enum Page {
     Parameters,
     /// The recording.
     Log,
+    /// Every alarm, to be acknowledged one by one.
+    Alarms,
     /// The keys.
     Help,
 }
 
 impl Page {
-    /// Every screen, in the order of its digit.
+    /// Every screen that has a digit, in its order; help has `?`.
     pub const ALL: [Self; 9] = [
         Self::Pad,
         Self::Descent,
@@ -36,12 +40,13 @@ impl Page {
         Self::Messages,
         Self::Parameters,
         Self::Log,
-        Self::Help,
+        Self::Alarms,
     ];
 
-    /// The digit that shows it, 1 to 9.
-    pub fn digit(self) -> usize {
-        1 + self as usize
+    /// The key that shows it.
+    pub fn key(self) -> char {
+        let digit = Self::ALL.iter().position(|page| *page == self).map(|place| place as u32 + 1);
+        digit.and_then(|digit| char::from_digit(digit, 10)).unwrap_or('?')
     }
 
     /// The screen of a digit.
@@ -58,9 +63,10 @@ impl Page {
             Self::Landing => "Landing",
             Self::Review => "Review",
             Self::Link => "Link",
-            Self::Messages => "Messages",
+            Self::Messages => "Texts",
             Self::Parameters => "Params",
             Self::Log => "Log",
+            Self::Alarms => "Alarms",
             Self::Help => "Help",
         }
     }
@@ -88,6 +94,8 @@ pub struct Pages {
     pub held: Option<Page>,
     /// Lines that a list is scrolled back from its newest, or down from its first.
     pub scroll: usize,
+    /// The alarm that the list of alarms points at; `None` for the foremost.
+    pub chosen: Option<AlarmKind>,
 }
 
 impl Pages {
@@ -98,7 +106,7 @@ impl Pages {
 
     /// Holds a screen, or follows the flight again.
     pub fn hold(&mut self, page: Option<Page>) {
-        *self = Self { held: page, scroll: 0 };
+        *self = Self { held: page, ..Self::default() };
     }
 }
 
@@ -109,9 +117,9 @@ mod tests {
     #[test]
     fn every_screen_has_its_digit() {
         for page in Page::ALL {
-            let digit = char::from_digit(u32::try_from(page.digit()).unwrap(), 10).unwrap();
-            assert_eq!(Page::from_digit(digit), Some(page));
+            assert_eq!(Page::from_digit(page.key()), Some(page));
         }
+        assert_eq!(Page::Help.key(), '?');
         for other in ['0', 'x', '\u{0661}'] {
             assert_eq!(Page::from_digit(other), None);
         }

@@ -66,17 +66,22 @@ pub enum By {
 }
 
 /// The predicted position of a vehicle in flight whose last position is stale; `None` while it is heard,
-/// on the ground, and where it was never seen.
+/// on the ground, and where nothing is known that it could begin from.
 pub fn reckon(vehicle: &Vehicle, now: Duration) -> Option<Reckoned> {
     let motion = vehicle.best_motion()?;
-    if !vehicle.in_flight() || !motion.is_stale(now) {
+    if !is_unheard(vehicle, now) {
         return None;
     }
     let phase = vehicle.phase()?.value;
+    let on_plan = along_plan(vehicle, phase, now);
+    // What stood on the pad says nothing of a flight that began elsewhere; only a boost begins there.
+    let in_flight = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
+    if !in_flight && phase != TdPhase::TD_PHASE_BOOST && on_plan.is_none() {
+        return None;
+    }
     let age = motion.age(now);
     let seconds = age.as_secs_f64();
-    let expected = along_plan(vehicle, phase, now)
-        .unwrap_or_else(|| Course::of(vehicle, phase, &motion.value).after(seconds));
+    let expected = on_plan.unwrap_or_else(|| Course::of(vehicle, phase, &motion.value).after(seconds));
     let growing_s = match expected.landed_after_s {
         Some(landed_s) => seconds.min((1.0 + LATE_SHARE) * landed_s + LATE_S),
         None => seconds,
@@ -92,6 +97,15 @@ pub fn reckon(vehicle: &Vehicle, now: Duration) -> Option<Reckoned> {
         age,
         by: expected.by,
     })
+}
+
+/// Whether it flies, and where was not heard of late.
+pub fn is_unheard(vehicle: &Vehicle, now: Duration) -> bool {
+    let in_silence = match vehicle.best_motion() {
+        Some(motion) => motion.is_stale(now),
+        None => vehicle.phase().is_some_and(|phase| phase.is_stale(now)),
+    };
+    vehicle.in_flight() && in_silence
 }
 
 fn acceleration_error_m_s2(vehicle: &Vehicle, phase: TdPhase, by: By) -> f64 {

@@ -7,20 +7,24 @@ use protocol::dialect::{
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
 };
 
+use super::boot::Spoken;
 use super::motion::{Attitude, Motion};
-use super::vehicle::{Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning};
+use super::vehicle::{
+    Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
+};
 use crate::limits::Touchdown;
 
-/// The vehicle's clock may jump back this far by a slow link beside a fast one; more is a reboot.
-const REORDERED_MS: u32 = 5_000;
-
 /// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted, in which
-/// case everything it said before is forgotten first.
+/// case everything it said before is forgotten first. What a boot that is over has said is not taken.
 pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
-    let rebooted = note_clock(vehicle, message);
+    let spoken = vehicle.boot.hear(message);
+    match spoken {
+        Spoken::Present => {}
+        Spoken::New => *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() },
+        Spoken::Former => return false,
+    }
     match message {
         MavMessage::HEARTBEAT(data) => {
-            vehicle.hil = data.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
         }
         MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
@@ -77,30 +81,12 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         }
         _ => {}
     }
-    rebooted
-}
-
-fn note_clock(vehicle: &mut Vehicle, message: &MavMessage) -> bool {
-    let Some(boot_ms) = time_boot_ms(message) else { return false };
-    let rebooted = vehicle.last_boot_ms.is_some_and(|last| boot_ms.saturating_add(REORDERED_MS) < last);
-    if rebooted {
-        *vehicle = Vehicle::default();
+    if vehicle.in_flight() {
+        vehicle.left_pad_at.get_or_insert(now);
+    } else if vehicle.phase().is_some_and(|phase| is_on_pad(phase.value)) {
+        vehicle.left_pad_at = None;
     }
-    vehicle.last_boot_ms = Some(vehicle.last_boot_ms.map_or(boot_ms, |last| last.max(boot_ms)));
-    rebooted
-}
-
-fn time_boot_ms(message: &MavMessage) -> Option<u32> {
-    match message {
-        MavMessage::TD_FLIGHT_STATUS(data) => Some(data.time_boot_ms),
-        MavMessage::ATTITUDE_QUATERNION(data) => Some(data.time_boot_ms),
-        MavMessage::LOCAL_POSITION_NED(data) => Some(data.time_boot_ms),
-        MavMessage::TD_FINS(data) => Some(data.time_boot_ms),
-        MavMessage::TD_GIMBAL(data) => Some(data.time_boot_ms),
-        MavMessage::TD_CONTROLLER(data) => Some(data.time_boot_ms),
-        MavMessage::TD_TOUCHDOWN_PREDICTION(data) => Some(data.time_boot_ms),
-        _ => None,
-    }
+    spoken == Spoken::New
 }
 
 fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
@@ -176,7 +162,7 @@ fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
+    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, TD_FLIGHT_STATUS_DATA};
 
     const NOW: Duration = Duration::from_secs(1);
 
@@ -250,27 +236,18 @@ mod tests {
     }
 
     #[test]
-    fn a_falling_clock_is_a_reboot_and_a_late_datagram_is_not() {
-        let at = |ms| {
-            MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA { time_boot_ms: ms, ..Default::default() })
+    fn what_was_known_before_a_reboot_is_forgotten_and_what_the_boot_before_says_is_not_taken() {
+        let status = |boot_number| {
+            MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA { boot_number, ..Default::default() })
         };
         let mut vehicle = Vehicle::default();
-        assert!(!apply(&mut vehicle, &at(60_000), NOW));
-        assert!(!apply(&mut vehicle, &at(59_900), NOW));
-        apply(&mut vehicle, &at_pitch_at(90.0, 60_100), NOW);
-        assert!(apply(&mut vehicle, &at(200), NOW));
-        assert!(vehicle.attitude.is_none(), "what was known before the reboot is forgotten");
-        assert!(!apply(&mut vehicle, &at(300), NOW));
-    }
-
-    fn at_pitch_at(pitch_deg: f64, boot_ms: u32) -> MavMessage {
-        match at_pitch(pitch_deg) {
-            MavMessage::ATTITUDE_QUATERNION(mut data) => {
-                data.time_boot_ms = boot_ms;
-                MavMessage::ATTITUDE_QUATERNION(data)
-            }
-            other => other,
-        }
+        apply(&mut vehicle, &status(1), NOW);
+        apply(&mut vehicle, &at_pitch(90.0), NOW);
+        assert!(apply(&mut vehicle, &status(2), NOW));
+        assert!(vehicle.attitude.is_none() && vehicle.boot.number() == Some(2));
+        let late = 3 * NOW;
+        assert!(!apply(&mut vehicle, &status(1), late));
+        assert_eq!(vehicle.status.map(|status| status.received_at), Some(NOW));
     }
 
     #[test]

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use protocol::dialect::{
     TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock,
-    TdPhase, TdVehicleFlag,
+    TdPhase,
 };
 
+use super::boot::Boot;
 use super::flown::Flown;
 use super::motion::{Attitude, BodySpeed, Motion};
 use super::trend::Trend;
@@ -134,10 +135,10 @@ pub struct Vehicle {
     pub burn: Flown,
     /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
     pub in_space: bool,
-    /// `MAV_MODE_FLAG_HIL_ENABLED`: it says that it is simulated.
-    pub hil: bool,
-    /// The vehicle's clock, ms since its boot.
-    pub last_boot_ms: Option<u32>,
+    /// When it was first heard to have left the pad.
+    pub left_pad_at: Option<Duration>,
+    /// Which boot of it this is.
+    pub boot: Boot,
 }
 
 impl Vehicle {
@@ -159,10 +160,9 @@ impl Vehicle {
         self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
     }
 
-    /// Both of its words say that it is simulated.
+    /// Whether it has always said of itself that nothing of it burns. Unknown counts as not.
     pub fn is_simulated(&self) -> bool {
-        let flag = TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED;
-        self.hil && self.status.as_ref().is_some_and(|status| status.value.vehicle_flags.contains(flag))
+        self.boot.is_simulated()
     }
 
     /// The interlocks, if known.
@@ -202,6 +202,52 @@ impl Vehicle {
         }
     }
 
+    /// Height above the pad, m: of position and velocity while they are heard, else as the descent is steered by it. Every
+    /// place on the screen shows this one.
+    pub fn height_m(&self) -> Option<Sample<f64>> {
+        self.newer(|motion| motion.altitude_m, |descent| descent.height_m)
+    }
+
+    /// Vertical speed, up, m/s; likewise.
+    pub fn vertical_m_s(&self) -> Option<Sample<f64>> {
+        self.newer(|motion| motion.climb_m_s, |descent| descent.vertical_speed_m_s)
+    }
+
+    fn newer(
+        &self,
+        of_motion: fn(&Motion) -> f64,
+        of_descent: fn(&TD_DESCENT_DATA) -> f32,
+    ) -> Option<Sample<f64>> {
+        let motion = self.best_motion().map(|motion| motion.map(of_motion));
+        let descent = self.descent.as_ref().map(|descent| Sample {
+            value: f64::from(of_descent(&descent.value)),
+            received_at: descent.received_at,
+        });
+        let descent = descent.filter(|sample| sample.value.is_finite());
+        match (motion, descent) {
+            (Some(motion), Some(descent))
+                if descent.received_at.saturating_sub(motion.received_at) > STALE_AFTER =>
+            {
+                Some(descent)
+            }
+            (Some(motion), _) => Some(motion),
+            (None, descent) => descent,
+        }
+    }
+
+    /// Time from now until the landing motor is to be lit, s, as old as what it was told by. It runs on between two messages.
+    /// `None` where it will not be lit, or is over.
+    pub fn ignition_in_s(&self, now: Duration) -> Option<Sample<f64>> {
+        let descent = self.descent.as_ref().filter(|_| self.may_light())?;
+        let told_s = f64::from(descent.value.time_to_ignition_s);
+        runs_on(Sample { value: told_s, received_at: descent.received_at }, now)
+    }
+
+    /// Time from now until the plan ends on the ground, s; likewise.
+    pub fn touchdown_in_s(&self, now: Duration) -> Option<Sample<f64>> {
+        runs_on(self.prediction?.map(|prediction| prediction.time_to_go_s), now)
+    }
+
     /// Speeds along the body's axes, as old as the older of attitude and velocity.
     pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
         let (attitude, motion) = (self.attitude?, self.motion?);
@@ -214,6 +260,11 @@ impl Vehicle {
         let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
         self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
     }
+}
+
+fn runs_on(told_s: Sample<f64>, now: Duration) -> Option<Sample<f64>> {
+    let left_s = told_s.value - told_s.age(now).as_secs_f64();
+    (left_s.is_finite() && left_s >= 0.0).then_some(Sample { value: left_s, ..told_s })
 }
 
 /// Between leaving the pad and coming to rest.

@@ -10,6 +10,11 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
+/// A boot's number, in the fewest characters.
+pub fn boot(number: u32) -> String {
+    format!("{number:08X}")
+}
+
 /// The phase of a name, in any case.
 pub fn phase_from_name(name: &str) -> Option<TdPhase> {
     (0..=u32::from(u8::MAX))

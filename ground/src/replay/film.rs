@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use protocol::dialect::{MavMessage, TdPhase};
 use protocol::frame::Frame;
+use protocol::identity::Address;
 
 pub use super::footage::Scene;
 use super::footage::{Footage, Side};

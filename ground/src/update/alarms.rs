@@ -5,13 +5,14 @@ use std::time::Duration;
 use protocol::dialect::{TdControlLevel, TdInterlock, TdPhase};
 
 use super::Action;
-use crate::model::Model;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::{Acknowledged, CommandKind};
-use crate::model::link::LinkState;
+use crate::model::link::{LinkState, RED_AFTER};
+use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::{Model, Role};
 
-/// An abort that was sent more often than this without an answer is an alarm.
-const UNANSWERED_ATTEMPTS: u32 = 3;
+/// An abort without an answer for this long is an alarm.
+const UNANSWERED_FOR: Duration = Duration::from_secs(1);
 /// Under thrust, until the first plan acts: the stabiliser bridges that by design.
 const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
 /// A reboot is an alarm for this long, and until it is acknowledged.
@@ -34,6 +35,11 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     if let LinkState::Lost(_) = model.link.state(now) {
         found.push((AlarmKind::LinkLost, "LINK LOST: the vehicle is not heard".to_owned()));
     }
+    if is_unheard(model, now) {
+        let why = model.link.uplink.why_unheard();
+        let text = format!("UPLINK LOST: the vehicle does not hear this station; {why}");
+        found.push((AlarmKind::UplinkLost, text));
+    }
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
@@ -48,6 +54,28 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     }
 }
 
+/// The vehicle is heard, and so it is known that it does not hear.
+fn is_unheard(model: &Model, now: Duration) -> bool {
+    // What it told before a silence says nothing of now: it has this long to tell.
+    let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    let silent = match model.link.uplink.state(now) {
+        LinkState::Lost(_) | LinkState::NeverHeard => heard_for > RED_AFTER,
+        LinkState::Alive(_) | LinkState::Doubtful(_) => false,
+    };
+    // While nothing comes down, nobody tells: what is known already stays.
+    let told = match model.link.state(now) {
+        LinkState::Alive(_) => true,
+        LinkState::Doubtful(_) => {
+            let mut alarms = model.alarms.list().iter();
+            alarms.any(|alarm| alarm.kind == AlarmKind::UplinkLost && alarm.is_active())
+        }
+        LinkState::NeverHeard | LinkState::Lost(_) => false,
+    };
+    // A flight that was recorded before vehicles told of it has no uplink to lose.
+    let recorded = model.settings.role == Role::Replaying && !model.link.uplink.is_told();
+    silent && told && !recorded
+}
+
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
     for track in &model.commands.tracks {
         let name = track.kind.name();
@@ -55,7 +83,8 @@ fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
             found.push((AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED")));
         }
         let waits = matches!(track.acknowledged, Acknowledged::Waiting | Acknowledged::Nothing);
-        if track.kind == CommandKind::Abort && waits && track.attempts >= UNANSWERED_ATTEMPTS {
+        let waited = now.saturating_sub(track.commanded_at);
+        if track.kind == CommandKind::Abort && waits && waited >= UNANSWERED_FOR {
             found.push((AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated")));
         } else if track.acknowledged == Acknowledged::Nothing && !track.not_observed_said {
             found.push((AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged")));
@@ -70,6 +99,12 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     let vehicle = &model.vehicle;
     if model.rebooted_at.is_some_and(|at| now.saturating_sub(at) < REBOOT_SHOWN) {
         found.push((AlarmKind::Rebooted, "the vehicle has REBOOTED".to_owned()));
+    }
+    if let Some(away) = KeepAway::of(vehicle).filter(|away| is_live(away.danger)) {
+        found.push((AlarmKind::LiveMotor, away.words()));
+    }
+    if let Some(words) = hold_words(vehicle, model.link.uplink.commands) {
+        found.push((AlarmKind::Held, words));
     }
     if let Some(locks) = vehicle.interlocks() {
         let latched = [
@@ -105,4 +140,8 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(names) = vehicle.prediction.and_then(|prediction| prediction.value.touchdown.violations()) {
         found.push((AlarmKind::PlanOutside, format!("plan ends OUTSIDE {names}")));
     }
+}
+
+fn is_live(danger: Danger) -> bool {
+    matches!(danger, Danger::Live | Danger::LiveWaited)
 }

@@ -95,6 +95,8 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
         Some("the vehicle no longer says how its checks stand".to_owned())
     } else if !failing.is_empty() {
         Some(format!("failing checks: {}", failing.join(", ")))
+    } else if !model.link.uplink.is_proven(now) {
+        Some(format!("the uplink is not proven: {}", model.link.uplink.why_unheard()))
     } else if status.value.phase != TdPhase::TD_PHASE_PAD_IDLE {
         Some(format!("phase {}", words::phase(status.value.phase)))
     } else if status.received_at < not_before {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::command::{ANSWER_TIMEOUT, CommandAnswer, CommandEvent, Ticket, result_words};
+use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
 use protocol::log::record::EventLevel;
 
@@ -12,10 +12,13 @@ use crate::model::events::Speaker;
 use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model};
 
+/// Of an abort's many attempts, the first is said and each of so many.
+const ABORT_SAID_EVERY: u32 = 20;
+
 /// Asks the vehicle, and begins to follow what becomes of it.
 pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {
     let commands = &mut model.commands;
-    let aborting = commands.of(CommandKind::Abort).is_some_and(|track| is_open(track.acknowledged));
+    let aborting = commands.is_aborting();
     if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
         // An abort or a disarming ends whatever else is still being resent: a start that arrives
         // after it would undo it. Nor will its effect be seen; nobody needs to be told.
@@ -45,9 +48,6 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         ticket,
         not_observed_said: false,
     });
-    if kind == CommandKind::Abort {
-        commands.abort_again_at = None;
-    }
     model.outcome.refusal = None;
     poll(model, now);
 }
@@ -64,10 +64,6 @@ fn is_open(acknowledged: Acknowledged) -> bool {
 
 /// Sends what is due and takes note of what happened.
 pub(super) fn poll(model: &mut Model, now: Duration) {
-    if model.commands.abort_again_at.is_some_and(|at| now >= at) {
-        model.commands.abort_again_at = None;
-        send(model, CommandKind::Abort, now);
-    }
     let messages = model.commands.sender.poll(now);
     model.outbox.extend(messages.into_iter().map(Action::send));
     for event in model.commands.sender.take_events() {
@@ -112,8 +108,16 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
-            track.acknowledged = Acknowledged::Waiting;
-            ("commanded", EventLevel::Info, format!("{name} commanded, attempt {}{by}", track.attempts))
+            let attempt = track.attempts;
+            if kind == CommandKind::Abort && attempt > 1 {
+                // Answered or not, it goes on; and so many lines would drown everything else.
+                if attempt % ABORT_SAID_EVERY != 0 {
+                    return;
+                }
+            } else {
+                track.acknowledged = Acknowledged::Waiting;
+            }
+            ("commanded", EventLevel::Info, format!("{name} commanded, attempt {attempt}{by}"))
         }
         CommandEvent::InProgress { .. } => {
             track.acknowledged = Acknowledged::InProgress;
@@ -144,8 +148,6 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     model.say(now, Speaker::Ground, level, text);
     if let Some(result) = answered {
         on_final_answer(model, kind, result, now);
-    } else if kind == CommandKind::Abort && matches!(event, CommandEvent::TimedOut { .. }) {
-        model.commands.abort_again_at = Some(now);
     }
 }
 
@@ -157,16 +159,49 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
         CommandKind::Arm | CommandKind::Start if refused => {
             model.outcome.refusal = Some((format!("{} {}", kind.name(), result_words(result)), now));
         }
-        // "Not now" is no answer to an abort.
+        // "Not now" is no answer to an abort: it goes on.
         CommandKind::Abort if for_now => {
-            model.commands.abort_again_at = Some(now + ANSWER_TIMEOUT);
             if let Some(track) = model.commands.tracks.iter_mut().find(|track| track.kind == kind) {
                 track.acknowledged = Acknowledged::Waiting;
                 track.acknowledged_at = None;
             }
         }
+        // There is nothing to abort, or it will not be done: more of them change nothing.
+        CommandKind::Abort if refused => stop_aborting(model, now),
+        CommandKind::Abort => stop_if_latched(model, now),
         _ => {}
     }
+}
+
+/// An abort is sent until both are there, the latch in the vehicle's own state and an answer.
+fn stop_if_latched(model: &mut Model, now: Duration) {
+    let done = model.commands.of(CommandKind::Abort).is_some_and(|track| {
+        let answered = matches!(track.acknowledged, Acknowledged::Answered(_));
+        answered && track.observed_at.is_some()
+    });
+    if done {
+        stop_aborting(model, now);
+    }
+}
+
+fn stop_aborting(model: &mut Model, now: Duration) {
+    if let Some(ticket) = model.commands.of(CommandKind::Abort).map(|track| track.ticket) {
+        model.commands.sender.withdraw_one(ticket, now);
+    }
+}
+
+/// The vehicle has begun anew: an abort that was under way is meant for it still, and nothing else is. What was
+/// acknowledged and observed was so by a vehicle that is no more. Returns what is void.
+pub(super) fn begin_anew(model: &mut Model, now: Duration) -> Vec<&'static str> {
+    let aborting = model.commands.is_aborting();
+    let by = model.commands.of(CommandKind::Abort).map(|track| track.by.clone()).unwrap_or_default();
+    model.commands.sender.withdraw_all(now);
+    let void = model.commands.tracks.iter().map(|track| track.kind.name()).collect();
+    model.commands.tracks.clear();
+    if aborting {
+        submit(model, CommandKind::Abort, by, now);
+    }
+    void
 }
 
 /// Compares the vehicle's own state with what was asked.
@@ -192,4 +227,5 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         keys::record_operator(model, "observed", &text, now);
         model.say(now, Speaker::Ground, level, text);
     }
+    stop_if_latched(model, now);
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TdPhase};
-use protocol::identity::VEHICLE;
+use protocol::identity::Address;
 
 use super::{Action, keys};
 use crate::model::Model;
@@ -34,7 +34,7 @@ pub(super) fn step(model: &mut Model, now: Duration) {
         }
     };
     if now + HALF_A_TICK >= due {
-        model.outbox.push(Action::send(hold()));
+        model.outbox.push(Action::send(hold(model.settings.vehicle)));
         model.crew.hold_due = Some(now + HOLD_EVERY);
     }
 }
@@ -50,11 +50,11 @@ fn armed_here(model: &Model) -> bool {
     arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())
 }
 
-fn hold() -> MavMessage {
+fn hold(vehicle: Address) -> MavMessage {
     MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         command: MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
-        target_system: VEHICLE.system_id,
-        target_component: VEHICLE.component_id,
+        target_system: vehicle.system_id,
+        target_component: vehicle.component_id,
         ..COMMAND_LONG_DATA::default()
     })
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::command::CommandAnswer;
-use protocol::dialect::{MavMessage, TIMESYNC_DATA};
+use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA};
 use protocol::frame::Frame;
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
@@ -57,6 +57,7 @@ fn note_stranger(model: &mut Model, source: Address, now: Duration) {
 }
 
 fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
+    model.link.heard_at = Some(now);
     if let Some(answer) = CommandAnswer::from_frame(frame) {
         if model.settings.us.accepts(answer.target) {
             commands::on_answer(model, answer, now);
@@ -79,10 +80,10 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             return;
         }
         MavMessage::PARAM_VALUE(data) => return model.parameters.take(data),
+        MavMessage::TD_UPLINK(data) => return on_uplink(model, data, now),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
             model.link.first_heartbeat_at.get_or_insert(now);
-            model.link.heartbeat_at = Some(now);
             if std::mem::take(&mut model.link.lost_said) {
                 model.info(now, "link restored: the vehicle is heard again");
             }
@@ -123,6 +124,15 @@ pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }
 
+/// What the vehicle hears of a station. Addressed to nobody it is of everybody: nothing of any was accepted yet.
+fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
+    if model.settings.us.accepts(Address { system_id: data.target_system, component_id: data.target_component }) {
+        model.link.uplink.hear(data, now);
+    } else {
+        model.link.uplink.overhear(data);
+    }
+}
+
 fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
     let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
     // Another's question is its own to ask, and another's answer is measured by its clock.
@@ -142,6 +152,7 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
         // Anything older answers a question that was given up.
         if round_trip < Duration::from_secs(10) {
             model.link.round_trip = Some(round_trip);
+            model.link.uplink.answered(now.saturating_sub(round_trip));
         }
     }
 }

@@ -13,6 +13,7 @@ use protocol::log::v1::OperatorAction;
 use super::{Action, commands};
 use crate::attach::codec::Asked;
 use crate::key::Key;
+use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
 use crate::model::hand::{FINGERS_APART, Touch};
@@ -197,11 +198,9 @@ fn on_page_key(model: &mut Model, key: Key, now: Duration) {
         Key::Escape | Key::Char('0') => model.pages.hold(None),
         Key::Char('h' | 'H') if model.pages.held.is_some() => model.pages.hold(None),
         Key::Char('h' | 'H') => model.pages.hold(Some(shown)),
-        Key::Char(' ') if model.settings.role == Role::Attached => {
-            model.outbox.push(Action::Request(Asked::Acknowledge));
-        }
-        Key::Char(' ') => acknowledge(model, now),
+        Key::Char(' ') => see_alarm(model, now),
         Key::Char('r') if shown == Page::Parameters => ask_parameters(model),
+        Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
@@ -276,11 +275,32 @@ fn on_its_way(model: &Model, kind: CommandKind, now: Duration) -> Option<String>
     Some(format!("{} is on its way already{}", kind.name(), track.by.in_brackets()))
 }
 
-pub(super) fn acknowledge(model: &mut Model, now: Duration) {
-    let seen = model.alarms.acknowledge();
-    if seen > 0 {
-        model.info(now, format!("alarms acknowledged: {seen}"));
+/// The one alarm that the screen points at was seen: in the alarm line, or the chosen one of the list.
+fn see_alarm(model: &mut Model, now: Duration) {
+    let Some(kind) = model.pointed_at().map(|alarm| alarm.kind) else { return };
+    if model.settings.role == Role::Attached {
+        model.outbox.push(Action::Request(Asked::Acknowledge(kind)));
+    } else {
+        acknowledge(model, kind, now);
     }
+}
+
+pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
+    if let Some(text) = model.alarms.acknowledge(kind) {
+        model.info(now, format!("alarm acknowledged: {text}"));
+    }
+}
+
+/// Points at the next alarm of the list, or the one before.
+fn choose_alarm(model: &mut Model, up: bool) {
+    let list = model.alarms.list();
+    let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
+    let next = match at {
+        Some(at) if up => at.saturating_sub(1),
+        Some(at) => (at + 1).min(list.len() - 1),
+        None => return,
+    };
+    model.pages.chosen = Some(list[next].kind);
 }
 
 /// Why arming is not even asked for. The vehicle's own checks are the vehicle's to refuse, in its words.
@@ -290,6 +310,10 @@ fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     }
     if model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("armed already".to_owned());
+    }
+    if !model.link.uplink.is_proven(now) {
+        let why = model.link.uplink.why_unheard();
+        return Some(format!("the uplink is not proven: {why}"));
     }
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());

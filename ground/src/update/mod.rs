@@ -20,6 +20,7 @@ use protocol::signing::SigningCounters;
 
 use crate::attach::codec::Asked;
 use crate::key::Key;
+use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
@@ -50,8 +51,8 @@ pub enum Msg {
     Crew(Vec<Seat>),
     /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station goes on.
     ScreenQuit,
-    /// The crew has seen the alarms, on a screen elsewhere.
-    Acknowledged,
+    /// The crew has seen this alarm, on a screen elsewhere.
+    Acknowledged(AlarmKind),
     /// A screen elsewhere wants the parameters.
     ParametersWanted,
     /// Time passes on a screen whose station runs elsewhere: its dialogs and chord expire.
@@ -147,7 +148,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.crew.sit(seats, now);
             model.info(now, model.crew.words());
         }
-        Msg::Acknowledged => keys::acknowledge(model, now),
+        Msg::Acknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => {
             keys::expire(model, now);

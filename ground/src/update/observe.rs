@@ -2,16 +2,20 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TdHold, TdMotor, TdPhase};
 use protocol::log::record::EventLevel;
 
 use super::{Action, commands};
-use crate::model::command::{CommandKind, is_aborted};
+use crate::model::command::is_aborted;
+use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::flown::Flown;
 use crate::model::history::{History, Maxima};
+use crate::model::judgement::Standard;
+use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::outcome::Outcome;
 use crate::model::parameters::Parameters;
+use crate::model::uplink::Uplink;
 use crate::model::vehicle::{Vehicle, Verdict, is_flight};
 use crate::model::{Model, words};
 
@@ -22,6 +26,8 @@ pub(super) struct Facts {
     armed: Option<bool>,
     counting: bool,
     aborted: bool,
+    hold: Option<TdHold>,
+    danger: Option<Danger>,
     verdict: Option<Verdict>,
 }
 
@@ -33,24 +39,31 @@ impl Facts {
             armed: vehicle.armed().map(|armed| armed.value),
             counting: on_pad && vehicle.countdown_s().is_some(),
             aborted: vehicle.interlocks().is_some_and(is_aborted),
+            hold: vehicle.status.as_ref().map(|status| status.value.hold),
+            danger: KeepAway::of(vehicle).map(|away| away.danger),
             verdict: vehicle.verdict.map(|verdict| verdict.value),
         }
     }
 }
 
 pub(super) fn on_reboot(model: &mut Model, now: Duration) {
-    model.warn(now, "the vehicle has rebooted: everything known of it before is forgotten");
+    let number = model.vehicle.boot.number();
+    let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
+    let text = format!("the vehicle has rebooted{which}: everything known of it before is forgotten");
+    model.warn(now, text);
     model.outcome = Outcome { error: model.outcome.error.take(), ..Outcome::default() };
     model.history = History::default();
     model.parameters = Parameters::default();
+    model.link.uplink = Uplink::default();
+    model.link.round_trip = None;
+    model.alarms.vehicle_is_another(now);
     model.rebooted_at = Some(now);
-    // What was asked of the vehicle before its reboot is not asked of it afterwards; an abort is.
-    let aborting = model.commands.is_aborting();
-    model.commands.sender.withdraw_all(now);
-    model.commands.tracks.retain(|track| track.kind == CommandKind::Abort && aborting);
-    if aborting {
-        model.commands.abort_again_at = Some(now);
-        commands::poll(model, now);
+    // What was offered, was offered for the boot before.
+    model.dialog = Dialog::Closed;
+    let void = commands::begin_anew(model, now);
+    if !void.is_empty() {
+        let void = void.join(", ");
+        model.warn(now, format!("void since the reboot, whatever was acknowledged or observed: {void}"));
     }
 }
 
@@ -82,6 +95,29 @@ pub(super) fn on_change(model: &mut Model, before: Facts, now: Duration) {
     {
         on_verdict(model, &verdict, now);
     }
+    if after.hold != before.hold
+        && let Some(text) = hold_words(&model.vehicle, model.link.uplink.commands)
+    {
+        model.say(now, Speaker::Ground, EventLevel::Error, text);
+        model.outbox.push(Action::SyncLog);
+    }
+    if after.danger != before.danger {
+        on_danger(model, now);
+    }
+}
+
+/// Whoever reads the log or the lines later must find when nobody was to come near, and until when.
+fn on_danger(model: &mut Model, now: Duration) {
+    if let Some(away) = KeepAway::of(&model.vehicle) {
+        let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
+        return model.say(now, Speaker::Ground, level, away.words());
+    }
+    let safe = match model.vehicle.status.as_ref().map(|status| status.value.motor) {
+        Some(TdMotor::TD_MOTOR_PIN_IN) => "the pin is in: the vehicle may be approached",
+        Some(TdMotor::TD_MOTOR_BURNT) => "the motor is burnt out and cool: the vehicle may be approached",
+        _ => "the waiting time is over",
+    };
+    model.info(now, safe);
 }
 
 fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
@@ -106,7 +142,10 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
 
 fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
     let (level, text) = match (verdict.landed, verdict.touchdown.violations()) {
-        (true, _) => (EventLevel::Info, "LANDED inside every limit".to_owned()),
+        (true, _) => {
+            let whose = Standard::whose(model.vehicle.limits.as_ref());
+            (EventLevel::Info, format!("LANDED inside every limit of {whose}"))
+        }
         (false, Some(names)) => (EventLevel::Error, format!("NOT LANDED: outside {names}")),
         (false, None) => (EventLevel::Error, "NOT LANDED".to_owned()),
     };

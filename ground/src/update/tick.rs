@@ -10,12 +10,18 @@ use protocol::log::v1::Telemetry;
 
 use super::{Action, auto, commands, crew, frames, keys};
 use crate::model::Model;
+use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link::LinkState;
-use crate::model::vehicle::Deflection;
+use crate::model::vehicle::{Deflection, is_on_pad};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
+/// A vehicle that is armed holds its countdown when it hears nothing for 2 s: of twenty heartbeats that each have one
+/// chance in two, all are lost once in a million times.
+const HURRIED_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
+/// While its answer alone shows that the vehicle hears this station.
+const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
 /// Without a screen: how long after a flight its last words are waited for.
 const LAST_WORDS: Duration = Duration::from_secs(2);
@@ -27,7 +33,9 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     keys::pass_abort_chord(model, now);
     keys::pass_quit(model, now);
     heartbeat(model, now);
-    if model.link.heartbeat_at.is_some() && is_due(&mut model.due.timesync, TIMESYNC_EVERY, now) {
+    let known = model.link.first_heartbeat_at.is_some();
+    let timesync_every = if model.link.uplink.is_told() { TIMESYNC_EVERY } else { PROVING_TIMESYNC_EVERY };
+    if known && is_due(&mut model.due.timesync, timesync_every, now) {
         let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
         model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
             tc1: 0,
@@ -40,15 +48,13 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         frames::say_text(model, &text, now);
     }
     note_loss(model, now);
-    let silence = model.link.heartbeat_at.map(|at| now.saturating_sub(at));
+    let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
     auto::step(model, now);
     commands::poll(model, now);
     commands::observe(model, now);
     crew::step(model, now);
-    if model.link.heartbeat_at.is_some()
-        && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now)
-    {
+    if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
         let telemetry = telemetry_record(model, now);
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));
     }
@@ -60,17 +66,28 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
 }
 
+/// Counted from the time that it was due: a clock that looks late now and then makes nothing rarer.
 fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
+    *due = (*due).min(now + every);
     if now < *due {
         return false;
     }
-    *due = now + every;
+    *due = (*due + every).max(now + every / 2);
     true
+}
+
+/// Whether the vehicle must hear this station all the time: it is armed on its pad, or is about to be.
+fn must_be_heard(model: &Model, now: Duration) -> bool {
+    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
+    let on_pad = model.vehicle.phase().is_some_and(|phase| is_on_pad(phase.value));
+    let arming = matches!(model.dialog, Dialog::Arm { .. });
+    model.link.state(now).carries() && on_pad && (armed || arming)
 }
 
 /// Sent from the loop that it vouches for: a ground that hangs sends none.
 fn heartbeat(model: &mut Model, now: Duration) {
-    if is_due(&mut model.due.heartbeat, HEARTBEAT_EVERY, now) {
+    let every = if must_be_heard(model, now) { HURRIED_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
+    if is_due(&mut model.due.heartbeat, every, now) {
         model.outbox.push(Action::send(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: 0,
             mavtype: MavType::MAV_TYPE_GCS,
@@ -83,11 +100,13 @@ fn heartbeat(model: &mut Model, now: Duration) {
 }
 
 fn note_loss(model: &mut Model, now: Duration) {
+    let since = model.link.alive_since.unwrap_or(now);
+    model.link.alive_since = model.link.state(now).carries().then_some(since);
     if let LinkState::Lost(age) = model.link.state(now)
         && !model.link.lost_said
     {
         model.link.lost_said = true;
-        let text = format!("LINK LOST: no heartbeat for {:.1} s", age.as_secs_f64());
+        let text = format!("LINK LOST: the vehicle is not heard for {:.1} s", age.as_secs_f64());
         model.say(now, Speaker::Ground, EventLevel::Error, text);
     }
 }
@@ -153,8 +172,8 @@ fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
         solver_status: controller.map(|controller| controller.solver_status as u32),
         iterations: controller.map(|controller| u32::from(controller.iterations)),
         solve_time_s: controller.map(|controller| f64::from(controller.solve_time_us) * 1e-6),
-        link_age_s: model.link.heartbeat_at.map(|at| now.saturating_sub(at).as_secs_f64()),
-        link_loss: Some(link.loss),
+        link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
+        link_loss: model.link.loss(now),
         link_rx_bytes_s: Some(link.rx_bytes_s),
     }
 }

@@ -78,7 +78,8 @@ fn plane_rows(
     let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
     let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
     let text = |value: Option<f64>| value.map_or_else(|| "--".to_owned(), |value| fixed(value, 1));
-    let stop = limit_deg.map_or_else(String::new, |limit| format!(" ±{}", shortest(limit)));
+    let stop =
+        limit_deg.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
     vec![
         Line::from(vec![
             Span::styled(format!(" {name:<5}"), theme.style(Role::Label)),

@@ -3,25 +3,36 @@
 use std::time::Duration;
 
 use protocol::log::record::EventLevel;
-use ratatui::text::Line;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
 
-use super::number::{seconds, shortest};
+use super::number::shortest;
 use super::theme::{Role, Theme};
+use crate::model::alarm::Alarm;
 use crate::model::{Model, Playing};
 
-/// The foremost alarm; without one, what happened last.
-pub fn line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+/// The key that acknowledges the alarm of the line.
+const KEY: &str = " Space: seen ";
+/// Narrower than this, there is room for the alarm alone.
+const KEY_FROM_COLUMNS: usize = 40;
+/// Less of its text would say nothing.
+const TEXT_COLUMNS_MIN: usize = 12;
+
+/// Draws the foremost alarm; without one, what happened last. The key has a place of its own, which no text takes.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if let Some(playing) = model.playing {
-        return replay(playing, theme);
+        return frame.render_widget(replay(playing, theme), area);
     }
-    if let Some(alarm) = alarm(model, theme, now) {
-        return alarm;
+    if let Some(alarm) = alarm(model, theme, now, usize::from(area.width)) {
+        return frame.render_widget(alarm, area);
     }
-    model.events.newest(1).next().map_or_else(Line::default, |event| {
+    let last = model.events.newest(1).next().map_or_else(Line::default, |event| {
         let role = if event.level == EventLevel::Info { Role::Label } else { Role::Plain };
         let head = format!(" {:.1} ", event.at.as_secs_f64());
         Line::styled(format!("{head}{}{}", event.mark().trim_start(), event.text), theme.style(role))
-    })
+    });
+    frame.render_widget(last, area);
 }
 
 /// Where a replay is, and its keys.
@@ -37,23 +48,60 @@ pub fn replay(playing: Playing, theme: Theme) -> Line<'static> {
     )
 }
 
-/// The foremost alarm, how many more there are, and the key that acknowledges them.
-pub fn alarm(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+/// The foremost alarm, its age and how many more there are. The text is cut to what they leave; while it is new, the key that
+/// acknowledges it stands at the end of the line, cut by nothing.
+pub fn alarm(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let alarm = model.alarms.foremost()?;
     let more = match model.alarms.list().len() {
         1 => String::new(),
-        count => format!(" (+{} more)", count - 1),
+        count => format!(" (+{})", count - 1),
     };
-    let age = seconds(now.saturating_sub(alarm.raised_at));
-    let line = if alarm.past && !alarm.acknowledged {
-        let text = format!(" past alarm: {}, raised {age} ago{more}  Space: seen", alarm.text);
-        Line::styled(text, theme.style(Role::Caution))
-    } else if alarm.acknowledged {
-        Line::styled(format!(" alarm seen: {} {age}{more}", alarm.text), theme.style(Role::Caution))
-    } else {
-        let over = if alarm.active { "" } else { ", over" };
-        let text = format!(" ALARM {}{over} {age}{more}  Space: seen", alarm.text);
-        Line::styled(text, theme.style(Role::Alarm))
+    let key = if alarm.acknowledged || columns < KEY_FROM_COLUMNS { "" } else { KEY };
+    let State { word, age, role } = state(alarm, now);
+    let taken = 1 + word.len() + 1 + 1 + age.len() + more.len() + key.len();
+    // On the narrowest screens the words come before their age.
+    let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
+    let text = cut(&alarm.text, room);
+    let line = format!(" {word} {text} {age}{more}");
+    let columns = columns.saturating_sub(key.len());
+    let mut spans = vec![Span::styled(format!("{line:<columns$}"), theme.style(role))];
+    if !key.is_empty() {
+        spans.push(Span::styled(key, theme.style(Role::Key)));
+    }
+    Some(Line::from(spans))
+}
+
+/// What is true of an alarm now.
+pub struct State {
+    /// Whether it holds, and whether a person has seen it.
+    pub word: &'static str,
+    /// For how long, or since when no more. Whole seconds: nobody reads tenths of them here.
+    pub age: String,
+    /// How it looks.
+    pub role: Role,
+}
+
+/// What is true of an alarm now, in words.
+pub fn state(alarm: &Alarm, now: Duration) -> State {
+    let since = |at: Duration| now.saturating_sub(at).as_secs();
+    let (word, role) = match alarm.ended_at {
+        None if alarm.acknowledged => ("alarm seen:", Role::Caution),
+        None => ("ALARM", Role::Alarm),
+        Some(_) if alarm.past => ("past alarm:", Role::Caution),
+        Some(_) => ("ended alarm:", Role::Caution),
     };
-    Some(line)
+    let age = match alarm.ended_at {
+        None => format!("{} s", since(alarm.raised_at)),
+        Some(at) => format!("ended {} s ago", since(at)),
+    };
+    State { word, age, role }
+}
+
+/// So many columns of a text; what is cut ends in a mark.
+pub fn cut(text: &str, columns: usize) -> String {
+    if text.chars().count() <= columns {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(columns.saturating_sub(2)).collect();
+    format!("{kept}..")
 }

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use super::number::{age_mark, fixed};
 use super::theme::{Role, Theme};
 use crate::model::Model;
-use crate::model::reckoning::reckon;
+use crate::model::reckoning::{is_unheard, reckon};
 
 /// The scale reaches at least this high, m.
 const TOP_MIN_M: f64 = 25.0;
@@ -22,20 +22,20 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
     let descent = model.vehicle.descent.as_ref();
     // A motor that will not be lit has no band.
     let to_light = descent.filter(|_| model.vehicle.may_light());
-    let motion = model.vehicle.best_motion();
     let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
     let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
     let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
     let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
     let lost = reckon(&model.vehicle, now);
-    let (height, mark, role) = match (lost, motion) {
-        (Some(at), _) => (finite(at.altitude_m), "?", Role::Stale),
-        (None, Some(motion)) => {
-            let (mark, role) = age_mark(&motion, now);
-            (finite(motion.value.altitude_m.max(0.0)), mark, role)
+    let (height, mark, role) = match (lost, model.vehicle.height_m()) {
+        (Some(at), _) => (finite(at.altitude_m), "pred ", Role::Stale),
+        (None, Some(height)) if !is_unheard(&model.vehicle, now) => {
+            let (mark, role) = age_mark(&height, now);
+            (finite(height.value.max(0.0)), mark, role)
         }
-        (None, None) => (None, " ", Role::Label),
+        // Nothing is known of where it can be.
+        (None, _) => (None, " ", Role::Label),
     };
     let marks = [height, band.map(|band| band.1), chosen, commit];
     let top = top_m(marks.into_iter().flatten().fold(0.0, f64::max));

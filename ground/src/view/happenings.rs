@@ -88,7 +88,8 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         Some(round_trip) => format!("{:.0} ms", round_trip.as_secs_f64() * 1_000.0),
         None => "--".to_owned(),
     };
-    let loss_role = if figures.loss > 0.05 { Role::Caution } else { Role::Plain };
+    let loss = model.link.loss(now);
+    let loss_role = if loss.is_some_and(|loss| loss > 0.05) { Role::Caution } else { Role::Plain };
     let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
     let rejected =
         model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
@@ -98,7 +99,7 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
     let refused = (rejected > 0 || model.link.send_drops > 0)
         .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), Role::Caution));
     // In the order of their weight; what comes first has room in the narrowest panel.
-    let mut pieces = vec![received, span(format!("  loss {:.1} %", figures.loss * 100.0), loss_role)];
+    let mut pieces = vec![received, span(format!("  loss {}", percent(loss)), loss_role)];
     pieces.push(log(model, theme));
     pieces.extend(refused);
     pieces.push(span(format!("  rtt {round_trip}"), Role::Plain));
@@ -110,6 +111,11 @@ pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         used <= columns
     };
     Line::from(pieces.into_iter().take_while(fits).collect::<Vec<_>>())
+}
+
+/// A share that was lost; where nothing arrives, nobody can tell.
+pub fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "unknown".to_owned(), |share| format!("{:.1} %", share * 100.0))
 }
 
 /// What a radio says of itself: signal and noise, here and at the other end, in its own units.
@@ -130,12 +136,12 @@ fn known(value: u8) -> String {
 
 /// Several links to one vehicle: what is left of the loss, and each link by itself as far as there is room.
 fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    let all = model.link.stats.figures(now);
+    let all = model.link.loss(now);
     let role = |loss: f64| if loss > 0.05 { Role::Caution } else { Role::Plain };
     let mut spans = vec![
         Span::styled(
-            format!(" {} links, loss {:.1} %", model.link.reports.len(), all.loss * 100.0),
-            theme.style(role(all.loss)),
+            format!(" {} links, loss {}", model.link.reports.len(), percent(all)),
+            theme.style(role(all.unwrap_or(0.0))),
         ),
         log(model, theme),
     ];
@@ -151,7 +157,8 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         } else {
             let (rate, loss) = (report.figures.rx_bytes_s, report.figures.loss);
             let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-            let words = format!("  {kind} {rate:.0}{capacity} B/s {:.1} %", loss * 100.0);
+            let known = (report.figures.rx_frames_s > 0.0).then_some(loss);
+            let words = format!("  {kind} {rate:.0}{capacity} B/s {}", percent(known));
             Span::styled(words, theme.style(role(loss)))
         };
         used += span.width();

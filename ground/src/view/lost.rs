@@ -7,21 +7,29 @@ use ratatui::text::{Line, Span};
 use super::number::{fixed, seconds};
 use super::theme::{Role, Theme};
 use crate::model::Model;
-use crate::model::reckoning::{By, reckon};
+use crate::model::reckoning::{By, is_unheard, reckon};
 
-/// Whether only a prediction is left of the flight.
+/// Whether only a prediction is left of the flight, or not even that.
 pub fn is_lost(model: &Model, now: Duration) -> bool {
-    reckon(&model.vehicle, now).is_some()
+    is_unheard(&model.vehicle, now)
 }
 
 /// The prediction's rows.
 pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let Some(at) = reckon(&model.vehicle, now) else { return Vec::new() };
+    if !is_lost(model, now) {
+        return Vec::new();
+    }
+    let Some(at) = reckon(&model.vehicle, now) else {
+        return vec![
+            Line::styled(" position unknown:", theme.style(Role::Alarm)),
+            Line::styled(" not heard since the pad", theme.style(Role::Caution)),
+        ];
+    };
     let row = |label: &str, value: f64| {
         Line::from(vec![
-            Span::styled(format!(" {label:<6}"), theme.style(Role::Label)),
+            Span::styled(format!(" {label:<6}pred"), theme.style(Role::Label)),
             Span::styled(
-                format!("?{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1)),
+                theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1))),
                 theme.style(Role::Stale),
             ),
         ])

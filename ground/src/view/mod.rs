@@ -1,6 +1,6 @@
 //! The screen: one pure function from the model and the time to a frame.
 //!
-//! The top lines (phase, armed, countdown, link, abort key and what an abort would do) stand in the
+//! Who sits where ([`identity`]) is the first line. The top lines (phase, armed, countdown, link, abort key and what an abort would do) stand in the
 //! same place on every screen and under every dialog; so do the alarm line and the screens' names. One room
 //! a screen is in [`pages`]. From 80x24 on the panels are laid out side by side ([`wide`]); on anything
 //! smaller the same facts come as lines, the most important first ([`compact`]). A terminal without Unicode
@@ -17,6 +17,7 @@ pub mod fins;
 pub mod flight;
 pub mod gauge;
 pub mod happenings;
+pub mod identity;
 pub mod lost;
 pub mod next;
 pub mod number;

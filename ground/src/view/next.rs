@@ -42,12 +42,12 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
         TdPhase::TD_PHASE_IGNITION => words("thrust", " within 0.5 s, or NO LIGHT"),
         TdPhase::TD_PHASE_POWERED => {
-            let left_s = vehicle
-                .prediction
-                .map(|prediction| prediction.value.time_to_go_s - prediction.age(now).as_secs_f64());
+            let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
             Some((format!("touchdown{}", within(left_s)), String::new()))
         }
-        TdPhase::TD_PHASE_TOUCHDOWN => words("at rest", ", then SAFED; stay away until then"),
+        TdPhase::TD_PHASE_TOUCHDOWN => {
+            words("SAFED", " once the motor is burnt out and cool, or the pin is in")
+        }
         TdPhase::TD_PHASE_SAFED => words("nothing", ": the flight is over"),
         TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
     }
@@ -58,7 +58,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
         return ("the ground".to_owned(), ": the motor will NOT be lit".to_owned());
     }
     let descent = vehicle.descent.as_ref();
-    let left_s = descent.map(|d| f64::from(d.value.time_to_ignition_s) - d.age(now).as_secs_f64());
+    let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
     let chosen_m =
         descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
     let at = chosen_m.map_or_else(String::new, |height_m| format!(" at {} m", fixed(height_m, 0)));

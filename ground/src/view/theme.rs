@@ -48,6 +48,11 @@ impl Theme {
         Self { colour, ascii: !unicode || old }
     }
 
+    /// A limit to either side, as this terminal can write it.
+    pub fn either_side(self, text: &str) -> String {
+        if self.ascii { text.replace('±', "+-") } else { text.to_owned() }
+    }
+
     /// The style of a role. Only the 16 basic colours, which the terminal's owner has chosen readable.
     pub fn style(self, role: Role) -> Style {
         let plain = Style::new();

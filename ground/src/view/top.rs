@@ -2,15 +2,14 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TD_FLIGHT_STATUS_DATA;
 use ratatui::text::{Line, Span};
 
 use super::next;
-use super::number::{STALE_MARK, age_mark, seconds};
+use super::number::{STALE_MARK, age_mark};
 use super::theme::{Role, Theme};
 use crate::model::command::{Acknowledged, CommandKind, Track};
 use crate::model::link::LinkState;
-use crate::model::vehicle::Sample;
+use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::{self, Model, too_late, words};
 
 /// In flight, a command whose effect is not seen stands before what happens next for this long. Its alarm stays.
@@ -67,17 +66,31 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// The link, in a word and its age.
-pub fn link(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
-    match model.link.state(now) {
-        LinkState::NeverHeard => Span::styled("link: not heard", theme.style(Role::Caution)),
-        // An age that only counts from heartbeat to heartbeat says nothing, ten times a second.
-        LinkState::Alive(_) => Span::styled("link ok", theme.style(Role::Good)),
-        LinkState::Doubtful(age) => {
-            Span::styled(format!("LINK? {}", seconds(age)), theme.style(Role::Caution))
-        }
-        LinkState::Lost(age) => Span::styled(format!("LINK LOST {}", seconds(age)), theme.style(Role::Alarm)),
+/// Both directions of the link, each with the age of the last frame that arrived on it: that the vehicle is heard does
+/// not say that it hears. Whole seconds, because tenths that only count from heartbeat to heartbeat say nothing.
+pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let down = model.link.state(now);
+    if down == LinkState::NeverHeard {
+        return Line::styled("down: not heard", theme.style(Role::Caution));
     }
+    let direction = |name: &str, loud: &str, state| match state {
+        LinkState::NeverHeard => Span::styled(format!("{loud} NOT PROVEN"), theme.style(Role::Alarm)),
+        LinkState::Alive(age) => Span::styled(format!("{name} {}s", age.as_secs()), theme.style(Role::Good)),
+        LinkState::Doubtful(age) => {
+            Span::styled(format!("{name} late {}s", age.as_secs()), theme.style(Role::Caution))
+        }
+        LinkState::Lost(age) => {
+            Span::styled(format!("{loud} LOST {}s", age.as_secs()), theme.style(Role::Alarm))
+        }
+    };
+    let up = match model.link.uplink.state(now) {
+        // Nobody has told of it since.
+        LinkState::Lost(age) | LinkState::Doubtful(age) if !down.carries() => {
+            Span::styled(format!("{STALE_MARK}up {}s", age.as_secs()), theme.style(Role::Stale))
+        }
+        state => direction("up", "UP", state),
+    };
+    Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up])
 }
 
 /// What an abort would do now, or what became of the one that was asked for.
@@ -106,11 +119,19 @@ fn abort_effect(model: &Model, now: Duration) -> String {
     format!("{mark}{}{reach}", words::abort_effect(&status.value))
 }
 
-/// After an abort on the pad: nobody goes there yet.
-pub fn pad_wait(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let wait_s =
-        model.vehicle.status.as_ref().map(|status| status.value.pad_wait_s).filter(|wait| *wait > 0)?;
-    Some(Line::styled(format!(" STAY OFF THE PAD for {wait_s} s"), theme.style(Role::Alarm)))
+/// That nobody may come near the vehicle, and for how long.
+pub fn keep_away(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let away = KeepAway::of(&model.vehicle)?;
+    let stale = model.vehicle.status.as_ref().is_some_and(|status| status.is_stale(now));
+    let mark = if stale { STALE_MARK } else { " " };
+    let role = if away.danger == Danger::Hot { Role::Caution } else { Role::Alarm };
+    Some(Line::styled(format!("{mark}{}", away.words()), theme.style(role)))
+}
+
+/// That the countdown was held, why, and what follows.
+fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let words = hold_words(&model.vehicle, model.link.uplink.commands)?;
+    Some(Line::styled(words, theme.style(Role::Alarm)))
 }
 
 /// The three facts for narrow screens.
@@ -175,11 +196,19 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// The wait after an abort; else the latest command besides an abort while something is still open about it; else what
-/// happens next; on the pad the latest command, and before the first, whether the vehicle may be armed.
+/// That nobody may come near; else the latest command besides an abort while something is still open about it; else a hold;
+/// else what happens next; on the pad the latest command, and before the first, whether the vehicle may be armed.
 pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(wait) = pad_wait(model, theme) {
-        return wait;
+    if let Some(mut line) = keep_away(model, theme, now) {
+        // Under a parachute both matter: that it comes down and where it is then.
+        let falls = model.vehicle.in_flight().then(|| next::line(model, theme, now)).flatten();
+        line.spans.extend(falls.into_iter().flat_map(|next| next.spans));
+        return line;
+    }
+    if open_command(model, now).is_none()
+        && let Some(hold) = hold(model, theme)
+    {
+        return hold;
     }
     let next = next::line(model, theme, now);
     if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
@@ -189,12 +218,7 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = latest {
         return facts(track, theme, now);
     }
-    model.vehicle.status.as_ref().map_or_else(Line::default, |status| {
-        readiness(status, theme, now).unwrap_or_else(|| {
-            let failing = words::failed_checks(status.value.checks_failed).join(", ");
-            Line::styled(format!(" NO-GO: {failing}"), theme.style(Role::Caution))
-        })
-    })
+    readiness(model, theme, now).unwrap_or_default()
 }
 
 /// The latest command besides an abort, while its effect is waited for.
@@ -203,16 +227,21 @@ pub fn open_command(model: &Model, now: Duration) -> Option<&Track> {
     latest.filter(|track| track.observed_at.is_none() && now.saturating_sub(track.commanded_at) < OPEN_SHOWN)
 }
 
-/// How the arming checks stand, where none is known to fail.
-pub fn readiness(
-    status: &Sample<TD_FLIGHT_STATUS_DATA>,
-    theme: Theme,
-    now: Duration,
-) -> Option<Line<'static>> {
+/// Whether the vehicle may be armed: GO only if every check of it passes and it is proven that it hears this station. `None`
+/// before it has said how its checks stand.
+pub fn readiness(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let status = model.vehicle.status.as_ref()?;
     if status.is_stale(now) {
         let words = format!(" {STALE_MARK}checks: not heard any more");
         return Some(Line::styled(words, theme.style(Role::Stale)));
     }
-    let passed = status.value.checks_failed.is_empty();
-    passed.then(|| Line::styled(" GO: every arming check passes", theme.style(Role::Good)))
+    let failing = words::failed_checks(status.value.checks_failed);
+    if !failing.is_empty() {
+        return Some(Line::styled(format!(" NO-GO: {}", failing.join(", ")), theme.style(Role::Caution)));
+    }
+    if !model.link.uplink.is_proven(now) {
+        let words = " NO-GO: uplink not proven, every other check passes";
+        return Some(Line::styled(words, theme.style(Role::Caution)));
+    }
+    Some(Line::styled(" GO: every arming check passes", theme.style(Role::Good)))
 }

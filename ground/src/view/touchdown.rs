@@ -29,9 +29,11 @@ pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<L
     };
     let (mark, role) = age_mark(&prediction, now);
     let mut rows = limit_rows(model, &prediction.value.touchdown, theme, mark, role);
+    let in_s = model.vehicle.touchdown_in_s(now);
+    let in_s = in_s.map_or_else(|| "--".to_owned(), |left| fixed(left.value, 1));
     rows.push(Line::from(vec![
         Span::styled("in      ", theme.style(Role::Label)),
-        Span::styled(format!("{mark}{:>6}", fixed(prediction.value.time_to_go_s, 2)), theme.style(role)),
+        Span::styled(format!("{mark}{in_s:>6}"), theme.style(role)),
         Span::styled(" s", theme.style(Role::Label)),
     ]));
     rows.push(match prediction.value.touchdown.violations() {
@@ -69,7 +71,10 @@ fn limit_rows(
             Span::styled(word, theme.style(word_role)),
             Span::styled(format!(" {:<5}", row.name), theme.style(Role::Label)),
             Span::styled(format!("{mark}{:>6}", fixed(row.value, decimals(row.value))), theme.style(role)),
-            Span::styled(format!(" {} {}", row.limit, row.unit), theme.style(Role::Label)),
+            Span::styled(
+                format!(" {} {}", theme.either_side(&row.limit), row.unit),
+                theme.style(Role::Label),
+            ),
         ])
     };
     rows.iter().map(line).collect()

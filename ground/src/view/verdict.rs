@@ -27,23 +27,20 @@ struct Beside {
     held: [Held; 6],
 }
 
-/// The verdict in the words that decide: the vehicle's first, whose limits they are, then what is computed.
+/// The verdicts in words, each with whose it is: the vehicle's, which decides, then what is computed by the other limits. Two
+/// verdicts stand side by side here, so none says "every limit".
 pub fn words(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> Line<'static> {
-    let (word, role) = super::touchdown::verdict_word(verdict.landed);
-    let own = own(model.vehicle.limits.as_ref()).map_or("own limits", |standard| standard.name);
-    let (word, whose) = if columns < WORDS_COLUMNS {
-        (word.strip_suffix(" inside every limit").unwrap_or(word), format!(" ({own})"))
-    } else {
-        (word, format!(" (vehicle: {own})"))
-    };
+    let (word, role) = if verdict.landed { ("LANDED", Role::Good) } else { ("NOT LANDED", Role::Alarm) };
+    let whose = Standard::whose(model.vehicle.limits.as_ref());
+    let says = if columns < WORDS_COLUMNS { "" } else { ", says the vehicle" };
     let mut spans = vec![
         Span::styled(format!(" {word}"), theme.style(role)),
-        Span::styled(whose, theme.style(Role::Plain)),
+        Span::styled(format!(" by {whose}{says}"), theme.style(Role::Plain)),
     ];
     for beside in beside(model, verdict) {
         let (word, role) = in_words(together(&beside.held));
         let name = beside.standard.name;
-        spans.push(Span::styled(format!("  {name}{COMPUTED} "), theme.style(Role::Label)));
+        spans.push(Span::styled(format!("; by {name}{COMPUTED} "), theme.style(Role::Label)));
         spans.push(Span::styled(word, theme.style(role)));
     }
     Line::from(spans)
@@ -69,9 +66,13 @@ pub fn table(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> 
     for (place, row) in verdict.touchdown.rows(limits).iter().enumerate() {
         let mut spans = figure(row, units, theme);
         let kept = if row.kept { Held::Kept } else { Held::Broken };
-        spans.extend(judged(kept, &row.limit, theme));
+        spans.extend(judged(kept, &theme.either_side(&row.limit), theme));
         for beside in &besides {
-            spans.extend(judged(beside.held[place], &limit_of(&beside.standard, place), theme));
+            spans.extend(judged(
+                beside.held[place],
+                &theme.either_side(&limit_of(&beside.standard, place)),
+                theme,
+            ));
         }
         lines.push(Line::from(spans));
     }
@@ -133,8 +134,8 @@ fn judged(held: Held, limit: &str, theme: Theme) -> Vec<Span<'static>> {
 
 fn in_words(held: Held) -> (&'static str, Role) {
     match held {
-        Held::Kept => ("inside", Role::Good),
-        Held::Broken => ("OUTSIDE", Role::Caution),
+        Held::Kept => ("landed", Role::Good),
+        Held::Broken => ("not landed", Role::Caution),
         Held::Unknown => ("not known", Role::Caution),
     }
 }

@@ -1,4 +1,4 @@
-//! The frame of every screen from 80x24 on: the top lines, the screen itself, the alarm line, the names.
+//! The frame of every screen from 80x24 on: who sits where, the top lines, the screen itself, the alarm line, the names.
 
 use std::time::Duration;
 
@@ -7,13 +7,14 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::theme::{Role, Theme};
-use super::{alarms, dialog, pages, top};
+use super::{alarms, dialog, identity, pages, top};
 use crate::model::Model;
 use crate::model::page::Page;
 
 /// Draws everything.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [status, abort, command, body, alarm, names] = area.layout(&Layout::vertical([
+    let [identity, status, abort, command, body, alarm, names] = area.layout(&Layout::vertical([
+        Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(1),
@@ -21,11 +22,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         Constraint::Length(1),
         Constraint::Length(1),
     ]));
+    identity::draw(model, theme, frame, identity);
     draw_status(model, theme, now, frame, status);
     frame.render_widget(top::abort(model, theme, now), abort);
     frame.render_widget(top::command(model, theme, now), command);
     pages::draw(model, theme, now, frame, body);
-    frame.render_widget(alarms::line(model, theme, now), alarm);
+    alarms::draw(model, theme, now, frame, alarm);
     frame.render_widget(names_line(model, theme), names);
     dialog::draw(model, theme, now, frame, body);
 }
@@ -49,9 +51,9 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
 fn names_line(model: &Model, theme: Theme) -> Line<'static> {
     let shown = model.page();
     let mut spans = Vec::new();
-    for page in Page::ALL {
+    for page in Page::ALL.into_iter().chain([Page::Help]) {
         let (left, right, role) = if page == shown { ("[", "]", Role::Key) } else { (" ", "", Role::Label) };
-        spans.push(Span::styled(format!("{left}{}{}{right}", page.digit(), page.name()), theme.style(role)));
+        spans.push(Span::styled(format!("{left}{}{}{right}", page.key(), page.name()), theme.style(role)));
     }
     let (word, role) =
         if model.pages.held.is_some() { (" HELD 0", Role::Caution) } else { (" auto", Role::Good) };

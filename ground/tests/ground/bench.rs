@@ -13,7 +13,8 @@ use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
-    TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase, TdVehicleFlag,
+    TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock, TdMotor, TdPhase,
+    TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -37,10 +38,17 @@ pub(crate) struct Bench {
     pub(crate) interlocks: TdInterlock,
     pub(crate) checks_failed: u16,
     pub(crate) pad_wait_s: u16,
-    /// It says that it is a simulated one.
+    pub(crate) boot_number: u32,
+    /// Both of its flags say so.
     pub(crate) simulated: bool,
+    pub(crate) motor: TdMotor,
+    pub(crate) approach_wait_s: u16,
+    pub(crate) hold: TdHold,
     /// Whether the vehicle sends anything at all.
     pub(crate) speaks: bool,
+    /// Whether it hears this station: what it reports of it.
+    pub(crate) hears: bool,
+    heard_at: Duration,
     encoder: Encoder,
 }
 
@@ -57,8 +65,14 @@ impl Bench {
             interlocks: TdInterlock::TD_INTERLOCK_PIN_OUT,
             checks_failed: 0,
             pad_wait_s: 0,
+            boot_number: 0x1A2B_3C4D,
             simulated: true,
+            motor: TdMotor::TD_MOTOR_LIVE,
+            approach_wait_s: 0,
+            hold: TdHold::TD_HOLD_NONE,
             speaks: true,
+            hears: true,
+            heard_at: Duration::ZERO,
             encoder: Encoder::new(VEHICLE),
         }
     }
@@ -129,6 +143,9 @@ impl Bench {
                     self.heartbeat();
                 }
                 self.flight_status();
+                if self.now.subsec_millis().is_multiple_of(500) {
+                    self.uplink();
+                }
             }
             self.msg(Msg::Tick);
         }
@@ -178,14 +195,41 @@ impl Bench {
             pad_wait_s: self.pad_wait_s,
             phase: self.phase,
             abort_effect: self.abort_effect,
+            boot_number: self.boot_number,
+            approach_wait_s: self.approach_wait_s,
             vehicle_flags: if self.simulated {
                 TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED
             } else {
                 TdVehicleFlag::empty()
             },
-            ..TD_FLIGHT_STATUS_DATA::default()
+            motor: self.motor,
+            abort_impact_m_s: 0,
+            hold: self.hold,
+            hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
+    }
+
+    /// What the vehicle hears of this station: its last frame 0.2 s ago, as long as it hears.
+    pub(crate) fn uplink(&mut self) {
+        let fresh = self.now.saturating_sub(Duration::from_millis(200));
+        if self.hears {
+            self.heard_at = fresh;
+        }
+        let age_ms = (self.now.saturating_sub(self.heard_at)).as_millis().min(65_534) as u16;
+        self.uplink_of(GROUND, age_ms, self.armed);
+    }
+
+    pub(crate) fn uplink_of(&mut self, station: Address, accepted_age_ms: u16, commands: bool) {
+        self.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+            time_boot_ms: self.boot_ms(),
+            accepted_age_ms,
+            refused_age_ms: u16::MAX,
+            target_system: station.system_id,
+            target_component: station.component_id,
+            commands: u8::from(commands),
+            ..TD_UPLINK_DATA::default()
+        }));
     }
 
     pub(crate) fn answer(&mut self, command: MavCmd, result: u8) {

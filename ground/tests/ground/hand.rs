@@ -8,7 +8,7 @@ use ground::model::Role;
 use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::dialog::{ARM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT, START_TIME_LIMIT};
 use ground::update::{Action, Msg};
-use protocol::dialect::{MavCmd, TdPhase};
+use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
@@ -198,6 +198,7 @@ fn ctrl_x_and_enter_abort_at_once_from_every_dialog_and_close_it() {
         assert!(sent.len() == 1 && is_abort(&sent[0]), "{opening:?}: {sent:?}");
         assert_eq!(bench.model.dialog, Dialog::Closed);
         bench.answer(ABORT, ACCEPTED);
+        bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
         bench.key(Key::Enter);
         bench.run(3.0);
         assert!(bench.take_commands().is_empty(), "once");
@@ -247,12 +248,48 @@ fn an_abort_is_repeated_until_acknowledged_and_its_attempts_are_shown() {
     bench.speaks = false;
     bench.run(10.0);
     let aborts: Vec<_> = bench.take_commands().into_iter().filter(is_abort).collect();
-    assert!((20..=21).contains(&aborts.len()), "{}", aborts.len());
+    // On a clock of ten ticks a second: ten in the first second, five in each of the nine after it.
+    assert!((54..=57).contains(&aborts.len()), "{}", aborts.len());
     assert!(aborts.iter().zip(0..).all(|(abort, resends)| abort.confirmation == resends));
     assert!(bench.screen(80, 24).contains(&format!("x{}", aborts.len())));
     bench.answer(ABORT, ACCEPTED);
+    bench.run(1.0);
+    assert_eq!(
+        bench.take_commands().iter().filter(|command| is_abort(command)).count(),
+        5,
+        "not latched yet"
+    );
+    bench.speaks = true;
+    bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     bench.run(10.0);
-    assert!(!bench.take_commands().iter().any(is_abort));
+    assert!(bench.take_commands().is_empty(), "latched");
+}
+
+/// A stabiliser that flies without an abort shows the same degradation as one that flies after it.
+#[test]
+fn an_abort_goes_on_until_the_latch_itself_is_seen() {
+    let mut bench = Bench::crewed();
+    bench.interlocks |= TdInterlock::TD_INTERLOCK_DEGRADED;
+    bench.run(0.5);
+    bench.abort();
+    bench.answer(ABORT, ACCEPTED);
+    bench.take_commands();
+    bench.run(3.0);
+    assert!(bench.take_commands().len() > 15);
+    bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    bench.run(3.0);
+    assert!(bench.take_commands().is_empty());
+}
+
+/// There is nothing to abort: saying it again changes nothing.
+#[test]
+fn a_refused_abort_ends() {
+    let mut bench = Bench::crewed();
+    bench.abort();
+    bench.answer(ABORT, 4);
+    bench.take_commands();
+    bench.run(3.0);
+    assert!(bench.take_commands().is_empty() && bench.events().contains("ABORT REFUSED: failed"));
 }
 
 #[test]
@@ -505,6 +542,10 @@ fn the_wait_after_an_abort_on_the_pad_is_shown_at_every_size() {
     bench.answer(ABORT, ACCEPTED);
     bench.pad_wait_s = 57;
     bench.run(0.1);
+    assert!(bench.screen(80, 24).contains("LIVE MOTOR: do not approach for 57 s"));
+    assert!(bench.screen(20, 5).contains("LIVE MOTOR"), "{}", bench.screen(20, 5));
+    bench.motor = TdMotor::TD_MOTOR_PIN_IN;
+    bench.run(0.1);
     assert!(bench.screen(80, 24).contains("STAY OFF THE PAD for 57 s"));
     assert!(bench.screen(20, 5).contains("STAY OFF THE PAD"));
 }
@@ -548,6 +589,7 @@ fn the_second_press_acts_at_once_where_the_terminal_tells_repeats() {
         bench.key(Key::CtrlX);
         assert_eq!(bench.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
         bench.answer(ABORT, ACCEPTED);
+        bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
         bench.run(3.0);
         assert!(bench.take_commands().is_empty(), "once");
     }

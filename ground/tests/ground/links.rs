@@ -23,7 +23,7 @@ fn source(source: Address, loss: f64, age_ms: u64) -> SourceFigures {
 fn report(name: &str, loss: f64, trouble: Option<&str>) -> LinkReport {
     LinkReport {
         name: name.to_owned(),
-        figures: LinkFigures { rx_bytes_s: 1_590.0, loss, ..LinkFigures::default() },
+        figures: LinkFigures { rx_bytes_s: 1_590.0, rx_frames_s: 20.0, loss, ..LinkFigures::default() },
         sources: vec![source(VEHICLE, loss, 200)],
         capacity_bytes_s: name.starts_with("serial").then_some(5_760),
         copies: 0,
@@ -89,14 +89,14 @@ fn loss_is_told_by_component() {
             bench.msg(Msg::Frame(frame));
         }
     }
-    assert_eq!(line(&bench, "1/1 vehicle"), "1/1 vehicle 11.0 0.0 % 0.0 s");
+    assert_eq!(line(&bench, "1/1 vehicle"), "1/1 vehicle 13.0 0.0 % 0.0 s");
     assert_eq!(line(&bench, "51/68 radio"), "51/68 radio 31.0 24.4 % 0.0 s");
     bench.speaks = false;
     bench.run(2.0);
     assert!(line(&bench, "1/1 vehicle").ends_with("~2.0 s"), "{}", bench.screen(80, 40));
     // Ten seconds on, nothing of it is in the window any more.
     bench.run(10.0);
-    assert_eq!(line(&bench, "51/68 radio"), "51/68 radio 0.0 0.0 % ~12.0 s");
+    assert_eq!(line(&bench, "51/68 radio"), "51/68 radio 0.0 unknown ~12.0 s");
 }
 
 /// Each of several links has its own figures, and its own of each component; ages go on between two reports.
@@ -111,8 +111,8 @@ fn loss_is_told_by_link_and_component() {
     bench.msg(Msg::Links { links, signing: None });
     bench.run(0.3);
     assert!(line(&bench, "all links").contains(" 0.0 % 17"));
-    assert_eq!(line(&bench, "udpin:"), "udpin:0.0.0.0:14550 1590 0 0.0 0.0 % 0");
-    assert_eq!(line(&bench, "serial:"), "serial:/dev/x:57600 1590/5760 0 0.0 12.5 % 17");
+    assert_eq!(line(&bench, "udpin:"), "udpin:0.0.0.0:14550 1590 0 20.0 0.0 % 0");
+    assert_eq!(line(&bench, "serial:"), "serial:/dev/x:57600 1590/5760 0 20.0 12.5 % 17");
     let vehicle = line(&bench, "1/1 vehicle");
     assert!(vehicle.ends_with("1/1 vehicle 20.0 0.0 % 0.5 s\n1/1 vehicle 20.0 12.5 % 0.5 s"), "{vehicle}");
     assert_eq!(line(&bench, "51/68 radio"), "51/68 radio 20.0 50.0 % 0.3 s");

@@ -2,7 +2,9 @@
 
 mod alarms;
 mod auto;
+mod bad_air;
 mod bench;
+mod bytes;
 mod crew;
 mod daemon;
 mod disarm;
@@ -17,3 +19,5 @@ mod radio;
 mod replay;
 mod screens;
 mod terminal;
+mod uplink;
+mod whose;

@@ -165,6 +165,7 @@ fn regress_chute() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
     let mut bench = in_phase(TdPhase::TD_PHASE_CHUTE, effect, (150.0, -30.0), (200.0, 12.0));
     bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    bench.approach_wait_s = u16::MAX;
     bench.descent_with(150.0, -30.0, TdChute::TD_CHUTE_FIRED);
     bench.run(0.1);
     assert!(bench.screen(80, 24).contains(" next chute opens: fired, still falling fast"));

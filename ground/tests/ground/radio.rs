@@ -63,10 +63,13 @@ fn other_systems_change_nothing() {
 
 #[test]
 fn a_reboot_forgets_what_was_known() {
-    let mut bench = Bench::crewed();
-    bench.run(10.0);
+    // Of a vehicle that tells no boot number.
+    let mut bench = Bench::new(settings(false, true));
+    bench.boot_number = 0;
+    bench.run(11.0);
     bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
     let mut rebooted = Bench::new(settings(false, true));
+    rebooted.boot_number = 0;
     rebooted.now = std::time::Duration::from_millis(500);
     rebooted.model = bench.model;
     rebooted.flight_status();
@@ -201,9 +204,9 @@ fn an_abort_under_thrust_is_an_aborted_flight_even_if_it_lands() {
 }
 
 /// Ids that the ground reads, and some it does not.
-const IDS: [u32; 22] = [
+const IDS: [u32; 24] = [
     0, 1, 2, 4, 22, 30, 31, 32, 74, 77, 109, 111, 245, 253, 54_000, 54_001, 54_002, 54_003, 54_004, 54_005,
-    54_006, 54_007,
+    54_006, 54_007, 54_008, 54_009,
 ];
 
 proptest! {

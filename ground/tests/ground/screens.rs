@@ -129,6 +129,7 @@ fn regress_every_screen_by_its_digit() {
         ('6', "messages"),
         ('7', "parameters"),
         ('8', "log"),
+        ('9', "alarms"),
         ('1', "pad_held"),
     ] {
         let mut bench = powered();
@@ -209,7 +210,7 @@ fn colour_carries_nothing_alone() {
 /// Phase, armed, countdown, link and the abort key stay where they are under every dialog.
 #[test]
 fn the_top_lines_keep_their_place() {
-    let top = |bench: &Bench| bench.screen(80, 24).lines().take(1).collect::<String>();
+    let top = |bench: &Bench| bench.screen(80, 24).lines().take(2).collect::<String>();
     let mut bench = armed();
     let before = top(&bench);
     for key in
@@ -218,4 +219,44 @@ fn the_top_lines_keep_their_place() {
         bench.key(key);
         assert_eq!(top(&bench), before, "after {key:?}");
     }
+}
+
+/// One quantity has one value, wherever it stands.
+#[test]
+fn one_quantity_has_one_value_on_a_screen() {
+    let mut bench = descending();
+    // What steers the descent was told a moment before the position.
+    bench.descent(131.2);
+    bench.run(0.3);
+    bench.state(4.0, 125.5, -0.6, -21.5, 88.0);
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("< 125.5 ") && screen.contains("height         125.5 m"), "{screen}");
+    assert!(screen.contains(" next IGNITION in 3.1 s"), "{screen}");
+    assert!(screen.contains("ignite in        3.1 s"), "{screen}");
+    let mut bench = powered();
+    bench.run(0.4);
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("in            1.9 s"), "2.3 s, told 0.4 s ago: {screen}");
+    assert!(bench.screen(40, 12).contains(" next touchdown in 1.9 s"), "{}", bench.screen(40, 12));
+}
+
+#[test]
+fn a_limit_to_either_side_is_plus_minus_in_ascii_too() {
+    let ascii = Theme { colour: false, ascii: true };
+    let screen = powered().draw(80, 24, ascii).backend().to_string();
+    assert!(screen.contains("+-0.4 m/s") && !screen.contains("<0.4"), "{screen}");
+}
+
+/// A report of the pad says nothing of where a vehicle is that flies from apogee.
+#[test]
+fn a_prediction_does_not_begin_on_the_pad() {
+    let mut bench = counting();
+    bench.run(0.5);
+    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    bench.run(0.1);
+    bench.speaks = false;
+    bench.run(4.0);
+    let screen = bench.screen(80, 24);
+    assert!(screen.contains("position unknown:") && !screen.contains("pred "), "{screen}");
+    assert!(!screen.contains("15.0 m"), "the pad's: {screen}");
 }

@@ -64,7 +64,10 @@ impl LoadedFlight {
     }
 
     /// The craft, powered up.
-    pub(super) fn craft(&self, seed: u64, policy: DeadlinePolicy) -> Result<Box<dyn Craft + Send>, FlyError> {
+    ///
+    /// # Errors
+    /// It cannot be simulated, or the policy is not for it.
+    pub fn craft(&self, seed: u64, policy: DeadlinePolicy) -> Result<Box<dyn Craft + Send>, FlyError> {
         Ok(match self {
             Self::AtIgnition(loaded) => {
                 Box::new(Vehicle::new(&loaded.profile, draw(&loaded.profile, seed), policy)?)

@@ -13,9 +13,17 @@ pub enum Resend {
     Never,
     /// This many further times.
     Times(u8),
-    /// Until answered. For aborting.
-    UntilAnswered,
+    /// Until it is withdrawn, whatever is answered: twenty a second for the first second, then five. For aborting: of
+    /// twenty that each have one chance in two, all are lost once in a million times.
+    UntilWithdrawn,
 }
+
+/// An abort's first second, in which it is sent often.
+const HURRIED_FOR: Duration = Duration::from_secs(1);
+/// How often it is sent in that second.
+const HURRIED_EVERY: Duration = Duration::from_millis(50);
+/// How often it is sent after it.
+const STEADY_EVERY: Duration = Duration::from_millis(200);
 
 /// What became of a command. Acknowledged is not observed: the vehicle's own state says that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,11 +92,26 @@ struct Pending {
     message: COMMAND_LONG_DATA,
     resend: Resend,
     attempts: u32,
+    submitted_at: Duration,
     due_at: Duration,
     in_progress: bool,
+    /// Of what is sent whatever is answered: the last answer.
+    answered: Option<u8>,
 }
 
 impl Pending {
+    /// When it is due again, once it was sent now.
+    fn due_after(&self, now: Duration) -> Duration {
+        match self.resend {
+            Resend::UntilWithdrawn if now < self.submitted_at + HURRIED_FOR => {
+                // From the time that it was due: a clock that looks late now and then makes it no rarer.
+                (self.due_at + HURRIED_EVERY).max(now + HURRIED_EVERY / 2)
+            }
+            Resend::UntilWithdrawn => now + STEADY_EVERY,
+            Resend::Never | Resend::Times(_) => now + ANSWER_TIMEOUT,
+        }
+    }
+
     /// The answer that is still to come when this is waited for no longer. Only of a command that is
     /// sent once is it known how many answers are outstanding.
     fn into_late(self, now: Duration) -> Option<Late> {
@@ -100,6 +123,8 @@ impl Pending {
 }
 
 /// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] says what to send.
+///
+/// What is sent until it is withdrawn may be answered many times; each answer that differs from the one before is told.
 ///
 /// An answer names its command by number alone, and arming and disarming share one. So the late answer
 /// to an arming is waited for even after a disarming has replaced it, and is never taken for the
@@ -143,8 +168,27 @@ impl CommandSender {
         };
         self.submitted += 1;
         let ticket = Ticket(self.submitted);
-        self.pending.push(Pending { ticket, message, resend, attempts: 0, due_at: now, in_progress: false });
+        self.pending.push(Pending {
+            ticket,
+            message,
+            resend,
+            attempts: 0,
+            submitted_at: now,
+            due_at: now,
+            in_progress: false,
+            answered: None,
+        });
         ticket
+    }
+
+    /// Stops sending this one.
+    pub fn withdraw_one(&mut self, ticket: Ticket, now: Duration) {
+        self.withdraw(now, |pending| pending.ticket == ticket);
+    }
+
+    /// When [`CommandSender::poll`] has something to do next; `None` while nothing is under way.
+    pub fn due_at(&self) -> Option<Duration> {
+        self.pending.iter().map(|pending| pending.due_at).min()
     }
 
     /// Stops sending whatever is under way. What was sent is sent: its answers may still come.
@@ -166,11 +210,12 @@ impl CommandSender {
             if now < pending.due_at {
                 return false;
             }
-            let may_send = !pending.in_progress
+            let waits = pending.in_progress && pending.resend != Resend::UntilWithdrawn;
+            let may_send = !waits
                 && match pending.resend {
                     Resend::Never => pending.attempts == 0,
                     Resend::Times(times) => pending.attempts <= u32::from(times),
-                    Resend::UntilAnswered => true,
+                    Resend::UntilWithdrawn => true,
                 };
             let command = pending.message.command as u16;
             if !may_send {
@@ -179,7 +224,7 @@ impl CommandSender {
             }
             pending.message.confirmation = u8::try_from(pending.attempts).unwrap_or(u8::MAX);
             pending.attempts += 1;
-            pending.due_at = now + ANSWER_TIMEOUT;
+            pending.due_at = pending.due_after(now);
             events.push(CommandEvent::Sent { command, attempt: pending.attempts });
             messages.push(MavMessage::COMMAND_LONG(pending.message.clone()));
             false
@@ -209,7 +254,9 @@ impl CommandSender {
             return true;
         }
         let Some(index) = waiting else { return false };
-        if final_answer {
+        if self.pending[index].resend == Resend::UntilWithdrawn {
+            self.note_answer(index, answer, final_answer);
+        } else if final_answer {
             self.pending.remove(index);
             self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
         } else {
@@ -220,7 +267,23 @@ impl CommandSender {
         true
     }
 
-    /// Whether this command still waits for its answer.
+    /// An answer to what goes on being sent: told when it differs from the one before. Once accepted it stays so: the
+    /// copies that arrive later find nothing left to do.
+    fn note_answer(&mut self, index: usize, answer: &CommandAnswer, final_answer: bool) {
+        let known = &mut self.pending[index].answered;
+        if *known == Some(answer.result) || *known == Some(MavResult::MAV_RESULT_ACCEPTED as u8) {
+            return;
+        }
+        *known = Some(answer.result);
+        let CommandAnswer { command, result, progress, .. } = *answer;
+        self.events.push(if final_answer {
+            CommandEvent::Answered { command, result }
+        } else {
+            CommandEvent::InProgress { command, progress }
+        });
+    }
+
+    /// Whether this command is still under way.
     pub fn is_pending(&self, command: MavCmd) -> bool {
         self.pending.iter().any(|pending| pending.message.command == command)
     }
@@ -260,6 +323,45 @@ mod tests {
             !matches!(event, CommandEvent::Sent { .. } | CommandEvent::TimedOut { attempts: 1, .. })
         };
         sender.take_events().into_iter().filter(is_answer).collect()
+    }
+
+    /// Polled every 10 ms; the times of each sending, ms.
+    fn aborts_ms(answered: &[(u64, MavResult)], withdrawn_ms: u64) -> (Vec<u64>, Vec<CommandEvent>) {
+        let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+        let mut sender = CommandSender::new();
+        let ticket = sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
+        let mut sent = Vec::new();
+        for now in (0..3_000).step_by(10) {
+            if now == withdrawn_ms {
+                sender.withdraw_one(ticket, ms(now));
+            }
+            sent.extend(sender.poll(ms(now)).iter().map(|_| now));
+            for (_, result) in answered.iter().filter(|(at, _)| *at == now) {
+                let (command, result) = (abort as u16, *result as u8);
+                let answer = CommandAnswer { command, result, progress: 0, target: GROUND };
+                assert!(sender.on_answer(&answer, ms(now)) || now >= withdrawn_ms);
+            }
+        }
+        let events = sender.take_events().into_iter();
+        (sent, events.filter(|event| !matches!(event, CommandEvent::Sent { .. })).collect())
+    }
+
+    #[test]
+    fn an_abort_goes_out_twenty_times_in_its_first_second_and_five_times_in_each_after_it() {
+        let (sent, events) = aborts_ms(&[], u64::MAX);
+        let within = |from, to| sent.iter().filter(|at| (from..to).contains(*at)).count();
+        assert_eq!((within(0, 1_000), within(1_000, 2_000), within(2_000, 3_000)), (20, 5, 5), "{sent:?}");
+        assert!(events.is_empty());
+    }
+
+    #[test]
+    fn an_answer_does_not_end_an_abort_and_its_copies_are_told_once() {
+        let accepted = MavResult::MAV_RESULT_ACCEPTED;
+        let (sent, events) =
+            aborts_ms(&[(100, accepted), (150, accepted), (160, MavResult::MAV_RESULT_FAILED)], 500);
+        assert_eq!(sent.len(), 10, "{sent:?}");
+        let command = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16;
+        assert_eq!(events, [CommandEvent::Answered { command, result: 0 }]);
     }
 
     #[test]

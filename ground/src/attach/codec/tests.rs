@@ -66,7 +66,8 @@ fn what_is_asked_comes_back_the_same() {
         Asked::Status,
         Asked::Stop { force: true, operator: "anna".to_owned() },
         Asked::Command(CommandKind::Arm),
-        Asked::Acknowledge,
+        Asked::Acknowledge(AlarmKind::Held),
+        Asked::Acknowledge(AlarmKind::Refused(CommandKind::Abort)),
         Asked::Parameters,
         Asked::Key("Ctrl-X".to_owned()),
     ];
@@ -137,7 +138,12 @@ fn msg() -> impl Strategy<Value = Msg> {
         CommandKind::Abort,
     ]);
     prop_oneof![
-        prop::sample::select(vec![Msg::Tick, Msg::Acknowledged, Msg::ParametersWanted, Msg::ScreenGone]),
+        prop::sample::select(vec![
+            Msg::Tick,
+            Msg::Acknowledged(AlarmKind::LinkLost),
+            Msg::ParametersWanted,
+            Msg::ScreenGone
+        ]),
         heartbeat,
         (any::<usize>(), counters()).prop_map(|(bytes, framing)| Msg::Received { bytes, framing }),
         (any::<usize>(), any::<u64>()).prop_map(|(bytes, drops)| Msg::Sent { bytes, drops }),

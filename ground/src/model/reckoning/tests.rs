@@ -19,6 +19,7 @@ fn moving(phase: TdPhase, velocity: [f64; 3], acceleration: Option<[f64; 3]>) ->
     let mut vehicle = Vehicle {
         heartbeat: Some(Sample::new(heartbeat, SEEN)),
         motion: Some(Sample::new(motion, SEEN)),
+        left_pad_at: Some(SEEN),
         ..Vehicle::default()
     };
     if let Some([north, east, up]) = acceleration {

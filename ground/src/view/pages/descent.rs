@@ -59,13 +59,14 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let of_motion = |value: Option<f64>| {
         value.zip(motion.map(|motion| motion.received_at)).map(|(value, at)| Sample::new(value, at))
     };
-    let height = of(|d| d.height_m).or(of_motion(motion.map(|m| m.value.altitude_m)));
-    let speed = of(|d| d.vertical_speed_m_s).or(of_motion(motion.map(|m| m.value.climb_m_s)));
     lines.push(band_word(model, theme, now));
-    lines.push(row(theme, "height", height, 1, "m", now));
-    lines.push(row(theme, "vertical", speed, 1, "m/s", now));
+    // What is predicted stands above; a second height beside it would be another value for the same.
+    if !lost::is_lost(model, now) {
+        lines.push(row(theme, "height", model.vehicle.height_m(), 1, "m", now));
+        lines.push(row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
+    }
     let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
-    lines.push(row(theme, "ignite in", lights(of(|d| d.time_to_ignition_s)), 1, "s", now));
+    lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
     lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
     lines.push(row(theme, "band high", of(|d| d.band_high_m), 1, "m", now));
     lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
@@ -94,19 +95,20 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     };
     let (mark, stale) = age_mark(descent, now);
     let d = &descent.value;
-    let (words, role) = if !(d.height_m.is_finite() && d.band_low_m.is_finite() && d.band_high_m.is_finite())
-    {
+    let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
+    let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
+    let (words, role) = if !(height_m.is_finite() && low_m.is_finite() && high_m.is_finite()) {
         ("band not known", Role::Caution)
-    } else if d.band_low_m > d.band_high_m {
+    } else if low_m > high_m {
         ("NO HEIGHT LANDS", Role::Alarm)
-    } else if d.height_m < d.band_low_m {
+    } else if height_m < low_m {
         ("BELOW the band", Role::Alarm)
-    } else if d.height_m > d.band_high_m {
+    } else if height_m > high_m {
         ("above the band", Role::Plain)
     } else {
         ("INSIDE the band", Role::Good)
     };
-    let committed = d.height_m < d.commit_height_m;
+    let committed = height_m < f64::from(d.commit_height_m);
     let commit = if committed { ", committed" } else { "" };
     let role = if stale == Role::Stale { stale } else { role };
     Line::styled(format!("{mark}{words}{commit}"), theme.style(role))

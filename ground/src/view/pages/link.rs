@@ -9,9 +9,10 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
-use crate::model::link::LinkReport;
+use crate::model::link::{LinkReport, LinkState};
+use crate::model::uplink::refusal;
 use crate::model::vehicle::STALE_AFTER;
-use crate::view::happenings;
+use crate::view::happenings::{self, percent};
 use crate::view::number::{STALE_MARK, seconds};
 use crate::view::theme::{Role, Theme};
 
@@ -42,6 +43,7 @@ const REGULAR: [&str; 13] = [
 /// The figures in all, of each link and of each component; then the age of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let mut lines = vec![happenings::link(model, theme, now, columns)];
+    lines.push(directions(model, theme, now));
     lines.extend(rejected(model, theme));
     lines.push(heading(theme, columns));
     for report in reports(model, now) {
@@ -58,6 +60,27 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     // Up goes back towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
     window(lines, start, rows)
+}
+
+/// The ages of both directions, and what the vehicle refuses.
+fn directions(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let age = |state: LinkState| match state {
+        LinkState::NeverHeard => "never".to_owned(),
+        LinkState::Alive(age) | LinkState::Doubtful(age) | LinkState::Lost(age) => seconds(age),
+    };
+    let uplink = &model.link.uplink;
+    let refused = uplink.refused.map_or_else(String::new, |refused| {
+        let (Address { system_id, component_id }, why) = (refused.source, refusal(refused.why));
+        let since = seconds(now.saturating_sub(refused.at));
+        format!("; it refused {} of {system_id}/{component_id}, {since} ago: {why}", refused.count)
+    });
+    Line::from(vec![
+        Span::styled(" heard    ", theme.style(Role::Label)),
+        Span::styled(
+            format!("down {} ago, up {} ago{refused}", age(model.link.state(now)), age(uplink.state(now))),
+            theme.style(Role::Plain),
+        ),
+    ])
 }
 
 /// What was thrown away, by why.
@@ -139,6 +162,7 @@ fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static>
         return Line::styled(format!(" {name} DOWN {why}"), theme.style(Role::Alarm));
     }
     let LinkFigures { rx_bytes_s, tx_bytes_s, rx_frames_s, loss } = report.figures;
+    let loss = (rx_frames_s > 0.0).then_some(loss);
     let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
     let rx = format!("{rx_bytes_s:.0}{capacity}");
     let loss_words = percent(loss);
@@ -156,6 +180,7 @@ fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static>
 
 fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: usize) -> Line<'static> {
     let SourceFigures { source: address, age, rx_frames_s, loss } = *source;
+    let loss = (rx_frames_s > 0.0).then_some(loss);
     let Address { system_id, component_id } = address;
     let name = format!("  {system_id}/{component_id} {}", what(address, vehicle));
     let (loss_words, age_words) = (percent(loss), seconds(age));
@@ -184,12 +209,8 @@ fn what(address: Address, vehicle: Address) -> &'static str {
     }
 }
 
-fn percent(share: f64) -> String {
-    format!("{:.1} %", share * 100.0)
-}
-
-fn loss_role(loss: f64) -> Role {
-    if loss > LOSS_MARKED { Role::Caution } else { Role::Plain }
+fn loss_role(loss: Option<f64>) -> Role {
+    if loss.is_some_and(|loss| loss > LOSS_MARKED) { Role::Caution } else { Role::Plain }
 }
 
 /// As many columns of them as there is room for.

@@ -1,5 +1,6 @@
 //! One room a screen. Each gives its lines for small terminals; those with panels also draw them.
 
+pub mod alarms;
 pub mod descent;
 pub mod help;
 pub mod landing;
@@ -47,6 +48,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Messages => messages::lines(model, theme, columns, rows),
         Page::Parameters => parameters::lines(model, theme, rows),
         Page::Log => log::lines(model, theme, now),
+        Page::Alarms => alarms::lines(model, theme, now, columns, rows),
         Page::Help => help::lines(),
     }
 }

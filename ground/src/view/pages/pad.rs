@@ -19,9 +19,9 @@ use crate::view::{draw_lines, flight, happenings, next, top};
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
 /// Rows of the checks, title and summary included.
-const CHECK_ROWS: u16 = 15;
+const CHECK_ROWS: u16 = 16;
 /// Rows of the ladder, its title included.
-const LADDER_ROWS: u16 = 9;
+const LADDER_ROWS: u16 = 10;
 
 /// Checks and ladder side by side, the events below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -97,10 +97,13 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             Line::styled(" off the pad nothing is checked for arming", theme.style(Role::Label))
         }
         None => Line::styled(" the vehicle has not said how its checks stand", theme.style(Role::Caution)),
-        Some(status) => top::readiness(status, theme, now).unwrap_or_else(|| {
+        Some(status) if stale || status.value.checks_failed.is_empty() => {
+            top::readiness(model, theme, now).unwrap_or_default()
+        }
+        Some(status) => {
             let count = status.value.checks_failed.iter_names().count();
             Line::styled(format!(" NO-GO: {count} of {} checks fail", lines.len()), theme.style(Role::Alarm))
-        }),
+        }
     };
     lines.insert(0, summary);
     lines
@@ -161,6 +164,7 @@ fn holds(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_IGNITER => "closed",
         TdCheck::TD_CHECK_LOG => "running",
         TdCheck::TD_CHECK_LOG_SPACE => "enough",
+        TdCheck::TD_CHECK_UPLINK => "heard",
         _ => "",
     }
 }
@@ -181,6 +185,7 @@ fn why(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_LOG_SPACE => "disk full",
         TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
+        TdCheck::TD_CHECK_UPLINK => "not heard",
         _ => "",
     }
 }
@@ -197,6 +202,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let counting = vehicle.countdown_s().is_some();
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard"),
+        (model.link.uplink.is_proven(now), "it hears us: uplink proven"),
         (pin_out, "pin out (first inhibit)"),
         (checked, "every check passes"),
         (armed, "A, then ARM Enter (10 s)"),

@@ -3,7 +3,7 @@
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA, TD_DESCENT_DATA,
     TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdChute, TdControlLevel, TdLimit, TdSolverStatus,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdChute, TdControlLevel, TdLimit, TdMotor, TdSolverStatus,
 };
 
 use super::Bench;
@@ -203,6 +203,8 @@ impl Bench {
 
     /// The figures of a contact: distance, pitch, speeds, rate.
     pub(crate) fn contact(&mut self, figures: [f32; 5], landed: bool, limits_violated: TdLimit) {
+        // It has burnt, and is hot.
+        (self.motor, self.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 55);
         let [x_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = figures;
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             time_boot_ms: self.boot_ms(),
