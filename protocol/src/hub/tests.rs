@@ -133,7 +133,7 @@ fn a_sender_is_believed_for_a_valid_frame_and_for_nothing_less() {
     assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), sender);
     let key = |fill| Some(Signing::new(Key::new([fill; Key::LEN]), Memory::default()));
     let mut hub = Hub::new(1, key(7));
-    let mut signed_by = |fill| Hub::new(1, key(fill)).bytes_for(0, &plain, CLOCK);
+    let signed_by = |fill| Hub::new(1, key(fill)).bytes_for(0, &plain, CLOCK);
     let radio = MavMessage::RADIO_STATUS(crate::dialect::RADIO_STATUS_DATA::default());
     assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), []);
     assert_eq!(believed(&mut hub, signed_by(8)), []);

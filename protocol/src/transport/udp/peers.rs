@@ -252,8 +252,8 @@ mod tests {
             assert!(peers.proven.len() <= MAX_PROVEN);
         }
         // Silent ones make room.
-        assert_eq!(peers.on_believed(at(2), s(109)), None);
-        assert!(peers.on_believed(at(2), s(110)).is_some());
+        assert_eq!(peers.on_believed(at(2), s(108)), None);
+        assert!(peers.on_believed(at(2), s(109)).is_some());
     }
 
     #[test]
