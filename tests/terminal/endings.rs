@@ -88,7 +88,9 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
     let attach = ground(stage.folder.path(), &["attach"]);
     let mut second = Terminal::start(&attach, SIZE, false);
     second.wait_for(" ARMED ");
+    second.type_by_hand(b"6");
     second.wait_for("the terminal is gone");
+    second.type_by_hand(b"0");
     second.type_bytes(b"\x18\r");
     second.wait_for("acknowledged accepted  observed yes");
     // Who only looks cannot abort, nor take the station with it.

@@ -128,8 +128,8 @@ fn the_automatic_mode_is_refused_with_a_live_vehicle() {
         bench.armed = true;
         bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
         bench.run(5.0);
-        assert!(bench.take_commands().is_empty(), "refused is refused");
         assert_eq!(bench.wants_to_quit(), !interactive);
+        assert!(bench.take_commands().is_empty(), "refused is refused");
         assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
     }
     let mut own = Bench::new(Settings { demonstration: true, ..settings(true, false) });

@@ -335,7 +335,7 @@ fn a_start_takes_its_typed_word_and_is_resent_a_few_times() {
     assert_eq!(starts.len(), 4);
     assert!(starts.iter().all(|command| command.command == START));
     bench.keys(&start_ladder()[..6]);
-    bench.run(START_TIME_LIMIT.as_secs_f64());
+    bench.run(START_TIME_LIMIT.as_secs_f64() + 0.1);
     bench.key(Key::Enter);
     assert!(bench.take_commands().is_empty(), "the offer to start has ended");
 }
@@ -478,9 +478,9 @@ fn quitting_takes_a_key_before_and_a_typed_word_while_armed() {
         bench.keys(&[key, key]);
         bench.run(1.0);
         assert!(!leaves(&bench), "two keys do not");
-        bench.run(QUIT_TIME_LIMIT.as_secs_f64());
+        bench.run(QUIT_TIME_LIMIT.as_secs_f64() + 0.1);
         bench.keys(&[vec![key], typed("quit")].concat());
-        bench.run(QUIT_TIME_LIMIT.as_secs_f64());
+        bench.run(QUIT_TIME_LIMIT.as_secs_f64() + 0.1);
         bench.key(Key::Enter);
         assert!(!leaves(&bench), "the offer has ended");
         bench.keys(&[vec![key], typed("Quit"), vec![Key::Enter]].concat());

@@ -41,7 +41,7 @@ pub(crate) fn armed() -> Bench {
 
 pub(crate) fn counting() -> Bench {
     let mut bench = armed();
-    bench.keys(&[Key::Char('S'), Key::Enter]);
+    bench.keys(&crate::hand::start_ladder());
     bench.answer(MavCmd::MAV_CMD_MISSION_START, 0);
     bench.countdown_ms = 3_200;
     bench.run(1.0);
