@@ -1,6 +1,6 @@
 //! Comparisons of flights of which one has lost records: what is missing counts, whichever of the two lost it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_TRUTH_SAMPLE};
 
@@ -11,7 +11,7 @@ use crate::simulated::NOMINAL;
 use crate::tampered::Held;
 
 /// The log with every other tick and two thirds of the truth left out.
-fn thinned(log: &PathBuf, directory: &tempfile::TempDir) -> PathBuf {
+fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
     let (mut ticks, mut truths) = (0, 0);
     held.keep(|message| match message.topic.as_str() {
