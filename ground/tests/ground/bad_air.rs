@@ -79,13 +79,14 @@ fn run(seed: u64) -> Run {
         let mut msgs = Vec::new();
         if craft.time_s() <= now.as_secs_f64() {
             for frame in up.arrived(now) {
-                endpoint.on_frame(&frame, craft.as_mut());
+                endpoint.on_frame(0, &frame, craft.as_mut());
             }
+            endpoint.watch_the_uplink(craft.as_mut());
             for event in craft.advance_frame(&mut || Duration::ZERO) {
                 endpoint.on_event(&event);
             }
-            for frame in endpoint.poll(craft.as_mut()) {
-                down.send(frame, now);
+            for leaving in endpoint.poll(craft.as_mut()) {
+                down.send(leaving.frame, now);
             }
             if craft.aborted() {
                 latched_at.get_or_insert(now);

@@ -53,11 +53,13 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let (mut tick_at, mut over_at) = (Duration::ZERO, None);
     loop {
         let now = Duration::from_secs_f64(craft.time_s());
+        endpoint.watch_the_uplink(craft.as_mut());
         for event in craft.advance_frame(&mut || Duration::ZERO) {
             endpoint.on_event(&event);
         }
         let mut msgs = Vec::new();
-        for frame in endpoint.poll(craft.as_mut()) {
+        for leaving in endpoint.poll(craft.as_mut()) {
+            let frame = leaving.frame;
             let bytes = frame.as_bytes().len();
             msgs.extend([Msg::Frame(frame), Msg::Received { bytes, framing: FramerCounters::default() }]);
         }
@@ -69,7 +71,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
             pace.mark_message(&msg, &model);
             for action in update(&mut model, msg, now) {
                 if let Action::Send(message) = action {
-                    endpoint.on_frame(&encoder.encode(&message), craft.as_mut());
+                    endpoint.on_frame(0, &encoder.encode(&message), craft.as_mut());
                 }
             }
         }

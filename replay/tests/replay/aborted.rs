@@ -7,7 +7,7 @@ use replay::log::Recording;
 use replay::refly::{ReflyOptions, StartAt, refly_flight};
 use replay::verify::{Outcome, verify};
 
-use crate::flown::{self, Recipe, write_log};
+use crate::flown::{self, Recipe, only, write_log};
 use crate::from_apogee;
 
 #[test]
@@ -15,7 +15,7 @@ fn from_apogee_an_aborted_flight_verifies_and_flies_the_same_again() {
     let aborted = from_apogee::fly(&["abort@powered+0..3"]);
     let recording = Recording::open(&aborted.log).unwrap();
     assert_eq!(recording.frames.iter().filter(|tick| tick.input.abort).count(), 1);
-    let report = verify(&aborted.log).unwrap();
+    let report = only(verify(&aborted.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
     let landing = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..ReflyOptions::default() };
     let (report, again) = refly_flight(&recording, &landing).unwrap();
@@ -30,7 +30,7 @@ fn verified(tell: impl Fn(&mut ControllerInput)) -> (Vec<v1::ControllerTick>, Ou
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("aborted.mcap");
     std::fs::write(&log, write_log(&ticks, &Recipe::default()).bytes).unwrap();
-    let outcome = verify(&log).unwrap().outcome;
+    let outcome = only(verify(&log).unwrap()).outcome;
     (ticks, outcome)
 }
 
