@@ -79,7 +79,9 @@ fn boot_ms_of(message: &MavMessage) -> Option<u32> {
 /// Receives with the ground's own links and model until the vehicle is silent for a while; returns the latencies.
 async fn receive(listening: Endpoint, vehicle: Option<Endpoint>) -> Result<Vec<Duration>, Failure> {
     let clock = Clock::start();
-    let mut wire = Wire::open(vec![listening], None, clock, None, LogTime::Run(clock)).await?;
+    let mut wire =
+        Wire::open(protocol::identity::GROUND, vec![listening], None, clock, None, LogTime::Run(clock))
+            .await?;
     let ticks = Ticks::default();
     // Over UDP the vehicle speaks to the port that the system chose.
     let bound = wire.endpoints().next().map(ToString::to_string).unwrap_or_default();

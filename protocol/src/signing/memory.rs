@@ -29,19 +29,19 @@ pub struct Memory {
 impl Memory {
     /// As lines of text.
     pub fn to_text(&self) -> String {
-        let lines = format!("ours {}\nclock {}\n", self.ours, self.clock);
-        self.streams.iter().fold(lines, |lines, stream| lines + &heard(stream))
+        [self.own_lines()].into_iter().chain(self.streams.iter().map(heard)).collect()
     }
 
     /// The lines that bring another memory, which is not newer, up to this one. Nothing while the timestamps of what is
     /// sent are covered for half of their lead.
     pub fn lines_since(&self, other: &Self) -> String {
         let news = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
-        let mut lines: String = news.map(heard).collect();
-        if self.ours > other.ours + LEAD / 2 {
-            lines += &format!("ours {}\nclock {}\n", self.ours, self.clock);
-        }
-        lines
+        let own = (self.ours > other.ours + LEAD / 2).then(|| self.own_lines());
+        news.map(heard).chain(own).collect()
+    }
+
+    fn own_lines(&self) -> String {
+        format!("ours {}\nclock {}\n", self.ours, self.clock)
     }
 
     /// Takes over what [`Memory::lines_since`] wrote down, so that it is not written again.

@@ -97,11 +97,14 @@ impl Waiting {
 
     /// The datagram whose turn it is.
     pub(super) fn pop(&mut self) -> Option<(SocketAddr, Vec<u8>)> {
+        let [first, second] = if self.proven_next {
+            [&mut self.proven, &mut self.unproven]
+        } else {
+            [&mut self.unproven, &mut self.proven]
+        };
+        let taken = first.pop().or_else(|| second.pop());
         self.proven_next = !self.proven_next;
-        match self.proven_next {
-            false => self.proven.pop().or_else(|| self.unproven.pop()),
-            true => self.unproven.pop().or_else(|| self.proven.pop()),
-        }
+        taken
     }
 }
 
