@@ -28,20 +28,26 @@ pub enum Touch {
 /// When which key came last.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Hand {
-    last: Option<(Key, Duration)>,
+    /// `None` is a paste.
+    last: Option<(Option<Key>, Duration)>,
     said_at: Option<Duration>,
 }
 
 impl Hand {
     /// How this key came; `together` with others in one read of the terminal.
     pub fn touch(&mut self, key: Key, together: bool, now: Duration) -> Touch {
-        let before = self.last.replace((key, now));
+        let before = self.last.replace((Some(key), now));
         match before {
             _ if together => Touch::Hurried,
-            Some((last, at)) if last == key && now.saturating_sub(at) < REPEATS_WITHIN => Touch::Repeat,
+            Some((Some(last), at)) if last == key && now.saturating_sub(at) < REPEATS_WITHIN => Touch::Repeat,
             Some((_, at)) if now.saturating_sub(at) < FINGERS_APART => Touch::Hurried,
             _ => Touch::Finger,
         }
+    }
+
+    /// Something was pasted; what comes close behind it is no finger's either.
+    pub fn pasted(&mut self, now: Duration) {
+        self.last = Some((None, now));
     }
 
     /// Something was dropped. Returns whether that is to be said.

@@ -43,6 +43,7 @@ pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
 /// What is pasted is meant for another window.
 pub(super) fn on_paste(model: &mut Model, now: Duration) {
     record_operator(model, "key", "a paste", now);
+    model.hand.pasted(now);
     model.quit_at = None;
     cancel(model, now);
     model.info(now, "a paste was dropped");

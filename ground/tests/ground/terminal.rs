@@ -59,7 +59,7 @@ fn a_terminal_that_vanishes_takes_nothing_with_it() {
     let mut attached =
         on_a_terminal(directory.path(), &format!("sh -c 'stty rows 24 cols 80; exec {program} attach'"))
             .unwrap();
-    assert!(wait_for(&directory.path().join("terminal.txt"), "controls:"));
+    assert!(wait_for(&directory.path().join("terminal.txt"), "Arming ladder"));
     attached.stdin.take().unwrap().write_all(b"q").unwrap();
     assert!(attached.wait().unwrap().success());
     assert!(signal("TERM", &process), "it still runs");
