@@ -54,7 +54,7 @@ impl Bench {
 
     fn beat(&mut self) {
         let beat = self.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-        self.endpoint.on_frame(&beat, &mut self.vehicle);
+        self.endpoint.on_frame(0, &beat, &mut self.vehicle);
     }
 
     /// Asks as a ground station does that is heard.

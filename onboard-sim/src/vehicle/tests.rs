@@ -243,10 +243,6 @@ fn an_abort_in_the_countdown_releases_nothing() {
     assert!(vehicle.snapshot().thrust_n.abs() < f64::EPSILON);
 }
 
-fn said(events: &[VehicleEvent], words: &str) -> bool {
-    events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
-}
-
 /// How long an aborted vehicle had been burning, s, and the abort's landing.
 fn aborted_after(burning_s: f64) -> (Vehicle, Vec<VehicleEvent>) {
     let mut vehicle = in_phase(Phase::Ignition);
