@@ -14,7 +14,7 @@ fn the_example_holds_every_key() {
         !config.connect.is_empty() && config.key.is_some() && config.log.is_some() && config.tlog.is_some()
     );
     assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-    assert_eq!(uncommented.lines().count(), 9, "one line a key: {uncommented}");
+    assert_eq!(uncommented.lines().count(), 11, "one line a key: {uncommented}");
     assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
 }
 
@@ -24,6 +24,8 @@ fn what_is_wrong_is_named() {
     assert!(wrong("belll = true").contains("belll"));
     assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
     assert!(wrong("colour = \"blue\"").contains("always"));
+    assert!(wrong("sysid = 0").contains("sysid: 0 addresses every system"));
+    assert!(wrong("vehicle_sysid = 256").contains("vehicle_sysid"));
     assert!(wrong("log = \"\"").contains("log: "));
     assert!(wrong("alarm_command = \" \"").contains("empty"));
 }
@@ -31,10 +33,12 @@ fn what_is_wrong_is_named() {
 /// Key, its text in a file, its flags, and whether settings and command line together then say what the flag says.
 type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
 
-const OVERRIDES: [Override; 9] = [
+const OVERRIDES: [Override; 11] = [
     ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
         cli.connect == [Endpoint::UdpIn("0.0.0.0:2".to_owned())]
     }),
+    ("sysid", "3", &["--sysid", "4"], |cli, _| cli.us().system_id == 4),
+    ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |cli, _| cli.vehicle().system_id == 4),
     ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |cli, _| cli.key == Some("b".into())),
     ("log", "\"a.mcap\"", &["--log", "b.mcap"], |cli, _| cli.log == Some(LogChoice::File("b.mcap".into()))),
     ("tlog", "\"a.tlog\"", &["--tlog", "none"], |cli, _| cli.tlog == Some(LogChoice::None)),
