@@ -207,18 +207,18 @@ async fn serve(
         out.extend_from_slice(&bytes);
         if out.len() > 256 * 1024 {
             if write.write_all(&out).await.is_err() {
-                return listening.abort();
+                return hear_out(write, listening).await;
             }
             out.clear();
         }
     }
     out.extend(encode_told(&Told::Live, Duration::ZERO).unwrap_or_default());
     if write.write_all(&out).await.is_err() {
-        return listening.abort();
+        return hear_out(write, listening).await;
     }
     loop {
         tokio::select! {
-            // Lagged behind, or the station ends: the screen sees its end and attaches again.
+            // Lagged behind, or gone: it sees its end and attaches again.
             news = live.recv() => match news {
                 Ok(bytes) if write.write_all(&bytes).await.is_ok() => {}
                 _ => break,
@@ -226,7 +226,16 @@ async fn serve(
             _ = &mut listening => return,
         }
     }
-    listening.abort();
+    hear_out(write, listening).await;
+}
+
+/// A screen that nothing can be told any more may have asked for something with its last breath, for an abort perhaps.
+async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<()>) {
+    // Its end of the news; it closes its own then.
+    drop(write);
+    if tokio::time::timeout(SPEAKS_WITHIN, &mut listening).await.is_err() {
+        listening.abort();
+    }
 }
 
 /// Reads a screen's requests until it ends or says what no screen says.
