@@ -326,7 +326,9 @@ impl Pilot {
         burning: bool,
     ) -> [f64; 4] {
         let fins = &self.known.airframe().fins;
-        let steering = matches!(self.mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition);
+        // Without a landing to steer to they brake, fully open.
+        let steering = matches!(self.mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
+            && !self.mode.interlocks.landing_motor_inhibited;
         if !(steering || burning) {
             // On the ground they stay where they are: nobody needs a servo moving there.
             let keep = matches!(self.mode.phase, Phase::Touchdown | Phase::Safed);
