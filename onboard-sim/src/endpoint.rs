@@ -299,7 +299,9 @@ impl VehicleEndpoint {
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
             // The vehicle says its reason itself, for the log and every ground.
-            Ok(Command::Vehicle(asked)) => (commands::mav_result(&self.put(asked, request.source, vehicle)), None),
+            Ok(Command::Vehicle(asked)) => {
+                (commands::mav_result(&self.put(asked, request.source, vehicle)), None)
+            }
             Ok(Command::ForcedDisarm) => {
                 let asked = if aborts { Request::Abort } else { Request::Disarm };
                 (commands::mav_result(&self.put(asked, request.source, vehicle)), None)

@@ -126,7 +126,11 @@ pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
 
 /// What the vehicle hears of a station. Addressed to nobody it is of everybody: nothing of any was accepted yet.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
-    if model.settings.us.accepts(Address { system_id: data.target_system, component_id: data.target_component }) {
+    if model
+        .settings
+        .us
+        .accepts(Address { system_id: data.target_system, component_id: data.target_component })
+    {
         model.link.uplink.hear(data, now);
     } else {
         model.link.uplink.overhear(data);

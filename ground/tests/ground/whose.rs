@@ -18,7 +18,8 @@ fn first_line(bench: &Bench, columns: u16, rows: u16) -> String {
 
 #[test]
 fn every_screen_says_first_who_sits_where() {
-    let demo = Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
+    let demo =
+        Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
     let cases = [
         (demo, true, " DEMO       system 1 boot 1A2B3C4D mk2"),
         (settings(false, true), true, " SIM        system 1 boot 1A2B3C4D"),
