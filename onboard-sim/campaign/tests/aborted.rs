@@ -102,7 +102,8 @@ fn an_abort_that_lights_nothing_hits_the_ground_as_fast_as_predicted() {
     sortie.step();
     // What the prediction goes by, and the phase table asks for.
     let open_rad = sortie.flight().mission().airframe.fins.open_rad();
-    assert_eq!(sortie.flight().output().unwrap().fins_rad, [open_rad; 4]);
+    let fins_rad = sortie.flight().output().unwrap().fins_rad;
+    assert_eq!(fins_rad.map(f64::to_bits), [open_rad.to_bits(); 4]);
     while sortie.step() {}
     let found_m_s = -sortie.row().touchdown_vertical_m_s.unwrap();
     assert!((predicted_m_s - found_m_s).abs() < 2.0, "{predicted_m_s} m/s predicted, {found_m_s} found");

@@ -32,7 +32,7 @@ pub(crate) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
 }
 
 /// The words for an abort that found the landing motor lit, if it came between two moments.
-pub(crate) fn words_of_landing_here(before: &Interlocks, after: &Interlocks) -> Option<(Severity, String)> {
+pub(crate) fn words_of_landing_here(before: Interlocks, after: Interlocks) -> Option<(Severity, String)> {
     let aborted = after.lands_here && !before.lands_here;
     let words = if after.no_light_latched {
         "ABORT: the landing motor has not lit"

@@ -88,7 +88,7 @@ impl Rocket {
         for effect in effects_between(before, &after) {
             said.extend(words_of(effect, 0.0));
         }
-        said.extend(words_of_landing_here(&before.interlocks, &after.interlocks));
+        said.extend(words_of_landing_here(before.interlocks, after.interlocks));
         if let Some(air) = &mut self.air {
             let pilot = air.sortie.flight().pilot();
             let level = air.sortie.flight().output().map_or(ControlLevel::Idle, |output| output.level);

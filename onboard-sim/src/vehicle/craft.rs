@@ -103,7 +103,7 @@ impl Craft for Vehicle {
         for effect in next.effects.iter() {
             self.take_effect(effect);
         }
-        if let Some((severity, words)) = words_of_landing_here(&from.interlocks, &self.mode.interlocks) {
+        if let Some((severity, words)) = words_of_landing_here(from.interlocks, self.mode.interlocks) {
             self.say(severity, words);
         }
         if self.mode.phase != from.phase {
