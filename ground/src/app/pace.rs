@@ -27,7 +27,7 @@ const SMALL_CELLS: u32 = 80 * 24;
 /// Bytes that frames which can wait may bring any second to. What is left below the 5 and 8 kB of every second is for the one
 /// frame that cannot: another page, whole, takes up to 3 kB at 80x24.
 const SMALL_ROOM_BYTES: usize = 1_400;
-const LARGE_ROOM_BYTES: usize = 2_200;
+const LARGE_ROOM_BYTES: usize = 1_400;
 
 /// What is drawn at once when it changes.
 #[derive(Debug, Clone, Copy, PartialEq)]

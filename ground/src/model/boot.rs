@@ -45,6 +45,11 @@ impl Boot {
         self.number.is_some() && self.hil == Some(true) && self.flagged == Some(true)
     }
 
+    /// Whether it has told in both places, since its number was heard, whether it is a simulated one.
+    pub fn has_said_what_it_is(&self) -> bool {
+        self.hil.is_some() && self.flagged.is_some()
+    }
+
     /// Takes a message of the vehicle.
     pub fn hear(&mut self, message: &MavMessage) -> Spoken {
         match message {

@@ -27,7 +27,7 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     let phase = model.vehicle.phase().map(|phase| phase.value);
     match model.auto_step {
         AutoStep::WaitForReady { not_before } => match phase {
-            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed => start(model, now),
+            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && is_ours(model) => start(model, now),
             // Flying or flown already: there is nothing to start.
             Some(phase) if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 => {
                 model.auto_step = AutoStep::Done;
@@ -35,7 +35,7 @@ pub(super) fn step(model: &mut Model, now: Duration) {
             _ => arm_if_ready(model, not_before, now),
         },
         AutoStep::WaitForArmed => {
-            if armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
+            if armed && is_ours(model) && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
                 start(model, now);
             }
         }
@@ -43,10 +43,14 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     }
 }
 
-/// Whether the vehicle is known to be a real one, or not known to be a simulated one although it has said what it is.
+/// Whether the vehicle is known to be a simulated one.
+fn is_ours(model: &Model) -> bool {
+    model.settings.demonstration || model.vehicle.is_simulated()
+}
+
+/// Whether the vehicle has said what it is, and not that it is a simulated one.
 fn is_live(model: &Model) -> bool {
-    let has_said = model.vehicle.heartbeat.is_some() && model.vehicle.status.is_some();
-    has_said && !model.settings.demonstration && !model.vehicle.is_simulated()
+    model.vehicle.boot.has_said_what_it_is() && !is_ours(model)
 }
 
 fn refuse(model: &mut Model, now: Duration) {
@@ -90,6 +94,9 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
     let Some(status) = model.vehicle.status.as_ref() else {
         return Some("the vehicle has not said how its checks stand".to_owned());
     };
+    if !is_ours(model) {
+        return Some("the vehicle has not said that it is simulated".to_owned());
+    }
     let failing = words::failed_checks(status.value.checks_failed);
     if status.is_stale(now) {
         Some("the vehicle no longer says how its checks stand".to_owned())

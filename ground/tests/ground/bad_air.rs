@@ -66,7 +66,7 @@ struct Run {
 
 fn run(seed: u64) -> Run {
     let mut craft = load_profile("paper-calibrated").unwrap().craft(seed, DeadlinePolicy::Observe).unwrap();
-    let mut endpoint = VehicleEndpoint::sending(craft.standard());
+    let mut endpoint = VehicleEndpoint::sending(craft.standard()).booted(1);
     let (mut up, mut down) = (Air::new(2 * seed + 1), Air::new(2 * seed + 2));
     let mut model = Model::new(settings(false, true));
     let mut encoder = Encoder::new(GROUND);

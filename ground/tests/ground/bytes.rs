@@ -43,7 +43,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let mut craft = load_profile(profile).unwrap().craft(1, DeadlinePolicy::Observe).unwrap();
     craft.pull_pin();
     craft.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-    let mut endpoint = VehicleEndpoint::sending(craft.standard());
+    let mut endpoint = VehicleEndpoint::sending(craft.standard()).booted(1);
     let mut encoder = Encoder::new(GROUND);
     let mut model = Model::new(settings(true, true));
     let line = Line::default();

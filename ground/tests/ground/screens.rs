@@ -236,7 +236,7 @@ fn one_quantity_has_one_value_on_a_screen() {
     let mut bench = powered();
     bench.run(0.4);
     let screen = bench.screen(80, 24);
-    assert!(screen.contains("in            1.9 s"), "2.3 s, told 0.4 s ago: {screen}");
+    assert!(screen.contains("in          1.9 s"), "2.3 s, told 0.4 s ago: {screen}");
     assert!(bench.screen(40, 12).contains(" next touchdown in 1.9 s"), "{}", bench.screen(40, 12));
 }
 

@@ -45,9 +45,13 @@ fn every_screen_says_first_who_sits_where() {
 #[test]
 fn a_vehicle_that_contradicts_itself_is_live() {
     let mut bench = Bench::crewed();
-    bench.simulated = true;
     bench.run(2.0);
-    assert!(!bench.model.vehicle.is_simulated() && first_line(&bench, 80, 24).starts_with(" LIVE"));
+    assert!(bench.model.vehicle.is_simulated() && first_line(&bench, 80, 24).starts_with(" SIM"));
+    for simulated in [false, true] {
+        bench.simulated = simulated;
+        bench.run(2.0);
+        assert!(!bench.model.vehicle.is_simulated() && first_line(&bench, 80, 24).starts_with(" LIVE"));
+    }
     bench.boot_number += 1;
     bench.run(2.0);
     assert!(bench.model.vehicle.is_simulated() && first_line(&bench, 80, 24).starts_with(" SIM"));
