@@ -10,10 +10,10 @@ use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, auto, commands, crew, frames, keys};
-use crate::model::Model;
 use crate::model::events::Speaker;
 use crate::model::link::LinkState;
 use crate::model::vehicle::Deflection;
+use crate::model::{Model, Role};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
@@ -24,9 +24,11 @@ const LAST_WORDS: Duration = Duration::from_secs(2);
 const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
-    keys::expire(model, now);
-    keys::pass_abort_chord(model, now);
-    keys::pass_quit(model, now);
+    // A screen of another process has a clock of its own for its own hand: what the station's clock does there, the
+    // station has done already.
+    if matches!(model.settings.role, Role::Station | Role::Replaying) {
+        keys::pass(model, now);
+    }
     heartbeat(model, now);
     if model.link.heartbeat_at.is_some() && is_due(&mut model.due.timesync, TIMESYNC_EVERY, now) {
         let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
