@@ -29,6 +29,15 @@ fn whole_log(path: &Path, topic: &str) -> Vec<String> {
     found
 }
 
+/// Not the facts of the arming before it.
+fn wait_for_abort(screen: &Terminal) {
+    screen.wait_until("an abort that was seen", |window| {
+        window
+            .row_with(" ABORT  commanded ")
+            .filter(|facts| facts.contains("acknowledged accepted  observed yes"))
+    });
+}
+
 #[test]
 fn quit_and_terminated_it_gives_the_terminal_back_and_ends_its_log() {
     type Ending = fn(&mut Terminal);
@@ -65,14 +74,14 @@ fn armed_its_screen_quits_by_a_typed_word_alone_and_the_station_goes_on() {
     stage.terminal.wait_for("quit: cancelled");
     stage.terminal.type_by_hand(b"qquit\r");
     // What it says from now on is said on the terminal as it was.
-    stage.terminal.wait_for("the screen was quit; armed or in flight, so the station goes on");
+    stage.terminal.wait_for("the screen was quit; armed or in flight, so the station");
     assert!(stage.terminal.is_restored() && !stage.terminal.look().is_closed());
     stage.terminal.signal(Signal::SIGINT);
     stage.terminal.wait_for("SIGINT: the station goes on while armed or in flight");
     let mut second = Terminal::start(&ground(stage.folder.path(), &["attach"]), SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
-    second.wait_for("acknowledged accepted  observed yes");
+    wait_for_abort(&second);
     stage.terminal.signal(Signal::SIGTERM);
     assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
     whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
@@ -92,12 +101,12 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
     second.wait_for("the terminal is gone");
     second.type_by_hand(b"0");
     second.type_bytes(b"\x18\r");
-    second.wait_for("acknowledged accepted  observed yes");
+    wait_for_abort(&second);
     // Who only looks cannot abort, nor take the station with it.
     let watch = ground(stage.folder.path(), &["attach", "--watch"]);
     let mut third = Terminal::start(&watch, SIZE, false);
     third.wait_for("WATCHING only");
-    third.wait_for("acknowledged accepted  observed yes");
+    wait_for_abort(&third);
     for screen in [&mut second, &mut third] {
         screen.type_by_hand(b"q");
         screen.wait_for_end();
@@ -125,7 +134,7 @@ fn a_terminal_that_takes_nothing_stops_neither_link_nor_abort_nor_log() {
     let mut second = Terminal::start(&attach, SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
-    second.wait_for("acknowledged accepted  observed yes");
+    wait_for_abort(&second);
     drop(stalled);
     // Read again, it shows what is, not what was.
     stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");

@@ -110,14 +110,7 @@ pub async fn session(
             },
             () = clock.sleep_until(look_again_at) => {
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
-                // Where no socket was named, the station that holds the same link now; never another vehicle's.
-                let place = match named {
-                    Some(path) => Some(path.to_owned()),
-                    None => status::station_over(&model.settings.link_name).await,
-                };
-                if let Some(place) = place
-                    && let Ok(mut found) = Link::open(&place, viewer).await
-                {
+                if let Some(mut found) = find_again(named, &model.settings.link_name, viewer).await {
                     let abort_unsent = model.link.abort_unsent
                         && !found.ask(&Asked::Command(CommandKind::Abort)).await;
                     link = found;
@@ -136,29 +129,7 @@ pub async fn session(
             _ = ticks.tick() => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             () = clock.sleep_until(redraw_at) => Vec::new(),
         };
-        let mut quit = false;
-        for action in actions {
-            match action {
-                Action::Request(asked) => {
-                    if !link.ask(&asked).await {
-                        unsent(&mut model, &asked, times.theirs(clock.now()));
-                    }
-                }
-                Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
-                    link.ask(&Asked::Key(action.detail)).await;
-                }
-                Action::Redraw => output.clear(),
-                Action::Bell => output.bell(),
-                Action::Quit => quit = true,
-                // The station itself sends, records and tells.
-                Action::Send(_)
-                | Action::Record(_)
-                | Action::SyncLog
-                | Action::Alarm(_)
-                | Action::Tell(_)
-                | Action::LeaveScreen => {}
-            }
-        }
+        let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let now = clock.now();
         output.show(&model, now, times.theirs(now))?;
         if quit {
@@ -167,6 +138,49 @@ pub async fn session(
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
+}
+
+/// Does what a screen does itself. Returns whether to quit.
+async fn act(
+    actions: Vec<Action>,
+    model: &mut Model,
+    link: &mut Link,
+    output: &mut Output,
+    now: Duration,
+) -> bool {
+    let mut quit = false;
+    for action in actions {
+        match action {
+            Action::Request(asked) => {
+                if !link.ask(&asked).await {
+                    unsent(model, &asked, now);
+                }
+            }
+            Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
+                link.ask(&Asked::Key(action.detail)).await;
+            }
+            Action::Redraw => output.clear(),
+            Action::Bell => output.bell(),
+            Action::Quit => quit = true,
+            // The station itself sends, records and tells.
+            Action::Send(_)
+            | Action::Record(_)
+            | Action::SyncLog
+            | Action::Alarm(_)
+            | Action::Tell(_)
+            | Action::LeaveScreen => {}
+        }
+    }
+    quit
+}
+
+/// The station on the named socket; else the one that holds the same link now, never another vehicle's.
+async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<Link> {
+    let place = match named {
+        Some(path) => path.to_owned(),
+        None => status::station_over(links).await?,
+    };
+    Link::open(&place, viewer).await.ok()
 }
 
 /// Says what the crew asked for and no station took.

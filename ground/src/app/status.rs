@@ -56,9 +56,10 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> Status {
 pub(super) fn stopping(model: &Model, force: bool) -> Told {
     let refused = model.is_at_risk() && !model.settings.demonstration && !force;
     let log = model.settings.log_path.as_deref().unwrap_or("none");
-    let words = match refused {
-        true => "the vehicle is armed or in flight; --force ends the station nevertheless".to_owned(),
-        false => format!("log: {log}"),
+    let words = if refused {
+        "the vehicle is armed or in flight; --force ends the station nevertheless".to_owned()
+    } else {
+        format!("log: {log}")
     };
     Told::Stopping { stops: !refused, words }
 }

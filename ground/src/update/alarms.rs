@@ -4,9 +4,12 @@ use std::time::Duration;
 
 use protocol::dialect::{TdControlLevel, TdInterlock, TdPhase};
 
+use protocol::log::record::EventLevel;
+
 use super::Action;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::{Acknowledged, CommandKind};
+use crate::model::events::Speaker;
 use crate::model::link::{LinkState, RED_AFTER};
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::{Model, Role};
@@ -28,7 +31,13 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     if model.alarms.rings(now, !raised.is_empty()) {
         model.outbox.push(Action::Bell);
     }
-    model.outbox.extend(raised.into_iter().map(|alarm| Action::Alarm(alarm.text)));
+    for alarm in raised {
+        // Said, too, where there is no screen; a lost link and a live motor have said so themselves.
+        if alarm.kind == AlarmKind::UplinkLost {
+            model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
+        }
+        model.outbox.push(Action::Alarm(alarm.text));
+    }
 }
 
 fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {

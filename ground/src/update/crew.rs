@@ -24,15 +24,12 @@ pub(super) fn step(model: &mut Model, now: Duration) {
         }
         return;
     }
-    let due = match model.crew.hold_due {
-        Some(due) => due,
-        None => {
-            let text = format!("no commanding screen for {} s in the countdown: HOLD", ALONE_MAX.as_secs());
-            keys::record_operator(model, "hold", &text, now);
-            model.warn(now, text);
-            now
-        }
-    };
+    if model.crew.hold_due.is_none() {
+        let text = format!("no commanding screen for {} s in the countdown: HOLD", ALONE_MAX.as_secs());
+        keys::record_operator(model, "hold", &text, now);
+        model.warn(now, text);
+    }
+    let due = model.crew.hold_due.unwrap_or(now);
     if now + HALF_A_TICK >= due {
         model.outbox.push(Action::send(hold(model.settings.vehicle)));
         model.crew.hold_due = Some(now + HOLD_EVERY);

@@ -147,15 +147,22 @@ fn cancel(model: &mut Model, now: Duration) {
 }
 
 /// Closes what has waited too long: an offer to arm does not stay open behind the crew's back.
-pub(super) fn expire(model: &mut Model, now: Duration) {
+fn expire(model: &mut Model, now: Duration) {
     if model.dialog.until().is_some_and(|until| now > until) {
         let dialog = std::mem::replace(&mut model.dialog, Dialog::Closed);
         model.info(now, format!("{}: time is up, nothing was done", dialog.name()));
     }
 }
 
+/// Time passes for the hand: offers end, a chord or a key to quit turns out to be complete.
+pub(super) fn pass(model: &mut Model, now: Duration) {
+    expire(model, now);
+    pass_abort_chord(model, now);
+    pass_quit(model, now);
+}
+
 /// Quits, once no other key has followed the one that asked for it.
-pub(super) fn pass_quit(model: &mut Model, now: Duration) {
+fn pass_quit(model: &mut Model, now: Duration) {
     if model.quit_at.is_some_and(|at| now >= at) {
         model.quit_at = None;
         model.outbox.push(Action::Quit);
@@ -337,7 +344,7 @@ fn why_not_start(model: &Model, now: Duration) -> Option<String> {
 
 /// Lets the abort chord's time pass. Only with the clock, never with a key: that key may be one more
 /// repeat of a Ctrl-X that is held.
-pub(super) fn pass_abort_chord(model: &mut Model, now: Duration) {
+fn pass_abort_chord(model: &mut Model, now: Duration) {
     if model.abort_chord.pass(now) {
         abort(model, now);
     }

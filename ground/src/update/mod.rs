@@ -150,11 +150,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::Acknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
-        Msg::ScreenTick => {
-            keys::expire(model, now);
-            keys::pass_abort_chord(model, now);
-            keys::pass_quit(model, now);
-        }
+        Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
             let goes_on = "armed or in flight, so the station goes on";
             model.warn(now, format!("the screen was quit; {goes_on}: `ground attach` shows it"));

@@ -9,11 +9,11 @@ use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, auto, commands, crew, frames, keys};
-use crate::model::Model;
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link::LinkState;
 use crate::model::vehicle::{Deflection, is_on_pad};
+use crate::model::{Model, Role};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 /// A vehicle that is armed holds its countdown when it hears nothing for 2 s: of twenty heartbeats that each have one
@@ -29,9 +29,11 @@ const LAST_WORDS: Duration = Duration::from_secs(2);
 const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
-    keys::expire(model, now);
-    keys::pass_abort_chord(model, now);
-    keys::pass_quit(model, now);
+    // A screen of another process has a clock of its own for its own hand: what the station's clock does there, the
+    // station has done already.
+    if matches!(model.settings.role, Role::Station | Role::Replaying) {
+        keys::pass(model, now);
+    }
     heartbeat(model, now);
     let known = model.link.first_heartbeat_at.is_some();
     let timesync_every = if model.link.uplink.is_told() { TIMESYNC_EVERY } else { PROVING_TIMESYNC_EVERY };

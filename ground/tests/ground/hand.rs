@@ -3,9 +3,11 @@
 use std::time::Duration;
 
 use crate::bench::{Bench, is_abort, is_arm, typed};
+use ground::attach::codec::Asked;
 use ground::key::Key;
 use ground::model::Role;
 use ground::model::chord::ABORT_TIME_LIMIT;
+use ground::model::command::CommandKind;
 use ground::model::dialog::{ARM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT, START_TIME_LIMIT};
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
@@ -489,6 +491,26 @@ fn quitting_takes_a_key_before_and_a_typed_word_while_armed() {
     }
 }
 
+/// What comes of the station's own ticks is the station's to do; a chord or a quit must not be used up by them.
+#[test]
+fn the_stations_clock_takes_nothing_from_the_hand_at_an_attached_screen() {
+    let mut bench = Bench::crewed();
+    bench.model.settings.role = Role::Attached;
+    bench.key(Key::CtrlX);
+    bench.run(0.4);
+    bench.key(Key::CtrlX);
+    bench.run(0.3);
+    let asks = |bench: &Bench| bench.actions.contains(&Action::Request(Asked::Command(CommandKind::Abort)));
+    assert!(!asks(&bench));
+    bench.msg(Msg::ScreenTick);
+    assert!(asks(&bench));
+    bench.key(Key::Char('q'));
+    bench.run(0.3);
+    assert!(!bench.wants_to_quit());
+    bench.msg(Msg::ScreenTick);
+    assert!(bench.wants_to_quit());
+}
+
 /// A live station goes on without its screen; a demonstration ends with it, and so does a screen of another station.
 #[test]
 fn quitting_a_screen_never_ends_a_live_station_in_flight() {
@@ -505,6 +527,7 @@ fn quitting_a_screen_never_ends_a_live_station_in_flight() {
     watching.model.settings.role = Role::Watching;
     watching.key(Key::Char('q'));
     watching.run(0.1);
+    watching.msg(Msg::ScreenTick);
     assert!(watching.wants_to_quit(), "who only watches is not needed");
 }
 

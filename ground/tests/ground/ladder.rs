@@ -33,7 +33,7 @@ fn told_by_hand(history: &[Came]) -> Vec<(Option<Key>, Duration)> {
     let mut told = Vec::new();
     for (k, came) in history.iter().enumerate() {
         let before = k.checked_sub(1).map(|before| history[before]);
-        let gap = before.map_or(Duration::MAX, |before| came.at - before.at);
+        let gap = before.map_or(Duration::MAX, |before| came.at.saturating_sub(before.at));
         let repeats = before.is_some_and(|before| before.key == came.key) && gap < Duration::from_millis(120);
         if repeats && !came.together {
             continue;
@@ -53,7 +53,7 @@ fn ends_in_ladder(history: &[Came], opens: &[Key], word: &str, within_s: u64) ->
     rungs[0].0.is_some_and(|key| opens.contains(&key))
         && rungs[1..=word.len()].iter().map(|(key, _)| *key).zip(word.chars()).all(letter)
         && rungs[word.len() + 1].0 == Some(Key::Enter)
-        && rungs[word.len() + 1].1 - rungs[0].1 <= Duration::from_secs(within_s)
+        && rungs[word.len() + 1].1.saturating_sub(rungs[0].1) <= Duration::from_secs(within_s)
 }
 
 /// Whether the history ends in an abort's chord: Ctrl-X and within 2 s Enter; or Ctrl-X twice, not as a held key does.
@@ -62,9 +62,9 @@ fn ends_in_chord(history: &[Came]) -> bool {
     let presses: Vec<Duration> =
         history.iter().filter(|came| came.key == Some(Key::CtrlX)).map(|came| came.at).collect();
     let (Some(newest), Some(last)) = (presses.last(), history.last()) else { return false };
-    let entered = last.key == Some(Key::Enter) && last.at - *newest <= ABORT_TIME_LIMIT;
+    let entered = last.key == Some(Key::Enter) && last.at.saturating_sub(*newest) <= ABORT_TIME_LIMIT;
     let twice = presses.len() > 1 && {
-        let gap = *newest - presses[presses.len() - 2];
+        let gap = newest.saturating_sub(presses[presses.len() - 2]);
         gap >= Duration::from_millis(120) && gap <= ABORT_TIME_LIMIT
     };
     entered || twice
@@ -189,7 +189,7 @@ impl Watched {
     fn pass(&mut self, ms: u64) -> Result<(), TestCaseError> {
         for _ in 0..ms / 10 {
             self.bench.now += Duration::from_millis(10);
-            if self.bench.now.as_millis() % 500 == 0 {
+            if self.bench.now.as_millis().is_multiple_of(500) {
                 self.bench.heartbeat();
                 self.bench.flight_status();
             }
