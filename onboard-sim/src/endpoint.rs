@@ -262,9 +262,16 @@ impl VehicleEndpoint {
     /// The crew learns at once, by the two messages that say so, what has become of the vehicle.
     fn watch(&mut self, mode: &Mode) {
         let told = Told::from(mode);
-        if self.told.replace(told) != Some(told) {
+        let before = self.told.replace(told);
+        if before != Some(told) {
             self.hurry(HEARTBEAT_DATA::ID);
             self.hurry(TD_FLIGHT_STATUS_DATA::ID);
+        }
+        // No command repeats a phase of the flight, and one may be over within a tenth of a second.
+        if !told.phase.on_pad() && before.is_some_and(|before| before.phase != told.phase) {
+            for lane in &mut self.lanes {
+                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
+            }
         }
         if !told.interlocks.armed {
             self.stations.set_armed_by(None);
