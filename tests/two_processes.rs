@@ -121,7 +121,7 @@ impl Speaking {
                     std::thread::sleep(Duration::from_millis(100));
                 }
             })
-            .unwrap();
+            .expect("a thread");
         Self(over)
     }
 }

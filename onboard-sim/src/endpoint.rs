@@ -166,7 +166,9 @@ impl VehicleEndpoint {
     pub fn of_system(self, system_id: u8) -> Self {
         let us = VEHICLE.of_system(system_id);
         let mut lanes = self.lanes;
-        lanes.iter_mut().for_each(|lane| lane.speak_as(us));
+        for lane in &mut lanes {
+            lane.speak_as(us);
+        }
         Self { us, lanes, ..self }
     }
 
@@ -314,16 +316,11 @@ impl VehicleEndpoint {
                 (commands::mav_result(&self.put(asked, request.source, vehicle)), None)
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
-                match self.rates_forbidden(request.source, vehicle) {
-                    Some(reason) => {
-                        (MavResult::MAV_RESULT_DENIED, Some(format!("message {message_id}: {reason}")))
-                    }
-                    None => {
-                        let now_s = self.now_s;
-                        self.with_rates_of(link, |streams| {
-                            streams.set_interval(message_id, interval_us, now_s)
-                        })
-                    }
+                let now_s = self.now_s;
+                if let Some(reason) = self.rates_forbidden(request.source, vehicle) {
+                    (MavResult::MAV_RESULT_DENIED, Some(format!("message {message_id}: {reason}")))
+                } else {
+                    self.with_rates_of(link, |streams| streams.set_interval(message_id, interval_us, now_s))
                 }
             }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(link, message_id, of, vehicle),

@@ -161,7 +161,7 @@ pub struct Streams {
     messages: &'static [Standard],
     signature_len: usize,
     capacity_bytes_s: u32,
-    streams: Vec<Stream>,
+    each: Vec<Stream>,
 }
 
 impl Streams {
@@ -201,7 +201,7 @@ impl Streams {
                 sent_s: f64::NEG_INFINITY,
             }
         });
-        Self { messages, signature_len, capacity_bytes_s: RADIO_BUDGET_BYTES_S, streams: streams.collect() }
+        Self { messages, signature_len, capacity_bytes_s: RADIO_BUDGET_BYTES_S, each: streams.collect() }
     }
 
     /// The link's budget, bytes per second.
@@ -235,12 +235,12 @@ impl Streams {
             frame_len,
             vital: is_vital(message_id),
         };
-        self.streams.iter().filter(due).map(named).collect()
+        self.each.iter().filter(due).map(named).collect()
     }
 
     /// A message was sent, or there was nothing to say in it.
     pub fn on_sent(&mut self, message_id: u32, now_s: f64) {
-        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
+        for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.sent_s = now_s;
             let Some(interval_s) = stream.interval_s else { continue };
             // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
@@ -257,25 +257,25 @@ impl Streams {
 
     /// Sends a message no later than so long after the last time.
     pub(crate) fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
-        for stream in self.streams.iter_mut().filter(|stream| stream.message_id == message_id) {
+        for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.due_s = stream.due_s.min(stream.sent_s + interval_s);
         }
     }
 
     /// Bytes per second of all of them, at their longest.
     pub fn bytes_s(&self) -> f64 {
-        self.streams.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
+        self.each.iter().map(|stream| stream.bytes_s(stream.interval_s)).sum()
     }
 
     /// The longest frame of those that are sent, bytes.
     pub(crate) fn longest_frame_len(&self) -> usize {
-        let sent = self.streams.iter().filter(|stream| stream.interval_s.is_some());
+        let sent = self.each.iter().filter(|stream| stream.interval_s.is_some());
         sent.map(|stream| stream.frame_len).max().unwrap_or(0)
     }
 
     /// The interval of each, in their order; `None` is off.
     pub(crate) fn intervals(&self) -> Vec<Option<f64>> {
-        self.streams.iter().map(|stream| stream.interval_s).collect()
+        self.each.iter().map(|stream| stream.interval_s).collect()
     }
 
     /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
@@ -285,13 +285,13 @@ impl Streams {
         interval_us: f32,
         now_s: f64,
     ) -> (MavResult, Option<String>) {
-        let Some(place) = self.streams.iter().position(|stream| stream.message_id == message_id) else {
+        let Some(place) = self.each.iter().position(|stream| stream.message_id == message_id) else {
             return (
                 MavResult::MAV_RESULT_FAILED,
                 Some(format!("message {message_id} is not sent by this vehicle")),
             );
         };
-        let before = self.streams[place];
+        let before = self.each[place];
         let wanted = match interval_us {
             -1.0 => None,
             0.0 => before.default_interval_s,
@@ -316,7 +316,7 @@ impl Streams {
             );
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
-        let stream = &mut self.streams[place];
+        let stream = &mut self.each[place];
         stream.interval_s = wanted;
         // A new rate counts from now, also after a long interval.
         if let Some(interval_s) = wanted {
@@ -327,13 +327,13 @@ impl Streams {
 
     /// How often a message is sent, Hz; 0 if it is off or none of ours.
     pub fn rate_hz(&self, message_id: u32) -> f64 {
-        let stream = self.streams.iter().find(|stream| stream.message_id == message_id);
+        let stream = self.each.iter().find(|stream| stream.message_id == message_id);
         stream.and_then(|stream| stream.interval_s).map_or(0.0, |interval_s| 1.0 / interval_s)
     }
 
     /// MESSAGE_INTERVAL of a message.
     pub fn interval_of(&self, message_id: u32) -> MavMessage {
-        let stream = self.streams.iter().find(|stream| stream.message_id == message_id);
+        let stream = self.each.iter().find(|stream| stream.message_id == message_id);
         let interval_us = match stream.map(|stream| stream.interval_s) {
             Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
             Some(None) => -1,

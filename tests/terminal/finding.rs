@@ -1,6 +1,6 @@
 //! Stations are found, named and ended; and what is not a station's never touches one.
 
-use e2e::{Air, Ended, Program, Running, Signal, Terminal, free_port, program};
+use e2e::{Air, Bound, Ended, Program, Running, Signal, Terminal, program};
 
 use crate::stage::{ARM, SIZE, ground};
 
@@ -89,14 +89,13 @@ fn stations_are_listed_and_ended_and_an_armed_one_only_by_force() {
 #[test]
 fn an_address_in_use_names_the_station_that_holds_it() {
     let folder = tempfile::tempdir().unwrap();
-    let port = free_port();
-    let link = |address: &str| format!("udpin:{address}:{port}");
-    let arguments = ["daemon", "--connect", &link("127.0.0.1"), "--log", "held.mcap"];
-    let _daemon = Running::start(&mut ground(folder.path(), &arguments));
+    let arguments = ["daemon", "--connect", "udpin:127.0.0.1:0", "--log", "held.mcap"];
+    let mut daemon = Running::start(&mut ground(folder.path(), &arguments));
+    let taken = format!("udpin:0.0.0.0:{}", daemon.bound_port(Bound::Udp));
     // Found once it serves screens; its link is open then.
     let listed = || Running::to_end(&mut ground(folder.path(), &["status"])).output.contains("udpin:");
     assert!((0..100).any(|_| listed()), "the station is never found");
-    let second = Running::to_end(&mut ground(folder.path(), &["--connect", &link("0.0.0.0"), "--headless"]));
+    let second = Running::to_end(&mut ground(folder.path(), &["--connect", &taken, "--headless"]));
     assert_eq!(second.code, Some(1));
     for words in ["your ground station pid ", "holds udpin:", "`ground attach`", "`ground stop`", "in use"] {
         assert!(second.output.contains(words), "no {words} in:\n{}", second.output);

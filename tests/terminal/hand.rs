@@ -27,9 +27,9 @@ fn what_is_pasted_into_an_armed_station_starts_nothing() {
     let mut stage = Stage::set("paper-calibrated");
     stage.arm();
     stage.terminal.paste(NOTE);
+    stage.terminal.wait_for("a paste was dropped");
     stage.wait_for_keys();
     assert_eq!(stage.sent(START, 0.0), 0, "a countdown was started by a paste");
-    stage.terminal.wait_for("a paste was dropped");
 }
 
 /// A console without marks around what is pasted.

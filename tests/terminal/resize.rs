@@ -65,8 +65,8 @@ fn after_a_storm_of_sizes_the_screen_is_right_at_every_size() {
     stage.terminal.resize(SIZE);
     stage.terminal.wait_until("a flight's end, and nothing left over", |window| {
         let shown = window.rows();
-        let top = shown[0].starts_with(" TOUCHDOWN ") && shown[0].contains(" disarmed ");
-        (top && shown[3].starts_with(" Review ───") && shown[23].contains("[4Review]")).then_some(())
+        let top = shown[1].starts_with(" TOUCHDOWN ") && shown[1].contains(" disarmed ");
+        (top && shown[4].starts_with(" Review ───") && shown[23].contains("[4Review]")).then_some(())
     });
     let before = without_numbers(&stage.terminal.look());
     stage.terminal.type_bytes(b"\x0c");

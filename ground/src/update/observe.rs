@@ -38,7 +38,8 @@ impl Facts {
             phase: vehicle.phase().map(|phase| phase.value),
             armed: vehicle.armed().map(|armed| armed.value),
             counting: on_pad && vehicle.countdown_s().is_some(),
-            aborted: vehicle.interlocks().is_some_and(is_aborted),
+            aborted: vehicle.interlocks().is_some_and(is_aborted)
+                || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),
             danger: KeepAway::of(vehicle).map(|away| away.danger),
             verdict: vehicle.verdict.map(|verdict| verdict.value),

@@ -65,7 +65,10 @@ struct Run {
 }
 
 fn run(seed: u64) -> Run {
-    let mut craft = load_profile("paper-calibrated").unwrap().craft(seed, DeadlinePolicy::Observe).unwrap();
+    let mut craft = load_profile("paper-calibrated")
+        .expect("built in")
+        .craft(seed, DeadlinePolicy::Observe)
+        .expect("sound");
     let mut endpoint = VehicleEndpoint::sending(craft.standard()).booted(1);
     let (mut up, mut down) = (Air::new(2 * seed + 1), Air::new(2 * seed + 2));
     let mut model = Model::new(settings(false, true));
@@ -113,7 +116,8 @@ fn run(seed: u64) -> Run {
             done_at.get_or_insert(now);
         }
     }
-    let since = |at: Option<Duration>| at.map_or(f64::INFINITY, |at| (at - pressed_at).as_secs_f64());
+    let since =
+        |at: Option<Duration>| at.map_or(f64::INFINITY, |at| at.saturating_sub(pressed_at).as_secs_f64());
     let track = model.commands.of(CommandKind::Abort);
     let acknowledged_at = track.and_then(|track| track.acknowledged_at);
     Run { latched_s: since(latched_at), acknowledged_s: since(acknowledged_at), sent, sent_afterwards }

@@ -40,7 +40,8 @@ impl Write for Line {
 
 /// The frames of a flight from arming on: when, how many bytes, in which phase.
 fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPhase)> {
-    let mut craft = load_profile(profile).unwrap().craft(1, DeadlinePolicy::Observe).unwrap();
+    let mut craft =
+        load_profile(profile).expect("built in").craft(1, DeadlinePolicy::Observe).expect("sound");
     craft.pull_pin();
     craft.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     let mut endpoint = VehicleEndpoint::sending(craft.standard()).booted(1);
@@ -48,7 +49,8 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let mut model = Model::new(settings(true, true));
     let line = Line::default();
     let options = TerminalOptions { viewport: Viewport::Fixed(Rect::new(0, 0, columns, rows)) };
-    let mut terminal = Terminal::with_options(CrosstermBackend::new(line.clone()), options).unwrap();
+    let mut terminal =
+        Terminal::with_options(CrosstermBackend::new(line.clone()), options).expect("a terminal of memory");
     let (mut pace, mut drawn) = (Pace::default(), Vec::new());
     let (mut tick_at, mut over_at) = (Duration::ZERO, None);
     loop {
@@ -78,7 +80,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
         pace.look(&model);
         if now >= pace.redraw_at() {
             let theme = Theme { colour: true, ascii: false };
-            terminal.draw(|frame| view(&model, theme, now, frame)).unwrap();
+            terminal.draw(|frame| view(&model, theme, now, frame)).expect("memory takes it");
             let bytes = std::mem::take(&mut *line.0.borrow_mut()).len();
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
             let phase = model.vehicle.phase().map_or(TdPhase::TD_PHASE_SAFE, |phase| phase.value);

@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn val_wgs84_a_degree_is_as_long_as_tables_have_it() {
         let site = Site { latitude_deg: 45.0, longitude_deg: 10.0 };
-        let (latitude_deg, longitude_deg) = site.at_deg(1_111.3175, 788.4681);
+        let (latitude_deg, longitude_deg) = site.at_deg(1_111.317_5, 788.468_1);
         assert!((latitude_deg - 45.01).abs() < 1e-8, "{latitude_deg}");
         assert!((longitude_deg - 10.01).abs() < 1e-8, "{longitude_deg}");
         assert_eq!(site.at_deg(0.0, 0.0), (45.0, 10.0));

@@ -24,7 +24,7 @@ impl OnTheWire {
         Self { boot_number, network_bytes_s: RADIO_BUDGET_BYTES_S }
     }
 
-    pub(super) fn capacity_bytes_s(&self, link: &Endpoint) -> u32 {
+    pub(super) fn capacity_bytes_s(self, link: &Endpoint) -> u32 {
         match link {
             Endpoint::Serial { .. } => RADIO_BUDGET_BYTES_S,
             Endpoint::UdpIn(_) | Endpoint::UdpOut(_) | Endpoint::TcpIn(_) | Endpoint::TcpOut(_) => {

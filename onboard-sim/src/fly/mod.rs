@@ -31,6 +31,7 @@ use self::recording::{log_state, nanoseconds, note, record};
 use crate::craft::{Craft, Judged};
 use crate::endpoint::VehicleEndpoint;
 use crate::solve_times::SolveTimes;
+use crate::streams::Standard;
 use crate::vehicle::{DeadlinePolicy, VehicleError, VehicleEvent};
 
 /// How fast simulated time runs.
@@ -207,6 +208,21 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
     Box::pin(fly_observed(options, stop, |_, _| ())).await
 }
 
+/// The vehicle's end of its links, as ordered.
+fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEndpoint {
+    let endpoint = match options.key_file {
+        Some(_) => VehicleEndpoint::sending_signed(standard),
+        None => VehicleEndpoint::sending(standard),
+    };
+    let capacities_bytes_s: Vec<u32> =
+        options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
+    let endpoint = endpoint
+        .of_system(options.system_id)
+        .booted(options.on_the_wire.boot_number.get())
+        .over_links(&capacities_bytes_s);
+    if options.auto_start { endpoint.starting_by_itself() } else { endpoint }
+}
+
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
 /// The outcome depends only on profile, seed and what arrives on the links: not on the speed, the machine or
@@ -224,19 +240,7 @@ pub async fn fly_observed(
     craft.pull_pin();
     let mut links =
         Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
-    let endpoint = match options.key_file {
-        Some(_) => VehicleEndpoint::sending_signed(craft.standard()),
-        None => VehicleEndpoint::sending(craft.standard()),
-    };
-    let capacities_bytes_s: Vec<u32> =
-        options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
-    let mut endpoint = endpoint
-        .of_system(options.system_id)
-        .booted(options.on_the_wire.boot_number.get())
-        .over_links(&capacities_bytes_s);
-    if options.auto_start {
-        endpoint = endpoint.starting_by_itself();
-    }
+    let mut endpoint = endpoint_of(&options, craft.standard());
     let crewed = !options.links.is_empty() && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();

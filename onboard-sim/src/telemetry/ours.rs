@@ -34,7 +34,6 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
         abort_impact_m_s,
         boot_number,
         vehicle_flags: TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
-        ..TD_FLIGHT_STATUS_DATA::default()
     })
 }
 

@@ -255,7 +255,7 @@ impl CommandSender {
         }
         let Some(index) = waiting else { return false };
         if self.pending[index].resend == Resend::UntilWithdrawn {
-            self.note_answer(index, answer, final_answer);
+            self.note_answer(index, *answer, final_answer);
         } else if final_answer {
             self.pending.remove(index);
             self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
@@ -269,13 +269,13 @@ impl CommandSender {
 
     /// An answer to what goes on being sent: told when it differs from the one before. Once accepted it stays so: the
     /// copies that arrive later find nothing left to do.
-    fn note_answer(&mut self, index: usize, answer: &CommandAnswer, final_answer: bool) {
+    fn note_answer(&mut self, index: usize, answer: CommandAnswer, final_answer: bool) {
         let known = &mut self.pending[index].answered;
         if *known == Some(answer.result) || *known == Some(MavResult::MAV_RESULT_ACCEPTED as u8) {
             return;
         }
         *known = Some(answer.result);
-        let CommandAnswer { command, result, progress, .. } = *answer;
+        let CommandAnswer { command, result, progress, .. } = answer;
         self.events.push(if final_answer {
             CommandEvent::Answered { command, result }
         } else {

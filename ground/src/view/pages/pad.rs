@@ -207,7 +207,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         (checked, "every check passes"),
         (armed, "A, then ARM Enter (10 s)"),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT"),
-        (counting, "S, Enter (5 s): countdown"),
+        (counting, "S, then START Enter (10 s)"),
     ];
     let mut lines: Vec<Line> = rungs
         .into_iter()

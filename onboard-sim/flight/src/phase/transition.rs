@@ -203,13 +203,13 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             P::Touchdown,
             Effects::of(&[Effect::InhibitLandingMotor]),
         ),
-        (P::Touchdown, E::SafingDone) => match mode.may_be_safed(time_s) {
-            Err(refusal) => Row::Refuse(refusal),
-            Ok(()) => {
-                let effects = if locks.armed { Effects::of(&[Effect::Disarm]) } else { Effects::NONE };
-                Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, effects)
+        (P::Touchdown, E::SafingDone) => {
+            if let Err(refusal) = mode.may_be_safed(time_s) {
+                return Row::Refuse(refusal);
             }
-        },
+            let effects = if locks.armed { Effects::of(&[Effect::Disarm]) } else { Effects::NONE };
+            Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, effects)
+        }
         (_, E::SafingDone) => wrong("safe", "only TOUCHDOWN is made safe"),
     }
 }

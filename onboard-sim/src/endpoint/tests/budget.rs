@@ -114,7 +114,8 @@ fn flood(frame: u64) -> Vec<CommandRequest> {
 
 #[test]
 fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messages_come() {
-    for (mut bench, signature_len) in [(Bench::new(), 0), (Bench::signed(), SIGNATURE_LEN)] {
+    for (new, signature_len) in [(Bench::new as fn() -> Bench, 0), (Bench::signed, SIGNATURE_LEN)] {
+        let mut bench = new();
         let sent = bench.run_asked(12.0, flood);
         let worst = sent.worst_second(signature_len);
         assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
@@ -128,7 +129,8 @@ fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messag
 
 #[test]
 fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
-    for mut bench in [Bench::new(), Bench::signed()] {
+    for new in [Bench::new, Bench::signed] {
+        let mut bench = new();
         assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
         bench.run_asked(5.0, flood);
         bench.endpoint.on_command(0, &from(255, 185, 1.0, 0.0), &mut bench.vehicle);

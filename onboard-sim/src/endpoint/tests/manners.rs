@@ -49,16 +49,15 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
         bytes.to_vec()
     };
     let mut bench = Bench::new();
-    use MavMissionResult as R;
     for (message_id, payload, result, mission_type) in [
-        (44, vec![3, 0, 1, 1, 1], R::MAV_MISSION_UNSUPPORTED, 1),
-        (44, vec![0, 0, 1, 1, 2], R::MAV_MISSION_ACCEPTED, 2),
-        (45, vec![1, 1, 1], R::MAV_MISSION_ACCEPTED, 1),
-        (38, vec![0, 0, 2, 0, 1, 1, 0], R::MAV_MISSION_UNSUPPORTED, 0),
-        (40, vec![0, 0, 1, 1, 0], R::MAV_MISSION_INVALID_SEQUENCE, 0),
-        (51, vec![4, 0, 1, 1, 2], R::MAV_MISSION_INVALID_SEQUENCE, 2),
-        (39, item(0), R::MAV_MISSION_UNSUPPORTED, 0),
-        (73, item(2), R::MAV_MISSION_UNSUPPORTED, 2),
+        (44, vec![3, 0, 1, 1, 1], MavMissionResult::MAV_MISSION_UNSUPPORTED, 1),
+        (44, vec![0, 0, 1, 1, 2], MavMissionResult::MAV_MISSION_ACCEPTED, 2),
+        (45, vec![1, 1, 1], MavMissionResult::MAV_MISSION_ACCEPTED, 1),
+        (38, vec![0, 0, 2, 0, 1, 1, 0], MavMissionResult::MAV_MISSION_UNSUPPORTED, 0),
+        (40, vec![0, 0, 1, 1, 0], MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, 0),
+        (51, vec![4, 0, 1, 1, 2], MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, 2),
+        (39, item(0), MavMissionResult::MAV_MISSION_UNSUPPORTED, 0),
+        (73, item(2), MavMissionResult::MAV_MISSION_UNSUPPORTED, 2),
     ] {
         let sent = bench.question(message_id, &payload);
         let answer = find(&sent, |message| match message {
