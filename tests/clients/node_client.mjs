@@ -59,6 +59,15 @@ async function command(number, param1) {
   return (await answer).result
 }
 
+// As a ground station does; without it the vehicle is not armed.
+function beat() {
+  const data = new minimal.Heartbeat()
+  data.type = minimal.MavType.GCS
+  data.autopilot = minimal.MavAutopilot.INVALID
+  data.mavlinkVersion = 3
+  if (vehicle) send(data)
+}
+
 function check(fact, holds) {
   if (!holds) throw new Error(fact)
   console.log('ok', fact)
@@ -66,8 +75,9 @@ function check(fact, holds) {
 
 socket.bind(0, '127.0.0.1', async () => {
   try {
-    const beat = await message(minimal.Heartbeat)
-    check('the vehicle is a rocket', beat.type === minimal.MavType.ROCKET)
+    const first = await message(minimal.Heartbeat)
+    setInterval(beat, 500).unref()
+    check('the vehicle is a rocket', first.type === minimal.MavType.ROCKET)
     const attitude = await message(common.AttitudeQuaternion)
     check('upright', Math.abs(attitude.q1 - Math.SQRT1_2) < 0.02)
     await message(minimal.Heartbeat, data => data.customMode === 1)

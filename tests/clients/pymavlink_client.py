@@ -25,10 +25,15 @@ class Ground:
         self.me = (system, component)
         self.texts = []
         self.chunks = {}
+        # Whether heartbeats are sent while it waits, and when the next is due.
+        self.beats = False
+        self.beat_at = 0.0
 
     def wait(self, what, wanted, patience_s=PATIENCE_S):
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
+            if self.beats and time.monotonic() >= self.beat_at:
+                self.beat()
             message = self.link.recv_match(blocking=True, timeout=0.2)
             if message is None or message.get_type() == "BAD_DATA":
                 continue
@@ -52,6 +57,7 @@ class Ground:
         return self.wait(kind, lambda m: m if m.get_type() == kind and m.get_srcSystem() == 1 and wanted(m) else None)
 
     def beat(self):
+        self.beat_at = time.monotonic() + 0.5
         self.link.mav.heartbeat_send(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4)
 
     def answer_to(self, command):
@@ -201,6 +207,8 @@ def arming(ground):
 
 def main():
     ground = Ground(f"udpout:127.0.0.1:{sys.argv[1]}")
+    # As a ground station does; without it the vehicle is not armed.
+    ground.beats = True
     identity(ground)
     ground.message("HEARTBEAT", lambda m: m.custom_mode == 1)
     for part in (modes, refusals, intervals, parameters, files, clocks, arming):

@@ -40,7 +40,7 @@ def pad(ground):
 
 def main():
     ground = Ground(f"udpout:127.0.0.1:{sys.argv[1]}") if len(sys.argv) == 2 else SerialGround(sys.argv[1], int(sys.argv[2]))
-    ground.beat()
+    ground.beats = True
     ready(ground)
     pad(ground)
     check("arm", ground.command(400, 1) == ACCEPTED)

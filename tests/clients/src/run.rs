@@ -24,6 +24,9 @@ pub fn found(names: &[&str], package: &str) -> PathBuf {
 
 /// A program that sees none of the user's settings: a bare environment, and a home of ours below the target folder. A home
 /// that does not exist would not do: run by root, these programs make it.
+///
+/// # Panics
+/// The folder for its home cannot be made.
 pub fn outside(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.env_clear();

@@ -1,5 +1,4 @@
 //! A flight over socat's pseudo-terminals: it is what a crew tests its radio with.
-#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::Path;
 
