@@ -60,19 +60,27 @@ class Ground:
         self.beat_at = time.monotonic() + 0.5
         self.link.mav.heartbeat_send(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4)
 
-    def answer_to(self, command):
+    def answer_to(self, command, patience_s=PATIENCE_S):
         def wanted(m):
             mine = (m.target_system, m.target_component) == self.me
             return m if m.command == command and mine else None
 
         return self.wait(
-            f"an answer to {command}", lambda m: wanted(m) if m.get_type() == "COMMAND_ACK" else None
+            f"an answer to {command}",
+            lambda m: wanted(m) if m.get_type() == "COMMAND_ACK" else None,
+            patience_s,
         ).result
 
     def command(self, command, *params):
         params = list(params) + [float("nan")] * (7 - len(params))
-        self.link.mav.command_long_send(1, 1, command, 0, *params)
-        return self.answer_to(command)
+        # Many refusals in a row are not all answered: whoever wants an answer asks again, as the standard has it.
+        for confirmation in range(3):
+            self.link.mav.command_long_send(1, 1, command, confirmation, *params)
+            try:
+                return self.answer_to(command, 2)
+            except AssertionError as error:
+                unanswered = error
+        raise unanswered
 
     def text(self, words):
         def wanted(_):
@@ -136,7 +144,7 @@ def refusals(ground):
 
 
 def intervals(ground):
-    check("a message that is none of ours has failed", ground.command(511, 30, 0) == FAILED)
+    check("a message that is none of ours has failed", ground.command(511, 36, 0) == FAILED)
     check("one of our own dialect is set", ground.command(511, 54001, 1000000) == ACCEPTED)
     check("and comes", len(ground.message("TD_FINS").measured) == 4)
     check("attitude slowed to 2 Hz", ground.command(511, 31, 500000) == ACCEPTED)
