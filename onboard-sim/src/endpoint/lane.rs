@@ -246,7 +246,10 @@ impl Lane {
         let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
         if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
             let frame = self.encoder.encode(&message);
-            self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
+            // What the crew lives by is beside the smoothing: a change of phase must cost no position.
+            if !due.vital {
+                self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
+            }
             self.put(frame, context.now_s, frames);
         }
         self.streams.on_sent(due.message_id, context.now_s);

@@ -114,7 +114,11 @@ impl Pad {
     /// Sends a command, and returns its result.
     fn ask(&mut self, station: usize, command: MavCmd, param1: f32) -> u8 {
         self.tell(station, command, param1);
-        self.frame();
+        // Some way behind the answer before it.
+        let end_s = self.craft.time_s() + 0.3;
+        while self.answers().is_empty() && self.craft.time_s() < end_s {
+            self.frame();
+        }
         let answers = self.answers();
         assert_eq!(answers.len(), 1, "{answers:?}");
         answers[0]
