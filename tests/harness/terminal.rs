@@ -24,6 +24,8 @@ const ANSWER: &[u8] = b"\x1b[?0u";
 /// What every terminal answers when asked what it is; it ends the wait for an answer to the question.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
+/// A crew that sees nothing come of its keys types them again.
+const TYPED_AGAIN_AFTER: Duration = Duration::from_secs(3);
 /// Between two keys of an unhurried hand.
 const BETWEEN_KEYS: Duration = Duration::from_millis(150);
 
@@ -120,6 +122,21 @@ impl Terminal {
             }
             self.type_bytes(&[*key]);
         }
+    }
+
+    /// Types this by hand until these words are shown; returns how often. On a busy machine two keys may arrive together,
+    /// which no hand types.
+    ///
+    /// # Panics
+    /// Nothing comes of it.
+    pub fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
+        for typed in 1..=20 {
+            self.type_by_hand(keys);
+            if self.wait_within(TYPED_AGAIN_AFTER, |window| window.shows(words).then_some(())).is_some() {
+                return typed;
+            }
+        }
+        panic!("no `{words}` on:\n{}", self.look().rows().join("\n"));
     }
 
     /// Holds a key down for so many repeats, on a keyboard that repeats it after half a second and every 33 ms then.

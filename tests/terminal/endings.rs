@@ -72,9 +72,8 @@ fn armed_its_screen_quits_by_a_typed_word_alone_and_the_station_goes_on() {
     stage.terminal.wait_for("QUIT although armed or in flight");
     stage.terminal.type_by_hand(b"x");
     stage.terminal.wait_for("quit: cancelled");
-    stage.terminal.type_by_hand(b"qquit\r");
     // What it says from now on is said on the terminal as it was.
-    stage.terminal.wait_for("the screen was quit; armed or in flight, so the station");
+    stage.type_until(b"qquit\r", "the screen was quit; armed or in flight, so the station");
     assert!(stage.terminal.is_restored() && !stage.terminal.look().is_closed());
     stage.terminal.signal(Signal::SIGINT);
     stage.terminal.wait_for("SIGINT: the station goes on while armed or in flight");

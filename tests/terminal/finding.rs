@@ -52,9 +52,8 @@ fn a_bare_ground_beside_a_station_is_the_demonstration_and_says_that_the_station
     demonstration.wait_for("a station runs: pid ");
     demonstration.wait_for("`ground attach` shows it");
     demonstration.wait_for("GO: every arming check passes");
-    demonstration.type_by_hand(b"AARM\r");
-    demonstration.wait_for(" ARMED ");
-    demonstration.type_by_hand(b"SSTART\r");
+    demonstration.type_until(b"AARM\r", " ARMED ");
+    demonstration.type_until(b"SSTART\r", "START  commanded");
     demonstration.wait_for("AERO_DESCENT");
     assert!(held.air.commands().is_empty(), "the real vehicle was commanded");
     demonstration.signal(Signal::SIGTERM);
@@ -71,8 +70,7 @@ fn stations_are_listed_and_ended_and_an_armed_one_only_by_force() {
     {
         assert!(listed.output.contains(words), "no {words} in:\n{}", listed.output);
     }
-    screen.type_by_hand(b"AARM\r");
-    screen.wait_for(" ARMED ");
+    screen.type_until(b"AARM\r", " ARMED ");
     assert!(held.run(&["status"]).output.contains("PAD_ARMED ARMED"));
     let refused = held.run(&["stop"]);
     assert_eq!(refused.code, Some(1));

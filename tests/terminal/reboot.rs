@@ -49,10 +49,10 @@ fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_
         Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let fly = |station: &mut Terminal, flying: &mut Running| {
         station.wait_for("GO: every arming check passes");
-        station.type_by_hand(b"AARM\r");
+        station.type_until(b"AARM\r", " ARMED ");
         flying.wait_for_line("PAD_ARMED");
         station.wait_for("[x] armed, says HEARTBEAT");
-        station.type_by_hand(b"SSTART\r");
+        station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
         station.wait_for("AERO_DESCENT");
     };

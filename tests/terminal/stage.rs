@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
 
 use e2e::{Air, Program, Running, Signal, Terminal, program};
 use protocol::dialect::MavCmd;
@@ -10,8 +9,6 @@ use protocol::dialect::MavCmd;
 pub(crate) const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 pub(crate) const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
 pub(crate) const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
-/// A crew that sees nothing come of its keys types them again.
-const TYPED_AGAIN_AFTER: Duration = Duration::from_secs(3);
 
 pub(crate) const SIZE: (u16, u16) = (80, 24);
 
@@ -64,14 +61,7 @@ impl Stage {
 
     /// Types this by hand until something comes of it; returns how often.
     pub(crate) fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
-        for typed in 1..=20 {
-            self.terminal.type_by_hand(keys);
-            let shown = |window: &e2e::Window| window.shows(words).then_some(());
-            if self.terminal.wait_within(TYPED_AGAIN_AFTER, shown).is_some() {
-                return typed;
-            }
-        }
-        panic!("no `{words}` on:\n{}", self.terminal.look().rows().join("\n"));
+        self.terminal.type_until(keys, words)
     }
 
     /// The arming ladder, from the first check to the vehicle's own word; returns how often it was climbed.
