@@ -1,5 +1,5 @@
-//! Generates the MAVLink dialect from its XML and the log records from their `.proto`, and notes
-//! which build this is, so that every log can name it.
+//! Generates the MAVLink dialect from its XML and the log records from their `.proto` files, and records which build
+//! this is, so that every log can name it.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,14 +12,14 @@ use sha2::Digest as _;
 fn main() -> Result<()> {
     let out_dir = PathBuf::from(env::var("OUT_DIR").context("OUT_DIR")?);
     generate_dialect(&out_dir)?;
-    for package in ["log", "flight"] {
+    for package in ["log", "flight", "computer"] {
         generate_log_records(&out_dir, package)?;
     }
     note_the_build()
 }
 
 fn generate_dialect(out_dir: &Path) -> Result<()> {
-    // The generated code asks for features that this crate does not have.
+    // The generated code checks for features that this crate does not have.
     println!("cargo:rustc-check-cfg=cfg(feature, values(\"serde\", \"arbitrary\", \"ts-rs\"))");
     for file in ["minimal", "standard", "common", "touchdown"] {
         println!("cargo:rerun-if-changed=dialect/{file}.xml");
@@ -34,20 +34,35 @@ fn generate_log_records(out_dir: &Path, package: &str) -> Result<()> {
     println!("cargo:rerun-if-changed={file}");
     let descriptors = protox::compile([&file], ["proto"]).with_context(|| file.clone())?;
     fs::write(out_dir.join(format!("{package}_v1.fds")), descriptors.encode_to_vec())?;
-    prost_build::Config::new().compile_fds(descriptors).with_context(|| file.clone())?;
+    let mut config = prost_build::Config::new();
+    if package == "computer" {
+        // What it imports is generated already.
+        config.extern_path(".touchdown.log.v1", "crate::log::v1");
+        config.extern_path(".touchdown.flight.v1", "crate::log::flight_v1");
+    }
+    config.compile_fds(descriptors).with_context(|| file.clone())?;
     Ok(())
 }
 
-fn note_the_build() -> Result<()> {
+/// A development build names no commit: it contains later edits, and a name that changes with every commit would make
+/// Cargo compile everything that depends on this crate again.
+fn commit_of_a_release() -> Result<String> {
+    if env::var("PROFILE").context("PROFILE")? != "release" {
+        return Ok("none: a development build".to_owned());
+    }
     let git = |args: &[&str]| {
         let output = Command::new("git").args(args).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    let commit = git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
     if let Some(git_dir) = git(&["rev-parse", "--absolute-git-dir"]) {
         println!("cargo:rerun-if-changed={git_dir}/HEAD");
         println!("cargo:rerun-if-changed={git_dir}/logs/HEAD");
     }
+    Ok(git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned()))
+}
+
+fn note_the_build() -> Result<()> {
+    let commit = commit_of_a_release()?;
     let rustc = env::var("RUSTC").context("RUSTC")?;
     let version = Command::new(rustc).arg("--version").output().context("rustc --version")?;
     let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();

@@ -1,15 +1,10 @@
-//! Abort in each phase that this flight passes, asked of the real vehicle process over a real socket.
+//! Aborts in the phases of this flight, sent to the real vehicle process over a real socket.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use e2e::{BareGround, Ended, Program, Running, Signal, program};
-use protocol::dialect::{
-    MavCmd, MavMessage, MavModeFlag, MavState, TdAbortEffect, TdInterlock, TdMotor, TdPhase,
-};
+use e2e::{ABORT, ACCEPTED, ARM, BareGround, Ended, Running, START, Signal, vehicle};
+use protocol::dialect::{MavModeFlag, MavState, TdAbortEffect, TdInterlock, TdMotor, TdPhase};
 
-const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
-const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
-const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
-const ACCEPTED: u8 = 0;
+/// MAV_RESULT_FAILED as a number.
 const FAILED: u8 = 4;
 
 struct Flight {
@@ -21,14 +16,10 @@ struct Flight {
 fn fly_to(phase: TdPhase) -> Flight {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
-    let mut command = program(Program::OnboardSim);
-    command
-        .args(["fly", "--stay", "--mavlink", &ground.link(), "--log", "flight.mcap"])
-        .current_dir(folder.path());
-    let vehicle = Running::start(&mut command);
-    ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
+    let vehicle = Running::start(vehicle(folder.path(), &[&ground.link()]).arg("--stay"));
+    ground.wait_until_ready();
     if phase != TdPhase::TD_PHASE_PAD_IDLE {
-        arm(&mut ground);
+        assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
     }
     if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 {
         assert_eq!(ground.command(START, 0.0), ACCEPTED);
@@ -37,23 +28,14 @@ fn fly_to(phase: TdPhase) -> Flight {
     Flight { vehicle, ground, _folder: folder }
 }
 
-/// Arms as soon as the checks pass: the landing's first rehearsal takes a moment.
-fn arm(ground: &mut BareGround) {
-    ground.wait_for("every check passed", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed.is_empty() => Some(()),
-        _ => None,
-    });
-    assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
-}
-
-/// Told to stop, the vehicle says how its flight ended.
+/// Stops the vehicle, which then reports how its flight ended.
 fn ended(flight: Flight) -> Ended {
     flight.vehicle.signal(Signal::SIGTERM);
     flight.vehicle.wait()
 }
 
 #[test]
-fn on_the_pad_it_disarms_latches_and_refuses_to_arm() {
+fn an_abort_on_the_pad_disarms_latches_and_prevents_arming() {
     for phase in [TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED] {
         let mut flight = fly_to(phase);
         let before = flight.ground.wait_for_phase(phase);
@@ -73,11 +55,11 @@ fn on_the_pad_it_disarms_latches_and_refuses_to_arm() {
 }
 
 #[test]
-fn in_the_countdown_nothing_is_released() {
+fn an_abort_in_the_countdown_prevents_the_release() {
     let mut flight = fly_to(TdPhase::TD_PHASE_PAD_ARMED);
     assert_eq!(flight.ground.command(START, 0.0), ACCEPTED);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
-    // Longer than the countdown would have taken.
+    // The wait is longer than the countdown.
     let aborted_at_ms = flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms;
     while flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms < aborted_at_ms + 6_000 {}
     let ended = ended(flight);
@@ -86,7 +68,7 @@ fn in_the_countdown_nothing_is_released() {
 }
 
 #[test]
-fn under_thrust_it_lands_here_and_says_that_no_cut_off_exists() {
+fn an_abort_under_thrust_lands_on_the_ground_below_and_reports_that_no_cut_off_exists() {
     let mut flight = fly_to(TdPhase::TD_PHASE_POWERED);
     let before = flight.ground.wait_for_phase(TdPhase::TD_PHASE_POWERED);
     assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE);
@@ -105,24 +87,21 @@ fn under_thrust_it_lands_here_and_says_that_no_cut_off_exists() {
 }
 
 #[test]
-fn on_the_ground_there_is_nothing_left_to_abort() {
+fn an_abort_after_touchdown_is_refused() {
     let mut flight = fly_to(TdPhase::TD_PHASE_TOUCHDOWN);
     assert_eq!(flight.ground.command(ABORT, 1.0), FAILED);
-    // At rest it disarms; a hot motor is not safe, and is not called so for a minute.
-    flight.ground.wait_for("a disarmed vehicle with a hot motor", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status)) => {
-            assert_eq!(status.phase, TdPhase::TD_PHASE_TOUCHDOWN);
-            let disarmed = !status.interlocks.contains(TdInterlock::TD_INTERLOCK_ARMED);
-            (disarmed && status.motor == TdMotor::TD_MOTOR_HOT && status.approach_wait_s > 40).then_some(())
-        }
-        _ => None,
+    // At rest the vehicle disarms. It reports a hot motor, not a safe one, for a minute.
+    flight.ground.wait_for_status("a disarmed vehicle with a hot motor", |status| {
+        assert_eq!(status.phase, TdPhase::TD_PHASE_TOUCHDOWN);
+        let disarmed = !status.interlocks.contains(TdInterlock::TD_INTERLOCK_ARMED);
+        disarmed && status.motor == TdMotor::TD_MOTOR_HOT && status.approach_wait_s > 40
     });
     let ended = ended(flight);
     assert_eq!(ended.code, Some(0), "a landing stays a landing: {}", ended.output);
 }
 
 #[test]
-fn a_termination_of_nought_does_nothing() {
+fn a_termination_command_with_zero_does_nothing() {
     let mut flight = fly_to(TdPhase::TD_PHASE_PAD_ARMED);
     assert_eq!(flight.ground.command(ABORT, 0.0), FAILED);
     let beat = flight.ground.wait_for_heartbeat();

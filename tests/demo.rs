@@ -1,35 +1,30 @@
-//! The main job: `ground` without arguments and without a terminal.
+//! The demonstration: `ground` without arguments and without a terminal.
 
-use std::path::PathBuf;
+use std::path::Path;
 
-use e2e::{Program, Running, program};
+use e2e::{Program, Running, expect_identical_replay, program};
 
-/// The path a program printed as its log.
-fn log_in(output: &str, folder: &std::path::Path) -> PathBuf {
-    let name = output
-        .split_whitespace()
-        .rev()
-        .find(|word| std::path::Path::new(word).extension().is_some_and(|extension| extension == "mcap"))
-        .unwrap_or_else(|| panic!("no log's path in:\n{output}"));
-    folder.join(name)
+/// The name of the log that a program printed.
+fn log_in(output: &str) -> String {
+    let is_log = |word: &&str| Path::new(word).extension().is_some_and(|extension| extension == "mcap");
+    let name = output.split_whitespace().rev().find(is_log);
+    name.unwrap_or_else(|| panic!("no log is named in:\n{output}")).to_owned()
 }
 
 #[test]
-fn a_newcomer_sees_a_landing_and_its_log_replays_to_the_bit() {
+fn the_demonstration_lands_and_its_log_replays_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let flight = Running::to_end(program(Program::Ground).current_dir(folder.path()));
     assert_eq!(flight.code, Some(0), "{}", flight.output);
-    // The mission itself: from apogee, through both phases, to the ground.
+    // The mission goes from apogee through both phases to the ground.
     for words in ["PAD_ARMED", "AERO_DESCENT", "LAND_ARMED", "POWERED", "TOUCHDOWN", "LANDED"] {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
-    let log = log_in(&flight.output, folder.path());
+    let log = log_in(&flight.output);
 
-    let verified = Running::to_end(program(Program::Replay).arg("verify").arg(&log));
-    assert_eq!(verified.code, Some(0), "{}", verified.output);
-    assert!(verified.output.contains("ticks identical"), "{}", verified.output);
+    expect_identical_replay(folder.path(), &log);
 
-    let info = Running::to_end(program(Program::Replay).arg("info").arg(&log));
+    let info = Running::to_end(program(Program::Replay).arg("info").arg(folder.path().join(log)));
     assert_eq!(info.code, Some(0), "{}", info.output);
     for words in ["mission mk2", "/pilot/tick", "/mavlink/rx/raw", "/mavlink/tx/raw", "bit-exact"] {
         assert!(info.output.contains(words), "no {words} in:\n{}", info.output);
@@ -37,7 +32,7 @@ fn a_newcomer_sees_a_landing_and_its_log_replays_to_the_bit() {
 }
 
 #[test]
-fn the_papers_landing_alone_is_asked_for_by_name() {
+fn the_landing_of_the_paper_is_chosen_by_its_profile() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--profile", "paper-calibrated", "--speed", "4"];
     let flight = Running::to_end(program(Program::Ground).args(arguments).current_dir(folder.path()));
@@ -50,7 +45,7 @@ fn the_papers_landing_alone_is_asked_for_by_name() {
 }
 
 #[test]
-fn a_landing_that_cannot_be_is_refused_with_its_reason() {
+fn an_impossible_landing_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let refused = Running::to_end(
         program(Program::Ground).args(["--profile", "paper-as-printed"]).current_dir(folder.path()),
@@ -60,7 +55,7 @@ fn a_landing_that_cannot_be_is_refused_with_its_reason() {
 }
 
 #[test]
-fn a_wrong_word_is_answered_with_what_would_do() {
+fn a_wrong_argument_is_refused_with_the_valid_forms() {
     let folder = tempfile::tempdir().unwrap();
     for (program_of, arguments, words) in [
         (Program::Ground, &["--connect", "tcp:x:1"][..], "udpin:ADDRESS:PORT"),

@@ -1,103 +1,80 @@
-//! Every kind of link, and several at once, between the real processes.
+//! Flights over every kind of link and over several at once, between the real processes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use std::path::Path;
+use std::net::SocketAddr;
 
-use e2e::{BareGround, Bound, Program, Running, SerialLine, program};
-use protocol::dialect::{MavMessage, TdPhase};
-
-fn links<'a>(option: &'a str, links: &'a [String]) -> impl Iterator<Item = &'a str> {
-    links.iter().flat_map(move |link| [option, link.as_str()])
-}
-
-fn vehicle(folder: &Path, to: &[String]) -> Running {
-    let mut command = program(Program::OnboardSim);
-    Running::start(
-        command.args(["fly", "--log", "vehicle.mcap"]).args(links("--mavlink", to)).current_dir(folder),
-    )
-}
-
-fn ground(folder: &Path, to: &[String]) -> Running {
-    let mut command = program(Program::Ground);
-    command.args(["--headless", "--auto", "--log", "ground.mcap"]);
-    Running::start(command.args(links("--connect", to)).current_dir(folder))
-}
-
-/// Waits for the end and expects a landing; returns the ground's lines.
-fn landed(flight: Running, station: Running) -> String {
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
-    station.output
-}
+use e2e::{
+    BareGround, Bound, Program, Running, SerialLine, Signal, auto_ground, expect_landing, program,
+    unshared_address, vehicle,
+};
+use protocol::dialect::TdPhase;
 
 #[test]
-fn over_tcp_they_land_whoever_connects() {
-    let listen = ["tcpin:127.0.0.1:0".to_owned()];
-    let connect = |to: &mut Running| [format!("tcpout:127.0.0.1:{}", to.bound_port(Bound::Tcp))];
+fn over_tcp_they_land_whichever_side_connects() {
+    let listen = "tcpin:127.0.0.1:0";
+    let connect_to = |listener: &mut Running| format!("tcpout:127.0.0.1:{}", listener.bound_port(Bound::Tcp));
     let [first, second] = [(); 2].map(|()| tempfile::tempdir().unwrap());
-    let mut listening_flight = vehicle(first.path(), &listen);
-    let station = ground(first.path(), &connect(&mut listening_flight));
-    let mut listening_station = ground(second.path(), &listen);
-    let flight = vehicle(second.path(), &connect(&mut listening_station));
-    landed(listening_flight, station);
-    landed(flight, listening_station);
+    let mut listening_vehicle = Running::start(&mut vehicle(first.path(), &[listen]));
+    let ground = Running::start(&mut auto_ground(first.path(), &[&connect_to(&mut listening_vehicle)]));
+    let mut listening_ground = Running::start(&mut auto_ground(second.path(), &[listen]));
+    let vehicle = Running::start(&mut vehicle(second.path(), &[&connect_to(&mut listening_ground)]));
+    expect_landing(listening_vehicle, ground);
+    expect_landing(vehicle, listening_ground);
 }
 
 #[test]
 fn over_ipv6_they_land() {
     let folder = tempfile::tempdir().unwrap();
-    let mut station = ground(folder.path(), &["udpin:[::1]:0".to_owned()]);
-    let link = format!("udpout:[::1]:{}", station.bound_port(Bound::Udp));
-    landed(vehicle(folder.path(), &[link]), station);
+    let mut ground = Running::start(&mut auto_ground(folder.path(), &["udpin:[::1]:0"]));
+    let link = format!("udpout:[::1]:{}", ground.bound_port(Bound::Udp));
+    expect_landing(Running::start(&mut vehicle(folder.path(), &[&link])), ground);
 }
 
 #[test]
 fn at_115200_baud_they_land() {
     let line = SerialLine::new(115_200);
-    let link = |device: &Path| format!("serial:{}:115200", device.display());
     let folder = tempfile::tempdir().unwrap();
-    let flight = vehicle(folder.path(), &[link(&line.near)]);
-    landed(flight, ground(folder.path(), &[link(&line.far)]));
+    let vehicle = Running::start(&mut vehicle(folder.path(), &[&line.near_link()]));
+    expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&line.far_link()])));
 }
 
 #[test]
 fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
     let line = SerialLine::new(57_600);
-    let radio = |device: &Path| format!("serial:{}:57600", device.display());
     let folder = tempfile::tempdir().unwrap();
-    let listens = ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"].map(str::to_owned);
-    let mut flight = vehicle(folder.path(), &[&[radio(&line.near)], &listens[..]].concat());
-    let (udp, tcp) = (flight.bound_port(Bound::Udp), flight.bound_port(Bound::Tcp));
-    let calls = [format!("udpout:127.0.0.1:{udp}"), format!("tcpout:127.0.0.1:{tcp}")];
-    let station = ground(folder.path(), &[&[radio(&line.far)], &calls[..]].concat());
-    let output = landed(flight, station);
+    let links = [&line.near_link(), "udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"];
+    let mut vehicle = Running::start(&mut vehicle(folder.path(), &links));
+    let tcp_link = format!("tcpout:127.0.0.1:{}", vehicle.bound_port(Bound::Tcp));
+    let udp_link = vehicle.udp_link();
+    let ground = Running::start(&mut auto_ground(folder.path(), &[&line.far_link(), &udp_link, &tcp_link]));
+    let (_, ground) = expect_landing(vehicle, ground);
     for once in ["ARM acknowledged", "countdown started", "burn-out", "phase IGNITION -> POWERED"] {
-        assert_eq!(output.matches(once).count(), 1, "{once} in:\n{output}");
+        assert_eq!(ground.output.matches(once).count(), 1, "{once} in:\n{}", ground.output);
     }
-    assert!(output.contains("acknowledged: accepted, over "), "says which link:\n{output}");
+    let names_the_link = ground.output.contains("acknowledged: accepted, over ");
+    assert!(names_the_link, "no link is named with the acknowledgement:\n{}", ground.output);
 }
 
 #[test]
-fn of_two_rockets_on_one_link_each_has_its_own_ground() {
+fn a_ground_commands_only_its_own_one_of_two_rockets_on_one_link() {
     let folder = tempfile::tempdir().unwrap();
-    let mut station = program(Program::Ground);
-    station
-        .args(["--connect", "udpin:127.0.0.1:0", "--headless", "--auto", "--log", "ground.mcap"])
-        .args(["--sysid", "254", "--vehicle-sysid", "2"])
-        .current_dir(folder.path());
-    let mut station = Running::start(&mut station);
-    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
+    let mut ground = auto_ground(folder.path(), &["udpin:127.0.0.1:0"]);
+    let mut ground = Running::start(ground.args(["--sysid", "254", "--vehicle-sysid", "2"]));
+    let link = ground.udp_link();
     let rocket = |id: &str| {
         let mut command = program(Program::OnboardSim);
         Running::start(command.args(["fly", "--mavlink", &link, "--sysid", id]).current_dir(folder.path()))
     };
     let (first, second) = (rocket("1"), rocket("2"));
-    let (station, second) = (station.wait(), second.wait());
-    assert_eq!((station.code, second.code), (Some(0), Some(0)), "{}\n{}", station.output, second.output);
-    first.signal(e2e::Signal::SIGTERM);
+    expect_landing(second, ground);
+    first.signal(Signal::SIGTERM);
     let first = first.wait();
-    assert!(!first.output.contains("PAD_ARMED"), "the other rocket's commands: {}", first.output);
-    // The log shows the one that flew.
+    assert!(
+        !first.output.contains("PAD_ARMED"),
+        "it obeyed the commands to the other rocket: {}",
+        first.output
+    );
+    // The log shows the flight of the second rocket.
     let mut replayed = program(Program::Ground);
     let replayed = Running::to_end(
         replayed
@@ -109,54 +86,46 @@ fn of_two_rockets_on_one_link_each_has_its_own_ground() {
 }
 
 #[test]
-fn a_link_that_dies_in_flight_is_named_and_the_other_carries_on() {
+fn a_link_that_fails_in_flight_is_reported_and_the_other_one_continues() {
     let folder = tempfile::tempdir().unwrap();
-    let mut flight = vehicle(folder.path(), &["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"].map(str::to_owned));
-    let relay = Relay::to(flight.bound_port(Bound::Tcp));
-    let calls = [
-        format!("udpout:127.0.0.1:{}", flight.bound_port(Bound::Udp)),
-        format!("tcpout:127.0.0.1:{}", relay.port),
-    ];
-    let mut station = ground(folder.path(), &calls);
-    station.wait_for_line("START observed");
+    let links = ["udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"];
+    let mut vehicle = Running::start(&mut vehicle(folder.path(), &links));
+    let relay = Relay::to(vehicle.bound_port(Bound::Tcp));
+    let (udp_link, tcp_link) = (vehicle.udp_link(), format!("tcpout:{}", relay.address));
+    let mut ground = Running::start(&mut auto_ground(folder.path(), &[&udp_link, &tcp_link]));
+    ground.wait_for_line("START observed");
     drop(relay);
-    station.wait_for_line("one link down");
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
-    assert!(!station.output.contains("LINK LOST"), "{}", station.output);
+    ground.wait_for_line("one link down");
+    let (_, ground) = expect_landing(vehicle, ground);
+    assert!(!ground.output.contains("LINK LOST"), "{}", ground.output);
 }
 
-/// The ground is stopped on the pad and started again: the vehicle answers the new one.
+/// The ground is stopped while the vehicle is on the pad, and the vehicle answers the next one.
 #[test]
 fn a_ground_that_restarts_is_answered_again() {
     let folder = tempfile::tempdir().unwrap();
-    let mut flight = vehicle(folder.path(), &["udpin:127.0.0.1:0".to_owned()]);
-    let port = flight.bound_port(Bound::Udp);
-    flight.wait_for_line("PAD_IDLE");
-    let watcher = || {
-        let mut command = program(Program::Ground);
-        command.args(["--headless", "--log", "none", "--connect", &format!("udpout:127.0.0.1:{port}")]);
-        Running::start(command.current_dir(folder.path()))
-    };
+    let mut vehicle = Running::start(&mut vehicle(folder.path(), &["udpin:127.0.0.1:0"]));
+    let link = vehicle.udp_link();
+    vehicle.wait_for_line("PAD_IDLE");
     for _ in 0..2 {
-        let mut first = watcher();
-        first.wait_for_line("PAD_IDLE");
-        first.signal(e2e::Signal::SIGTERM);
-        first.wait();
+        let mut command = program(Program::Ground);
+        command.args(["--headless", "--log", "none", "--connect", &link]);
+        let mut watching = Running::start(command.current_dir(folder.path()));
+        watching.wait_for_line("PAD_IDLE");
+        watching.signal(Signal::SIGTERM);
+        watching.wait();
     }
-    let station = ground(folder.path(), &[format!("udpout:127.0.0.1:{port}")]).wait();
-    assert_eq!(station.code, Some(0), "{}", station.output);
-    let flight = flight.wait();
-    assert_eq!(flight.code, Some(0), "{}", flight.output);
+    expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&link])));
 }
 
-/// The most that a vehicle on its pad may compute while its serial line is out, as a share of its own time: many times
-/// what it needs, and a quarter of what a loop that never waits takes where it has a core to itself.
+/// The most processor time that a vehicle on its pad may use while its serial line is gone, as a share of the elapsed
+/// time. It needs a small part of this; a loop that never waits takes four times as much.
 const PROCESSOR_SHARE_MAX: f64 = 0.25;
 
-/// A serial line that is pulled out and put back: the vehicle waits without running hot, and is heard again.
+/// A serial line is unplugged and plugged in again. The vehicle waits without using the processor, and is heard
+/// again.
 #[test]
-fn a_serial_line_is_survived_out_and_in_again() {
+fn a_serial_line_may_be_unplugged_and_plugged_in_again() {
     let folder = tempfile::tempdir().unwrap();
     let device = folder.path().join("radio");
     let plug = |line: &SerialLine| {
@@ -167,45 +136,41 @@ fn a_serial_line_is_survived_out_and_in_again() {
     let first = SerialLine::new(57_600);
     plug(&first);
     let radio = format!("serial:{}:57600", device.display());
-    let flight = vehicle(folder.path(), &[radio, watch.link()]);
-    watch.wait_for("every check passed", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status)) => status.checks_failed.is_empty().then_some(()),
-        _ => None,
-    });
+    let vehicle = Running::start(&mut vehicle(folder.path(), &[&radio, &watch.link()]));
+    watch.wait_until_ready();
     std::fs::remove_file(&device).unwrap();
     drop(first);
     let (busy_before, out_at_ms) =
-        (flight.processor_time(), watch.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms);
+        (vehicle.processor_time(), watch.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms);
     let mut time_ms = out_at_ms;
     while time_ms < out_at_ms + 3_000 {
         time_ms = watch.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms;
     }
-    let busy = flight.processor_time().saturating_sub(busy_before);
+    let busy = vehicle.processor_time().saturating_sub(busy_before);
     let share = busy.as_secs_f64() / (f64::from(time_ms - out_at_ms) * 1e-3);
     assert!(share < PROCESSOR_SHARE_MAX, "{busy:?} from {out_at_ms} to {time_ms} ms");
     let second = SerialLine::new(57_600);
     plug(&second);
-    let station = ground(folder.path(), &[format!("serial:{}:57600", second.far.display())]);
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
+    expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&second.far_link()])));
 }
 
-/// A TCP relay that can be cut.
+/// A TCP relay. Dropping it cuts the connection.
 struct Relay {
-    port: u16,
+    address: SocketAddr,
     _stop: std::sync::mpsc::SyncSender<()>,
 }
 
 impl Relay {
     fn to(to: u16) -> Self {
         let (stop, stopped) = std::sync::mpsc::sync_channel::<()>(0);
-        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = listener.local_addr().unwrap().port();
+        // The ground keeps calling this address after the relay is gone, and no other program may answer there.
+        let address = unshared_address();
+        let listener = std::net::TcpListener::bind(address).unwrap();
         std::thread::Builder::new()
             .name("relay".to_owned())
             .spawn(move || {
                 let (near, _) = listener.accept().unwrap();
-                // Nobody is let in a second time.
+                // A cut connection is not accepted again.
                 drop(listener);
                 let far = std::net::TcpStream::connect(("127.0.0.1", to)).unwrap();
                 let copy = |mut from: std::net::TcpStream, mut to: std::net::TcpStream| {
@@ -216,13 +181,13 @@ impl Relay {
                 };
                 copy(near.try_clone().unwrap(), far.try_clone().unwrap());
                 copy(far.try_clone().unwrap(), near.try_clone().unwrap());
-                // Waits until its owner goes.
+                // Wait until the relay is dropped.
                 let _ = stopped.recv();
                 for end in [near, far] {
                     let _ = end.shutdown(std::net::Shutdown::Both);
                 }
             })
             .unwrap();
-        Self { port, _stop: stop }
+        Self { address, _stop: stop }
     }
 }

@@ -1,11 +1,11 @@
-//! Logs under hard use: bits flipped, recorders killed, other CPUs, other times of day.
+//! Logs with flipped bits, killed recorders and other CPUs.
 
 use std::path::Path;
 
 use e2e::{Ended, Program, Running, Signal, program, rewrite_log, ticks_of};
 use prost::Message as _;
 
-/// Masks the instructions that glibc chooses its mathematics by.
+/// Hides the instructions by which glibc chooses its mathematical functions.
 const OTHER_CPU: (&str, &str) = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4");
 
 fn fly(folder: &Path, log: &str, environment: Option<(&str, &str)>) -> Ended {
@@ -22,7 +22,7 @@ fn verify(log: &Path, environment: Option<(&str, &str)>) -> Ended {
 }
 
 #[test]
-fn the_same_flight_on_another_cpu_is_the_same_to_the_bit() {
+fn the_same_flight_on_another_cpu_is_identical_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let here = fly(folder.path(), "here.mcap", None);
     let there = fly(folder.path(), "there.mcap", Some(OTHER_CPU));
@@ -70,7 +70,7 @@ fn a_killed_recorder_loses_a_fraction_of_a_second() {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--log", "killed.mcap"]).current_dir(folder.path());
     let mut flight = Running::start(&mut command);
-    // Killed the moment it says that its motor has burnt out.
+    // The vehicle is killed as soon as it reports that its motor has burnt out.
     flight.wait_for_line("burn-out");
     flight.signal(Signal::SIGKILL);
     flight.wait();
@@ -83,7 +83,7 @@ fn a_killed_recorder_loses_a_fraction_of_a_second() {
 }
 
 #[test]
-fn what_is_no_log_is_called_so() {
+fn a_file_that_is_no_log_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("picture.mcap");
     std::fs::write(&picture, b"\x89PNG\r\n\x1a\n and so on").unwrap();

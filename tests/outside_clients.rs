@@ -1,4 +1,4 @@
-//! Other people's programs are tried by a step of their own. `cargo test` installs nothing and asks for none of them.
+//! Tests with other people's programs are a separate step: `cargo test` needs and installs none of them.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -11,7 +11,7 @@ fn read(name: &str) -> String {
 }
 
 #[test]
-fn they_are_a_step_of_their_own_that_is_named_and_required() {
+fn tests_with_other_programs_are_a_separate_step_that_is_documented_and_required() {
     let workspace = read("Cargo.toml");
     let (_, default) = workspace.split_once("default-members = [").expect("default members");
     let (default, _) = default.split_once(']').expect("a list");
@@ -21,8 +21,9 @@ fn they_are_a_step_of_their_own_that_is_named_and_required() {
         let manifest = read(&format!("{member}/Cargo.toml"));
         assert!(!manifest.lines().any(|line| line.starts_with("clients ")), "{member} installs clients");
     }
-    assert!(read("README.md").contains(STEP), "the README names the step");
-    assert!(read(".ci/run").lines().any(|line| line == format!("step {STEP}")), "it is required");
-    // Past the test's captured output, so that nobody takes this run for theirs; nothing is left to do if it cannot be said.
+    assert!(read("README.md").contains(STEP), "the README does not name the step");
+    assert!(read(".ci/run").lines().any(|line| line == format!("step {STEP}")), "the step is not required");
+    // This bypasses the test's captured output, so that nobody mistakes this run for those tests. If it fails, there
+    // is nothing else to do.
     let _ = writeln!(std::io::stderr(), "NOT RUN: other people's programs against ours; `{STEP}` runs them");
 }

@@ -1,20 +1,13 @@
-//! A rocket from apogee on the wire: by itself, with the ground station over UDP and over a radio's serial line, and aborted.
+//! A rocket that flies from apogee: alone, with the ground station over UDP and over a serial radio, and aborted.
 
-use std::path::Path;
-
-use e2e::{BareGround, Program, Running, SerialLine, Signal, program};
-use protocol::dialect::{MavCmd, MavMessage, MavState, TdAbortEffect, TdChute, TdPhase};
-
-const ACCEPTED: u8 = 0;
-
-fn verify(folder: &Path, log: &str) {
-    let verified = Running::to_end(program(Program::Replay).args(["verify", log]).current_dir(folder));
-    assert_eq!(verified.code, Some(0), "{}", verified.output);
-    assert!(verified.output.contains("ticks identical"), "{}", verified.output);
-}
+use e2e::{
+    ABORT, ACCEPTED, ARM, BareGround, Program, Running, START, SerialLine, Signal, auto_ground,
+    expect_identical_replay, expect_landing, last_time_s, program, vehicle,
+};
+use protocol::dialect::{MavMessage, MavState, TdAbortEffect, TdChute, TdPhase};
 
 #[test]
-fn by_itself_it_lands_and_its_log_replays_to_the_bit() {
+fn a_rocket_without_a_ground_lands_and_its_log_replays_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let mut fly = program(Program::OnboardSim);
     fly.args(["fly", "--profile", "mk2", "--speed", "max", "--log", "flight.mcap"])
@@ -24,11 +17,11 @@ fn by_itself_it_lands_and_its_log_replays_to_the_bit() {
     for words in ["no ascent is flown", "AERO_DESCENT", "POWERED", "TOUCHDOWN", "LANDED", "Table 2"] {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
-    verify(folder.path(), "flight.mcap");
+    expect_identical_replay(folder.path(), "flight.mcap");
 }
 
 #[test]
-fn the_ground_s_own_demonstration_flies_it_too() {
+fn the_demonstration_of_the_ground_flies_the_same_mission() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = program(Program::Ground);
     ground.args(["--profile", "mk2", "--speed", "max", "--log", "both.mcap"]).current_dir(folder.path());
@@ -37,31 +30,19 @@ fn the_ground_s_own_demonstration_flies_it_too() {
     for words in ["AERO_DESCENT", "no ascent is flown", "LANDED"] {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
-    verify(folder.path(), "both.mcap");
+    expect_identical_replay(folder.path(), "both.mcap");
 }
 
 #[test]
-fn over_a_radio_s_serial_line_it_lands_within_its_budget() {
+fn over_a_serial_radio_it_lands_within_its_budget() {
     let folder = tempfile::tempdir().unwrap();
     let line = SerialLine::new(57_600);
-    let link = |device: &Path| format!("serial:{}:57600", device.display());
-    let mut vehicle = program(Program::OnboardSim);
-    vehicle.args(["fly", "--profile", "mk2", "--mavlink", &link(&line.near)]).current_dir(folder.path());
-    let mut ground = program(Program::Ground);
-    ground
-        .args(["--connect", &link(&line.far), "--headless", "--auto", "--log", "ground.mcap"])
-        .current_dir(folder.path());
-    let flight = Running::start(&mut vehicle);
-    let station = Running::start(&mut ground);
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!(station.code, Some(0), "{}", station.output);
-    assert_eq!(flight.code, Some(0), "{}", flight.output);
+    let mut vehicle = vehicle(folder.path(), &[&line.near_link()]);
+    let vehicle = Running::start(vehicle.args(["--profile", "mk2"]));
+    let ground = Running::start(&mut auto_ground(folder.path(), &[&line.far_link()]));
+    let (flight, _) = expect_landing(vehicle, ground);
     let [down, _] = line.carried();
-    let seconds = flight
-        .output
-        .lines()
-        .filter_map(|line| line.trim_start().split_once(" s  ")?.0.trim().parse::<f64>().ok())
-        .fold(0.0, f64::max);
+    let seconds = last_time_s(&flight.output);
     assert!(seconds > 15.0, "{}", flight.output);
     let down_s = down as f64 / seconds;
     println!("serial line at 57600 baud: {down_s:.0} B/s down over {seconds:.1} s");
@@ -69,34 +50,18 @@ fn over_a_radio_s_serial_line_it_lands_within_its_budget() {
 }
 
 #[test]
-fn an_abort_in_the_descent_brings_it_down_under_its_parachute() {
+fn an_abort_in_the_descent_opens_the_parachute() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
-    let mut command = program(Program::OnboardSim);
-    command
-        .args(["fly", "--profile", "mk2", "--stay", "--speed", "2", "--mavlink", &ground.link()])
-        .args(["--log", "flight.mcap"])
-        .current_dir(folder.path());
-    let vehicle = Running::start(&mut command);
-    ground.wait_for("every check passed", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status))
-            if status.phase == TdPhase::TD_PHASE_PAD_IDLE && status.checks_failed.is_empty() =>
-        {
-            Some(())
-        }
-        _ => None,
+    let mut command = vehicle(folder.path(), &[&ground.link()]);
+    let vehicle = Running::start(command.args(["--profile", "mk2", "--stay", "--speed", "2"]));
+    ground.wait_until_ready();
+    assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
+    assert_eq!(ground.command(START, 0.0), ACCEPTED);
+    ground.wait_for_status("room for the parachute", |status| {
+        status.abort_effect == TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW
     });
-    assert_eq!(ground.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0), ACCEPTED);
-    assert_eq!(ground.command(MavCmd::MAV_CMD_MISSION_START, 0.0), ACCEPTED);
-    ground.wait_for("room for the parachute", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status))
-            if status.abort_effect == TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW =>
-        {
-            Some(())
-        }
-        _ => None,
-    });
-    assert_eq!(ground.command(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0), ACCEPTED);
+    assert_eq!(ground.command(ABORT, 1.0), ACCEPTED);
     ground.wait_for_phase(TdPhase::TD_PHASE_CHUTE);
     ground.wait_for("an open parachute", |_, message| match message {
         Some(MavMessage::TD_DESCENT(descent)) if descent.chute == TdChute::TD_CHUTE_OPEN => Some(()),
@@ -108,5 +73,5 @@ fn an_abort_in_the_descent_brings_it_down_under_its_parachute() {
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(ended.output.contains("parachute deployed"), "{}", ended.output);
     assert!(!ended.output.contains("IGNITION"), "{}", ended.output);
-    verify(folder.path(), "flight.mcap");
+    expect_identical_replay(folder.path(), "vehicle.mcap");
 }

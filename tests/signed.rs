@@ -1,19 +1,18 @@
-//! Signed links between the real processes.
+//! Flights over signed links between the real processes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use std::net::UdpSocket;
+use std::net::{SocketAddr, UdpSocket};
 use std::path::Path;
 use std::time::Duration;
 
-use e2e::{Bound, Ended, Program, Running, Signal, program};
+use e2e::{
+    Program, Running, Signal, auto_ground, expect_landing, keygen, program, signing_clock,
+    signing_with_key_in, unshared_address,
+};
 use protocol::dialect::{MavMessage, TIMESYNC_DATA};
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
-use protocol::signing::{Key, Memory, Signing, stamp_of};
-
-fn keygen(folder: &Path, name: &str) -> Ended {
-    Running::to_end(program(Program::OnboardSim).args(["keygen", name]).current_dir(folder))
-}
+use protocol::signing::Signing;
 
 fn fly(folder: &Path, key: &str, link: &str) -> Running {
     let mut command = program(Program::OnboardSim);
@@ -24,17 +23,11 @@ fn fly(folder: &Path, key: &str, link: &str) -> Running {
 fn with_one_key_they_land_and_remember_their_timestamps() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(0));
-    assert_eq!(keygen(folder.path(), "flight.key").code, Some(1), "a key is not overwritten");
-    let mut station = program(Program::Ground);
-    station
-        .args(["--connect", "udpin:127.0.0.1:0", "--key", "flight.key"])
-        .args(["--headless", "--auto", "--log", "ground.mcap"])
-        .current_dir(folder.path());
-    let mut station = Running::start(&mut station);
-    let link = format!("udpout:127.0.0.1:{}", station.bound_port(Bound::Udp));
-    let flight = fly(folder.path(), "flight.key", &link);
-    let (station, flight) = (station.wait(), flight.wait());
-    assert_eq!((station.code, flight.code), (Some(0), Some(0)), "{}\n{}", station.output, flight.output);
+    assert_eq!(keygen(folder.path(), "flight.key").code, Some(1), "the key was overwritten");
+    let mut station = auto_ground(folder.path(), &["udpin:127.0.0.1:0"]);
+    let mut station = Running::start(station.args(["--key", "flight.key"]));
+    let flight = fly(folder.path(), "flight.key", &station.udp_link());
+    expect_landing(flight, station);
     for user in ["vehicle", "ground"] {
         let stamps = folder.path().join(format!("flight.key.{user}.stamps"));
         let text = std::fs::read_to_string(stamps).unwrap();
@@ -45,18 +38,18 @@ fn with_one_key_they_land_and_remember_their_timestamps() {
     let raw: Vec<u8> =
         (0..64).step_by(2).map(|at| u8::from_str_radix(&key[at..at + 2], 16).unwrap()).collect();
     for secret in [key.trim().as_bytes(), &raw] {
-        assert!(!bytes.windows(secret.len()).any(|window| window == secret), "a key in the log");
+        assert!(!bytes.windows(secret.len()).any(|window| window == secret), "the log contains the key");
     }
 }
 
 #[test]
-fn with_another_key_nothing_is_believed_on_either_side() {
+fn with_another_key_neither_side_accepts_anything() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["vehicle.key", "other.key"] {
         assert_eq!(keygen(folder.path(), name).code, Some(0));
     }
     let mut flight = fly(folder.path(), "vehicle.key", "udpin:127.0.0.1:0");
-    let link = format!("udpout:127.0.0.1:{}", flight.bound_port(Bound::Udp));
+    let link = flight.udp_link();
     for key in [Some("other.key"), None] {
         let mut station = program(Program::Ground);
         station
@@ -67,11 +60,12 @@ fn with_another_key_nothing_is_believed_on_either_side() {
         let station = Running::to_end(&mut station);
         assert_ne!(station.code, Some(0), "{}", station.output);
         if key.is_some() {
-            // The ground's counters, in words.
+            // The ground reports its counters in words.
             assert!(station.output.contains("wrongly signed"), "{}", station.output);
             assert!(!station.output.contains("PAD_IDLE"), "{}", station.output);
         } else {
-            // A ground without a key sees the vehicle, is not obeyed, and is told why.
+            // A ground without a key sees the vehicle. The vehicle does not obey it, and the ground reports the
+            // reason.
             assert!(station.output.contains("UPLINK LOST"), "{}", station.output);
             assert!(station.output.contains("not signed, is the key missing here?"), "{}", station.output);
         }
@@ -98,36 +92,33 @@ fn a_key_that_others_can_read_is_refused_by_name() {
     assert!(station.output.contains("chmod 600 open.key"), "{}", station.output);
 }
 
-/// A vehicle of one socket that asks for the ground's time: only what the ground believes is answered.
-struct Asker {
+/// A vehicle made of one socket. It asks the ground for its time with TIMESYNC, and the ground answers only frames
+/// that it accepts.
+struct TimesyncVehicle {
     socket: UdpSocket,
     encoder: Encoder,
     signing: Signing,
     asked: i64,
 }
 
-impl Asker {
-    fn new(folder: &Path, port: u16) -> Self {
-        let hex = std::fs::read_to_string(folder.join("flight.key")).unwrap();
+impl TimesyncVehicle {
+    fn new(folder: &Path, ground: SocketAddr) -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        socket.connect(("127.0.0.1", port)).unwrap();
+        socket.connect(ground).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
-        let signing = Signing::new(Key::from_hex(hex.trim_end()).unwrap(), Memory::default());
-        Self { socket, encoder: Encoder::new(VEHICLE), signing, asked: 0 }
+        Self { socket, encoder: Encoder::new(VEHICLE), signing: signing_with_key_in(folder), asked: 0 }
     }
 
     fn question(&mut self) -> Vec<u8> {
-        #[expect(clippy::disallowed_methods, reason = "signatures need the time of day")]
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
         self.asked += 1;
         let sync = TIMESYNC_DATA { tc1: 0, ts1: self.asked, target_system: 0, target_component: 0 };
         let frame = self.encoder.encode(&MavMessage::TIMESYNC(sync));
-        self.signing.sign(&frame, 0, stamp_of(now)).as_bytes().to_vec()
+        self.signing.sign(&frame, 0, signing_clock()).as_bytes().to_vec()
     }
 
-    /// Whether this is answered at once.
+    /// Sends a question and returns whether it is answered at once.
     fn is_answered(&self, question: &[u8]) -> bool {
-        // Nobody may be listening yet, which either the next call to send or the next to receive says.
+        // If nobody is listening yet, either the next send or the next receive reports it.
         let _ = self.socket.send(question);
         let mut datagram = [0; 2048];
         let mut framer = Framer::new();
@@ -153,7 +144,7 @@ impl Asker {
         }
     }
 
-    /// Asks anew until it is answered, and returns the question that was.
+    /// Sends new questions until one is answered, and returns that one.
     fn ask_until_answered(&mut self) -> Vec<u8> {
         for _ in 0..600 {
             let question = self.question();
@@ -161,10 +152,10 @@ impl Asker {
                 return question;
             }
         }
-        panic!("never answered");
+        panic!("no question was answered");
     }
 
-    /// Waits until somebody listens: until then the system refuses what is sent.
+    /// Waits until a program listens; until then the system reports an error.
     fn wait_for_listener(&self) {
         for _ in 0..600 {
             let refused = (0..3).any(|_| {
@@ -180,31 +171,30 @@ impl Asker {
 }
 
 #[test]
-fn what_a_ground_heard_is_not_believed_again_after_it_was_killed() {
+fn a_frame_that_a_ground_accepted_is_rejected_after_the_ground_was_killed() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(0));
-    let start = |port: u16| {
+    // The same address for every run, as a crew would use.
+    let address = unshared_address();
+    let start = || {
         let mut station = program(Program::Ground);
         station
-            .args(["--connect", &format!("udpin:127.0.0.1:{port}"), "--key", "flight.key"])
+            .args(["--connect", &format!("udpin:{address}"), "--key", "flight.key"])
             .args(["--headless", "--log", "none"])
             .current_dir(folder.path());
         Running::start(&mut station)
     };
-    // Any port; the ones after it listen at the same, as a crew's would.
-    let mut first = Some(start(0));
-    let port = first.as_mut().map_or(0, |station| station.bound_port(Bound::Udp));
-    let mut vehicle = Asker::new(folder.path(), port);
+    let mut vehicle = TimesyncVehicle::new(folder.path(), address);
     for _ in 0..3 {
-        let station = first.take().unwrap_or_else(|| start(port));
+        let station = start();
         let question = vehicle.ask_until_answered();
-        // It has acted on it just now.
+        // The station has just acted on it.
         station.signal(Signal::SIGKILL);
         station.wait();
-        let station = start(port);
+        let station = start();
         vehicle.wait_for_listener();
         for _ in 0..10 {
-            assert!(!vehicle.is_answered(&question), "believed twice");
+            assert!(!vehicle.is_answered(&question), "a replayed frame was accepted");
         }
         vehicle.ask_until_answered();
         station.signal(Signal::SIGKILL);
@@ -213,7 +203,7 @@ fn what_a_ground_heard_is_not_believed_again_after_it_was_killed() {
 }
 
 #[test]
-fn a_passphrase_makes_the_key_that_mavproxy_makes_of_it() {
+fn a_passphrase_gives_the_same_key_as_in_mavproxy() {
     use std::io::Write as _;
     let folder = tempfile::tempdir().unwrap();
     for (given, code) in [("\n", Some(1)), ("abc\n", Some(0))] {
@@ -231,7 +221,7 @@ fn a_passphrase_makes_the_key_that_mavproxy_makes_of_it() {
 }
 
 #[test]
-fn an_empty_file_of_timestamps_is_refused_on_both_sides() {
+fn an_empty_timestamp_file_is_refused_on_both_sides() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(0));
     for user in ["vehicle", "ground"] {

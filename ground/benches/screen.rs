@@ -1,4 +1,4 @@
-//! What one frame on the screen costs, and one message into the model.
+//! Measures the cost of drawing a frame and of taking a message into the model.
 
 use std::time::Duration;
 

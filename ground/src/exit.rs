@@ -1,12 +1,12 @@
-//! The exit codes, decided here and nowhere else.
+//! The exit codes and how a run is given one.
 
-use crate::model::outcome::Outcome;
+use crate::model::flight_so_far::FlightSoFar;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Landed inside every limit, or closed by the crew with no flight begun.
+    /// Landed inside every limit, or closed by the crew before a flight began.
     Landed = 0,
     /// Something failed: a file, a socket, the simulator.
     Error = 1,
@@ -16,11 +16,11 @@ pub enum Exit {
     OutsideLimits = 3,
     /// Arming or start was refused, or the flight was aborted.
     RefusedOrAborted = 4,
-    /// The end of the flight was not seen: link lost, nothing heard, time-out, or closed in flight.
+    /// The end of the flight was not seen: link lost, nothing heard, time limit, or closed in flight.
     NotSeen = 5,
 }
 
-/// The codes as `--help` shows them.
+/// The exit codes as `--help` shows them.
 pub const HELP: &str = "\
 Exit codes:
   0  landed inside every limit (full screen: also when closed before any flight began)
@@ -30,8 +30,8 @@ Exit codes:
   4  arming or start was refused, or the flight was aborted
   5  the end of the flight was not seen: link lost, nothing heard, time-out, or closed in flight";
 
-/// The exit of a run with this outcome; `interactive` if a person closed it.
-pub fn decide(outcome: &Outcome, interactive: bool) -> Exit {
+/// The exit code for an outcome; `interactive` if a person closed the program.
+pub fn decide(outcome: &FlightSoFar, interactive: bool) -> Exit {
     if outcome.error.is_some() {
         Exit::Error
     } else if outcome.aborted_at.is_some() {
@@ -39,7 +39,7 @@ pub fn decide(outcome: &Outcome, interactive: bool) -> Exit {
     } else if let Some((landed, _)) = outcome.verdict {
         if landed { Exit::Landed } else { Exit::OutsideLimits }
     } else if outcome.started {
-        // At rest without a verdict: under a parachute, or without a landing burn.
+        // At rest without a verdict: the vehicle came down under a parachute or without a landing burn.
         if outcome.safed_at.is_some() { Exit::OutsideLimits } else { Exit::NotSeen }
     } else if outcome.refusal.is_some() {
         Exit::RefusedOrAborted
@@ -58,21 +58,21 @@ mod tests {
     #[test]
     fn each_ending_has_its_code() {
         let at = Some(Duration::ZERO);
-        let none = Outcome::default();
-        let landed = Outcome { started: true, verdict: Some((true, Duration::ZERO)), ..none.clone() };
+        let none = FlightSoFar::default();
+        let landed = FlightSoFar { started: true, verdict: Some((true, Duration::ZERO)), ..none.clone() };
         let cases = [
             (landed.clone(), false, Exit::Landed),
             (
-                Outcome { verdict: Some((false, Duration::ZERO)), ..landed.clone() },
+                FlightSoFar { verdict: Some((false, Duration::ZERO)), ..landed.clone() },
                 false,
                 Exit::OutsideLimits,
             ),
-            (Outcome { aborted_at: at, ..landed.clone() }, false, Exit::RefusedOrAborted),
-            (Outcome { error: Some("socket".to_owned()), ..landed }, false, Exit::Error),
-            (Outcome { started: true, ..none.clone() }, true, Exit::NotSeen),
-            (Outcome { started: true, safed_at: at, ..none.clone() }, false, Exit::OutsideLimits),
+            (FlightSoFar { aborted_at: at, ..landed.clone() }, false, Exit::RefusedOrAborted),
+            (FlightSoFar { error: Some("socket".to_owned()), ..landed }, false, Exit::Error),
+            (FlightSoFar { started: true, ..none.clone() }, true, Exit::NotSeen),
+            (FlightSoFar { started: true, safed_at: at, ..none.clone() }, false, Exit::OutsideLimits),
             (
-                Outcome { refusal: Some(("ARM denied".to_owned(), Duration::ZERO)), ..none.clone() },
+                FlightSoFar { refusal: Some(("ARM denied".to_owned(), Duration::ZERO)), ..none.clone() },
                 false,
                 Exit::RefusedOrAborted,
             ),

@@ -1,4 +1,4 @@
-//! Keys, as the ground understands them: the terminal's many ways reduced to the few that mean something.
+//! The keys that have a meaning, and how terminal events are reduced to them.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
@@ -7,46 +7,30 @@ use crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 pub enum Key {
     /// A character without Ctrl or Alt.
     Char(char),
-    /// Enter.
     Enter,
-    /// Escape.
     Escape,
-    /// Backspace.
     Backspace,
-    /// F1.
     F1,
-    /// Arrow up.
     Up,
-    /// Arrow down.
     Down,
-    /// Arrow left.
     Left,
-    /// Arrow right.
     Right,
-    /// A page up.
     PageUp,
-    /// A page down.
     PageDown,
-    /// To the start.
     Home,
-    /// To the end.
     End,
-    /// Ctrl-C.
     CtrlC,
-    /// Ctrl-L.
     CtrlL,
-    /// Ctrl-X.
     CtrlX,
 }
 
 impl Key {
-    /// The key of a terminal's event; `None` for keys without a meaning here and for releases.
+    /// The key of a terminal event; `None` for key releases and for keys without a meaning.
     pub fn from_event(event: &KeyEvent) -> Option<Self> {
         if event.kind == KeyEventKind::Release {
             return None;
         }
-        // A held key is one press, where the terminal tells repeats apart: neither an abort nor a
-        // confirmed question. Scrolling may go on.
+        // On a terminal that reports repeats, a held key is one press; only scrolling repeats.
         if event.kind == KeyEventKind::Repeat && !may_repeat(event.code) {
             return None;
         }
@@ -59,7 +43,7 @@ impl Key {
             KeyCode::Char('l' | 'L') if ctrl => Some(Self::CtrlL),
             KeyCode::Char('x' | 'X') if ctrl => Some(Self::CtrlX),
             KeyCode::Char(c) if !ctrl && !c.is_control() => {
-                // Some terminals tell the key and Shift rather than the letter.
+                // Some terminals report the key with Shift instead of the capital letter.
                 let shift = event.modifiers.contains(KeyModifiers::SHIFT);
                 Some(Self::Char(if shift { c.to_ascii_uppercase() } else { c }))
             }
@@ -79,7 +63,7 @@ impl Key {
         }
     }
 
-    /// Whether it moves a list and does nothing else; such keys are held down on purpose.
+    /// Whether the key only scrolls; such keys are held down on purpose.
     pub fn scrolls(self) -> bool {
         matches!(
             self,
@@ -94,7 +78,7 @@ impl Key {
         )
     }
 
-    /// The key's name, for the log.
+    /// The name of the key, for the log.
     pub fn name(self) -> String {
         match self {
             Self::Char(' ') => "Space".to_owned(),
@@ -118,7 +102,7 @@ impl Key {
     }
 }
 
-/// Keys that a person holds down on purpose.
+/// Whether a person holds this key down on purpose.
 fn may_repeat(code: KeyCode) -> bool {
     matches!(
         code,

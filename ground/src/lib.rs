@@ -1,17 +1,19 @@
-//! The ground station: what the crew sees, and what it may do.
+//! The terminal ground station: shows a flight, and lets the crew arm, start and abort it.
 //!
-//! Three rooms keep apart what is known, what changes it, and what shows it:
+//! The modules in the order in which to read them:
 //!
-//! * [`model`]: everything known, as plain data; every value with the time it was received.
-//! * [`update`]: one pure function from a message and the time to a changed model and the actions it
-//!   wants (send, record, quit). Every decision of the ground is here, none reads a clock.
-//! * [`view`]: one pure function from a model and the time to a screen.
+//! 1. [`model`]: everything that the ground knows, as plain data; every received value carries its time.
+//! 2. [`update`]: every decision. One pure function takes a message and the time, changes the model, and
+//!    returns actions for the run loop (send, record, quit).
+//! 3. [`view`]: draws the screen. One pure function from the model and the time to a frame.
+//! 4. [`app`]: the run loops, which do what the other modules may not: terminal, links, log, clock, signals.
+//! 5. [`attach`]: the messages between a station and screens in other processes.
+//! 6. [`replay`]: plays a recorded flight through the same `update` on the same screens.
+//! 7. [`demo`]: runs the embedded simulator for the demonstration.
+//! 8. [`cli`] reads the command line, [`config`] the settings file; [`key`] names the keys that have a
+//!    meaning, and [`exit`] decides the exit code.
 //!
-//! [`replay`] is a recorded flight on the same screens; [`attach`] is what crosses the socket between a
-//! station and screens of other processes.
-//!
-//! Around them, [`app`] does what they may not: terminal, links, log file, clock, signals. [`demo`] runs
-//! the embedded simulator, [`cli`] reads the command line, [`exit`] decides the exit code.
+//! Imports go one way: `app` -> `update` -> `model`, and `app` -> `view` -> `model`.
 
 pub mod app;
 pub mod attach;
@@ -20,7 +22,6 @@ pub mod config;
 pub mod demo;
 pub mod exit;
 pub mod key;
-pub mod limits;
 pub mod model;
 pub mod replay;
 pub mod update;

@@ -1,4 +1,4 @@
-//! `ground`: the terminal ground station.
+//! `ground`: the terminal ground station. Parses the command line, runs, and returns the exit code.
 
 use std::io::Write as _;
 use std::panic::AssertUnwindSafe;
@@ -12,17 +12,17 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(message) => {
-            // Help and version are printed here too. Nothing is left to do if they cannot be.
+            // Help and version are printed here, too. A failure to print them is ignored.
             let _ = message.print();
             return if message.use_stderr() { code(Exit::Usage) } else { ExitCode::SUCCESS };
         }
     };
     if let Some(flag) = cli.ignored_flag() {
-        let why = "it belongs to the station that holds the link";
+        let why = "only the station that holds the link uses it";
         let _ = writeln!(std::io::stderr(), "error: {flag} means nothing to this command: {why}");
         return code(Exit::Usage);
     }
-    // A panic has restored the terminal and ended the log while it unwound, and has said what it was.
+    // While it unwound, the panic has printed its message, restored the terminal and finished the log.
     let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&cli)));
     match ended {
         Ok(Ok(exit)) => code(exit),

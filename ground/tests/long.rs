@@ -1,4 +1,4 @@
-//! Ten hours on the pad and in the air, on a clock turned by hand: memory stays where it was.
+//! Ten hours on the pad and in flight on a simulated clock: memory does not grow.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::time::Duration;
@@ -18,10 +18,10 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 
 const HOURS: u64 = 10;
-/// What may be added between the first hour and the last: the allocator's own moods.
+/// The allowed growth between the first and the last hour, for variations of the allocator.
 const GROWTH_MAX_BYTES: u64 = 1024 * 1024;
 
-/// Memory that is held by this process, bytes (Linux: the second number of `statm`, in pages of 4 KiB).
+/// The resident memory of this process, bytes (Linux: the second number of `statm`, in pages of 4 KiB).
 fn resident_bytes() -> u64 {
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
     statm.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096
@@ -34,7 +34,7 @@ fn ten_hours_take_no_more_memory_than_one() {
     let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
     let mut after_one_hour = 0;
     for second in 0..HOURS * 3_600 {
-        // Half an hour on the pad, half an hour of never-ending flight, in turn.
+        // Half an hour on the pad and half an hour of flight, in turn.
         let flying = (second / 1_800) % 2 == 1;
         let phase = if flying { TdPhase::TD_PHASE_AERO_DESCENT } else { TdPhase::TD_PHASE_PAD_IDLE };
         for tenth in 0..10 {

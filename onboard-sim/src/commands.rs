@@ -1,8 +1,8 @@
-//! MAVLink commands to requests of the vehicle.
+//! Translates MAVLink commands to requests for the vehicle.
 //!
 //! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly: an arm that is
-//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock. A forced *disarm* is what other
-//! ground stations call an emergency stop: it always stops what can still be stopped.
+//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock. A forced *disarm* is what
+//! other ground stations call an emergency stop: it always stops what can still be stopped.
 
 use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
@@ -10,25 +10,19 @@ use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
 };
 
-use crate::craft::{Answer, Request, Result};
+use flight::computer::crew::{Asked, Ending};
 
 /// What a command asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
-    /// Something for the vehicle to decide.
-    Vehicle(Request),
-    /// Disarm, whatever the vehicle does: on the ground a disarm, in the air an abort.
+    /// A request that the vehicle decides.
+    Vehicle(Asked),
+    /// A forced disarm: a disarm on the ground, an abort in the air.
     ForcedDisarm,
     /// MAV_CMD_SET_MESSAGE_INTERVAL: message id, interval in microseconds (-1 off, 0 default).
-    SetInterval {
-        /// Message.
-        message_id: u32,
-        /// Interval.
-        interval_us: f32,
-    },
+    SetInterval { message_id: u32, interval_us: f32 },
     /// MAV_CMD_REQUEST_MESSAGE: message id and the request's second parameter.
     SendMessage {
-        /// Message.
         message_id: u32,
         /// Parameter 2: for MESSAGE_INTERVAL, of which message.
         of: u32,
@@ -40,25 +34,25 @@ pub enum Command {
 pub struct Unfit {
     /// The result to answer with.
     pub result: MavResult,
-    /// The words for the crew, where there is something to say.
+    /// A text for the crew, if needed.
     pub reason: Option<String>,
 }
 
 /// Reads a command.
 ///
 /// # Errors
-/// The command is unknown here or its parameters are out of range, with the answer to give.
-pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
+/// The command is unknown or its parameters are out of range; the error holds the answer.
+pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     let [param1, param2, ..] = request.params;
     let unfit = |result, reason: String| Err(Unfit { result, reason: Some(reason) });
     if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
-        // A force code changes nothing about an arm: every check counts.
+        // A force code does not change an arm: every check still applies.
         if param1.to_bits() == 1.0f32.to_bits() {
-            Ok(Command::Vehicle(Request::Arm))
+            Ok(Command::Vehicle(Asked::Arm))
         } else if param1 == 0.0 && FORCE_CODES.contains(&param2) {
             Ok(Command::ForcedDisarm)
         } else if param1 == 0.0 {
-            Ok(Command::Vehicle(Request::Disarm))
+            Ok(Command::Vehicle(Asked::Disarm))
         } else {
             unfit(
                 MavResult::MAV_RESULT_DENIED,
@@ -66,16 +60,19 @@ pub fn parse(request: &CommandRequest) -> std::result::Result<Command, Unfit> {
             )
         }
     } else if request.is(MavCmd::MAV_CMD_MISSION_START) {
-        Ok(Command::Vehicle(Request::Start))
+        Ok(Command::Vehicle(Asked::Start))
     } else if request.is(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE) {
         if param1 == 0.0 {
-            Ok(Command::Vehicle(Request::Hold))
+            Ok(Command::Vehicle(Asked::Hold))
         } else {
-            unfit(MavResult::MAV_RESULT_DENIED, "a hold does not go on: start anew".to_owned())
+            unfit(
+                MavResult::MAV_RESULT_DENIED,
+                "a held countdown cannot be continued: start again".to_owned(),
+            )
         }
     } else if request.is(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) {
         if param1 > 0.5 {
-            Ok(Command::Vehicle(Request::Abort))
+            Ok(Command::Vehicle(Asked::Abort))
         } else {
             unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
         }
@@ -107,17 +104,17 @@ const LEGACY_REQUESTS: [(u16, u32); 3] =
     [(410, HOME_POSITION_DATA::ID), (519, 300), (520, AUTOPILOT_VERSION_DATA::ID)];
 
 /// The MAV_RESULT of a vehicle's answer.
-pub fn mav_result(answer: &Answer) -> MavResult {
-    match answer.result {
-        Result::Accepted => MavResult::MAV_RESULT_ACCEPTED,
-        Result::NotNow => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
-        Result::Denied => MavResult::MAV_RESULT_DENIED,
-        Result::Failed => MavResult::MAV_RESULT_FAILED,
+pub fn mav_result(ending: Ending) -> MavResult {
+    match ending {
+        Ending::Accepted => MavResult::MAV_RESULT_ACCEPTED,
+        Ending::NotNow => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+        Ending::Denied => MavResult::MAV_RESULT_DENIED,
+        Ending::Failed => MavResult::MAV_RESULT_FAILED,
     }
 }
 
 /// A message id sent as a float.
-fn message_id(param: f32) -> std::result::Result<u32, Unfit> {
+fn message_id(param: f32) -> Result<u32, Unfit> {
     let largest = 0x00FF_FFFF_u32 as f32;
     if (0.0..=largest).contains(&param) && param.fract() == 0.0 {
         return Ok(param as u32);
@@ -146,9 +143,9 @@ mod tests {
     }
 
     #[test]
-    fn arm_takes_exactly_one_and_disarm_exactly_nought() {
-        assert_eq!(parse(&command(400, 1.0, f32::NAN)), Ok(Command::Vehicle(Request::Arm)));
-        assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(Request::Disarm)));
+    fn arm_takes_exactly_one_and_disarm_exactly_zero() {
+        assert_eq!(parse(&command(400, 1.0, f32::NAN)), Ok(Command::Vehicle(Asked::Arm)));
+        assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(Asked::Disarm)));
         for param1 in [0.5, 2.0, -1.0, f32::NAN, f32::INFINITY, 1.000_000_1] {
             assert_eq!(result_of(&command(400, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
@@ -156,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_pause_holds_and_nothing_continues() {
-        assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(Request::Hold)));
+        assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(Asked::Hold)));
         for param1 in [1.0, 0.5, -1.0, f32::NAN] {
             assert_eq!(result_of(&command(193, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
@@ -165,7 +162,7 @@ mod tests {
     #[test]
     fn force_codes_ask_for_no_more_than_an_arm() {
         for code in [21196.0, 2989.0] {
-            assert_eq!(parse(&command(400, 1.0, code)), Ok(Command::Vehicle(Request::Arm)));
+            assert_eq!(parse(&command(400, 1.0, code)), Ok(Command::Vehicle(Asked::Arm)));
         }
     }
 
@@ -175,13 +172,13 @@ mod tests {
             assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::ForcedDisarm));
         }
         for code in [0.0, 1.0, 21195.0, 2989.5, f32::NAN, f32::INFINITY] {
-            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::Vehicle(Request::Disarm)), "{code}");
+            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::Vehicle(Asked::Disarm)), "{code}");
         }
     }
 
     #[test]
     fn termination_needs_more_than_half() {
-        assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(Request::Abort)));
+        assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(Asked::Abort)));
         for param1 in [0.0, 0.5, f32::NAN, -1.0] {
             assert_eq!(result_of(&command(185, param1, 0.0)), MavResult::MAV_RESULT_FAILED, "{param1}");
         }
@@ -212,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_unsupported() {
+    fn an_unknown_command_is_unsupported() {
         for number in [0, 22, 176, 65_535] {
             assert_eq!(result_of(&command(number, 1.0, 1.0)), MavResult::MAV_RESULT_UNSUPPORTED);
         }

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand};
-use onboard_sim::fly::{builtins, load_planar, load_profile};
+use onboard_sim::fly::{builtins, load_flight, load_planar};
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
 use protocol::key_file::KeyFile;
@@ -29,12 +29,12 @@ enum Command {
     ///
     /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
     ///
-    /// Exit codes: 0 landed inside every limit (from apogee: inside what the legs take); 1 error; 2 usage; 3 ended outside a limit; 4 refused or aborted;
-    /// 5 stopped before its end.
+    /// Exit codes: 0 landed inside every limit (from apogee: the limits of the legs); 1 error; 2 usage; 3 ended
+    /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     Fly(cli::fly::FlyArguments),
     /// Map where a landing inside the touchdown limits exists, over two quantities.
     Landability(LandabilityArguments),
-    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and day.
+    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     Campaign(cli::campaign::CampaignArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {
@@ -47,9 +47,9 @@ enum Command {
         /// The file; an existing one is not overwritten.
         #[arg(value_name = "FILE")]
         file: PathBuf,
-        /// Make it of a passphrase, read as a line from standard input, as MAVProxy's `signing key` does (SHA-256).
+        /// Derive it from a passphrase, read as a line from standard input, as MAVProxy's `signing key` does (SHA-256).
         ///
-        /// Whoever records one signed frame can try passphrases on it: take six random words or more.
+        /// Anybody who records one signed frame can try passphrases on it: use six random words or more.
         #[arg(long)]
         passphrase: bool,
     },
@@ -79,7 +79,7 @@ struct LandabilityArguments {
     /// Write the map as a picture.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Replace files that are there.
+    /// Replace existing files.
     #[arg(long)]
     force: bool,
     /// Cells computed at the same time; the map does not depend on it.
@@ -91,7 +91,7 @@ fn main() -> ExitCode {
     match run(Arguments::parse()) {
         Ok(code) => code,
         Err(error) => {
-            // Nothing is left to do if even this cannot be written.
+            // If writing fails here, there is nothing left to do.
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
             ExitCode::from(1)
         }
@@ -138,7 +138,7 @@ fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode>
     let shown = (count / 20).max(1);
     let map = landability::map(&profile, x, y, jobs, &|done| {
         if done.is_multiple_of(shown) || done == count {
-            // Talk goes to standard error; nobody may be listening.
+            // Messages go to standard error, which may be closed.
             let _ = write!(
                 std::io::stderr(),
                 "\r{done} of {count} cells{}",
@@ -156,7 +156,7 @@ fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode>
     Ok(ExitCode::SUCCESS)
 }
 
-/// A file that is there is replaced only if that is asked for; a pipe or a device holds nothing that could be lost.
+/// An existing file is replaced only on request; a pipe or a device has no content that could be lost.
 fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
     let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
     let is_device = std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir());
@@ -164,7 +164,7 @@ fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Under another name first, so that a file of this name is always whole.
+/// Write under a temporary name first, so that a file with the final name is always complete.
 fn write_file(
     path: &Path,
     force: bool,
@@ -201,11 +201,11 @@ fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
-        out.write_all(load_profile(name)?.toml().as_bytes())?;
+        out.write_all(load_flight(name)?.toml().as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
     for (name, _) in builtins() {
-        writeln!(out, "{name:<20} {}", load_profile(name)?.summary())?;
+        writeln!(out, "{name:<20} {}", load_flight(name)?.summary())?;
     }
     Ok(ExitCode::SUCCESS)
 }

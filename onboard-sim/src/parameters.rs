@@ -1,11 +1,11 @@
-//! The vehicle's parameters: what a ground may read by name, and the little that it may set.
+//! The vehicle's parameters: values that a ground station may read by name, and the few that it may set.
 //!
-//! The rate of each message, in hertz, may be set at any time by the station that commands, as by
-//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The landing cost's
-//! weights may be read: they come from the profile, which the log holds, so that a replay computes with the same
-//! ones. Limits that keep anybody safe are no parameters. The list of names never changes.
+//! The station in command may set the rate of each message, in hertz, at any time, as with
+//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The weights of the landing cost are
+//! read-only: they come from the profile, which the log holds, so that a replay uses the same ones. Safety limits are
+//! not parameters. The list of names never changes.
 
-use flight::profile::StateWeights;
+use flight::vehicle::profile::StateWeights;
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::parameter::{ParamId, ParamKey, is_real32, value_message};
 
@@ -28,7 +28,7 @@ const WEIGHTS: [Weight; 7] = [
     Weight { name: "NMPC_W_DELTA", of: |weights| weights.delta },
 ];
 
-/// How many parameters there are; their places are 0 to this, less one. Rates first, then weights.
+/// Number of parameters; their indices are 0 to this number minus one. Rates first, then weights.
 pub fn count(streams: &Streams) -> u16 {
     (streams.messages().len() + WEIGHTS.len()) as u16
 }
@@ -36,13 +36,13 @@ pub fn count(streams: &Streams) -> u16 {
 /// Why a parameter keeps its value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
-    /// For PARAM_ERROR, where there is no value to answer with.
+    /// For PARAM_ERROR, if there is no value to answer with.
     pub error: MavParamError,
-    /// In words for the crew.
+    /// As text for the crew.
     pub reason: String,
 }
 
-/// The place of a parameter in the list, if it is there.
+/// The index of a parameter in the list, if it exists.
 pub fn place_of(key: ParamKey, streams: &Streams) -> Option<u16> {
     let count = count(streams);
     match key {
@@ -59,7 +59,7 @@ fn name(place: u16, streams: &Streams) -> &'static str {
     }
 }
 
-/// PARAM_VALUE of the parameter at a place below [`count`].
+/// PARAM_VALUE of the parameter at an index below [`count`].
 pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessage {
     let messages = streams.messages();
     let found = match messages.get(usize::from(place)) {
@@ -69,11 +69,11 @@ pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessag
     value_message(name(place, streams), found as f32, place, count(streams))
 }
 
-/// Sets a parameter; `forbidden` says why this station may set none now. Returns the parameter's place, whose value is to
-/// be told in any case, with the refusal, if it was not changed as asked.
+/// Sets a parameter; `forbidden` says why this station may set none now. Returns the index of the parameter, whose
+/// value is to be sent in any case, and the refusal if it was not changed as requested.
 ///
 /// # Errors
-/// There is no such parameter.
+/// No parameter of that name.
 pub fn set(
     id: ParamId,
     value: f32,
@@ -83,7 +83,7 @@ pub fn set(
     now_s: f64,
 ) -> Result<(u16, Option<Refusal>), Refusal> {
     let Some(place) = place_of(ParamKey::Name(id), streams) else {
-        let reason = format!("parameter {}: there is none of this name", id.printable());
+        let reason = format!("parameter {}: no parameter has this name", id.printable());
         return Err(Refusal { error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, reason });
     };
     let name = name(place, streams);
@@ -102,7 +102,7 @@ pub fn set(
             refuse(MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "it must be 0 (off) or a rate in Hz")
         }
         (Some(stream), None) => {
-            // 0 Hz is off; the rest is the interval's business, with its budget.
+            // 0 Hz is off; the check against the budget is done with the interval.
             let interval_us = if value == 0.0 { -1.0 } else { 1e6 / value };
             match streams.set_interval(stream.message_id, interval_us, now_s) {
                 (_, None) => None,
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn names_fit_their_field_and_are_told_apart() {
+    fn names_fit_their_field_and_are_unique() {
         for streams in every() {
             let count = count(&streams);
             let name = |place| name(place, &streams);

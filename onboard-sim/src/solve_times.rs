@@ -1,4 +1,4 @@
-//! How long the controller's ticks took.
+//! Statistics of how long the controller's ticks took.
 
 /// Measured tick times of one flight, s.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! What is sent unasked, and how often.
+//! The messages that are sent periodically, and their rates.
 
 use mavlink::MessageData;
 use protocol::dialect::{
@@ -12,42 +12,43 @@ use protocol::dialect::{
 use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
 
-use crate::endpoint::WINDOW_S;
+/// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so
+/// that no second on the wire carries more.
+pub(crate) const WINDOW_S: f64 = 1.02;
 
 /// Bytes around a payload: header and checksum.
 const FRAME_OVERHEAD: usize = 12;
-/// Time, mask and six of the 32 outputs; the others are nought and therefore cut.
+/// Time, mask and six of the 32 outputs; the others are zero and therefore truncated.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
-/// Default rates are at most this where frames are signed, Hz, the first that fits the radio: a signature is as long as a
-/// short message. What the crew lives by is not slowed down.
+/// Highest default rates for signed frames, Hz; the first one that fits the radio is used, because a signature is as
+/// long as a short message. Vital messages are not slowed down.
 const SIGNED_RATES_MAX_HZ: [f64; 8] = [6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
-/// Slowest interval that can be asked for, s.
+/// Longest interval that can be requested, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
 /// The longest answer to an abort (COMMAND_ACK), bytes of payload.
 const ACK_PAYLOAD_LEN: usize = 10;
-/// What a ground is told of its own uplink (TD_UPLINK), bytes of payload and times a second.
+/// The uplink report (TD_UPLINK): bytes of payload and rate, Hz.
 const UPLINK_PAYLOAD_LEN: usize = 16;
 const UPLINK_HZ: f64 = 2.0;
-/// What is hurried is sent this long after the last time at the earliest, s.
+/// Shortest interval of a message that is sent early, s.
 const HURRIED_S: f64 = 0.1;
 
-/// Bytes that are kept free for what the crew lives by: a heartbeat, a flight status and the answer to an abort, all in
-/// one instant. They never wait behind telemetry.
+/// Bytes kept free for vital messages: a heartbeat, a flight status and the answer to an abort, all in one instant.
+/// They never wait for telemetry.
 pub(crate) fn kept_free_bytes(signature_len: usize) -> usize {
     let payload = HEARTBEAT_DATA::ENCODED_LEN + TD_FLIGHT_STATUS_DATA::ENCODED_LEN + ACK_PAYLOAD_LEN;
     payload + 3 * (FRAME_OVERHEAD + signature_len)
 }
 
-/// A link's share for answers, and as much for texts, bytes in a second: whatever is asked, the rest is for telemetry.
+/// A link's share for answers, and the same for texts, bytes per second. The rest is always for telemetry.
 pub(crate) fn share_bytes_s(capacity_bytes_s: u32) -> usize {
     capacity_bytes_s as usize / 5
 }
 
-/// A message that is sent by itself, with its longest payload and its default rate.
+/// A periodic message, with its longest payload and its default rate.
 #[derive(Debug)]
 pub struct Standard {
-    /// Message.
     pub message_id: u32,
     /// The parameter that holds its rate.
     pub parameter: &'static str,
@@ -61,13 +62,13 @@ const fn standard<M: MessageData>(parameter: &'static str, rate_hz: f64) -> Stan
 }
 
 impl Standard {
-    /// As long as it is without what is never set and therefore cut.
+    /// Length without the trailing fields that are never set and therefore truncated.
     const fn cut_to(self, payload_len: usize) -> Self {
         Self { payload_len, ..self }
     }
 }
 
-/// What the planar vehicle sends unasked. In the order in which it is given up when the budget runs short: last first.
+/// The periodic messages of the planar vehicle. If the budget runs short, the last ones are dropped first.
 pub const STANDARD: [Standard; 21] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
@@ -84,7 +85,7 @@ pub const STANDARD: [Standard; 21] = [
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // For other people's clients, off until asked for: what they say is in the messages above already.
+    // For other clients, off until requested: the messages above already have this data.
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
     standard::<ATTITUDE_DATA>("RATE_EULER", 0.0),
@@ -95,7 +96,7 @@ pub const STANDARD: [Standard; 21] = [
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
 ];
 
-/// What the rocket from apogee sends unasked, in the same order.
+/// The periodic messages of the rocket from apogee, in the same order.
 pub const FROM_APOGEE: [Standard; 25] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
@@ -114,7 +115,7 @@ pub const FROM_APOGEE: [Standard; 25] = [
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // Off until asked for.
+    // Off until requested.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0),
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
@@ -131,7 +132,7 @@ pub const FROM_APOGEE: [Standard; 25] = [
 struct Stream {
     message_id: u32,
     frame_len: usize,
-    /// `None`: off unless asked for.
+    /// `None`: off unless requested.
     default_interval_s: Option<f64>,
     /// `None`: switched off.
     interval_s: Option<f64>,
@@ -151,11 +152,11 @@ pub(crate) struct Due {
     pub(crate) message_id: u32,
     /// Its longest frame, bytes.
     pub(crate) frame_len: usize,
-    /// The crew lives by it.
+    /// Whether the message is vital.
     pub(crate) vital: bool,
 }
 
-/// Every stream of a craft over one link, in the order of its messages.
+/// Every stream of a vehicle over one link, in the order of its messages.
 #[derive(Debug, Clone)]
 pub struct Streams {
     messages: &'static [Standard],
@@ -170,7 +171,7 @@ impl Streams {
         Self::at_most(messages, 0, f64::INFINITY)
     }
 
-    /// The same where every frame carries a signature: the fastest are slowed down, so that the radio's budget holds.
+    /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget holds.
     pub fn signed(messages: &'static [Standard]) -> Self {
         let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz);
         let [fastest, slower @ ..] = SIGNED_RATES_MAX_HZ;
@@ -182,7 +183,6 @@ impl Streams {
         )
     }
 
-    /// What is sent.
     pub fn messages(&self) -> &'static [Standard] {
         self.messages
     }
@@ -196,7 +196,7 @@ impl Streams {
                 frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
                 default_interval_s: interval_s,
                 interval_s,
-                // Spread, so that the slow ones do not all fall into the same instant.
+                // Spread in time, so that the slow messages are not all due at the same instant.
                 due_s: 0.02 * place as f64,
                 sent_s: f64::NEG_INFINITY,
             }
@@ -219,8 +219,8 @@ impl Streams {
         self.bytes_s() <= self.for_telemetry_bytes_s()
     }
 
-    /// What the link's budget leaves for telemetry, bytes per second: all of it but what is kept free for what may not
-    /// wait, and what every ground is told of its uplink.
+    /// The part of the link's budget for telemetry, bytes per second: without the reserve for vital messages and the
+    /// uplink reports.
     fn for_telemetry_bytes_s(&self) -> f64 {
         let uplink_len = UPLINK_PAYLOAD_LEN + FRAME_OVERHEAD + self.signature_len;
         let in_window = f64::from(self.capacity_bytes_s) - kept_free_bytes(self.signature_len) as f64;
@@ -238,24 +238,24 @@ impl Streams {
         self.each.iter().filter(due).map(named).collect()
     }
 
-    /// A message was sent, or there was nothing to say in it.
+    /// Notes that a message was sent, or that it had no content.
     pub fn on_sent(&mut self, message_id: u32, now_s: f64) {
         for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.sent_s = now_s;
             let Some(interval_s) = stream.interval_s else { continue };
-            // From when it was due, not from now, or the frame grid would eat into the rate; but what was hurried
-            // or held back is not sent twice.
+            // Count from the due time, not from now; otherwise the frame grid would lower the rate. A message that was
+            // sent early or held back is not sent twice.
             let next_s = stream.due_s + interval_s;
             stream.due_s = if next_s > now_s { next_s } else { now_s + interval_s };
         }
     }
 
-    /// Sends a message at the next opportunity; however often that is asked, no more than ten times a second.
+    /// Sends a message at the next opportunity, but never more than ten times a second.
     pub fn hurry(&mut self, message_id: u32) {
         self.at_least_every(message_id, HURRIED_S);
     }
 
-    /// Sends a message no later than so long after the last time.
+    /// Sends a message at most this long after the last one.
     pub(crate) fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
         for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.due_s = stream.due_s.min(stream.sent_s + interval_s);
@@ -304,7 +304,7 @@ impl Streams {
         };
         let slower = |interval_s| before.default_interval_s.is_none_or(|default_s| interval_s > default_s);
         if is_vital(message_id) && wanted.is_none_or(slower) {
-            let reason = format!("message {message_id}: the crew lives by it; it is not slowed down");
+            let reason = format!("message {message_id}: vital messages are not slowed down");
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
         let total = self.bytes_s() - before.bytes_s(before.interval_s) + before.bytes_s(wanted);
@@ -325,7 +325,7 @@ impl Streams {
         (MavResult::MAV_RESULT_ACCEPTED, None)
     }
 
-    /// How often a message is sent, Hz; 0 if it is off or none of ours.
+    /// Rate of a message, Hz; 0 if it is off or unknown.
     pub fn rate_hz(&self, message_id: u32) -> f64 {
         let stream = self.each.iter().find(|stream| stream.message_id == message_id);
         stream.and_then(|stream| stream.interval_s).map_or(0.0, |interval_s| 1.0 / interval_s)
@@ -345,7 +345,7 @@ impl Streams {
     }
 }
 
-/// The crew lives by it: it never waits for anything else.
+/// Whether the message is vital: it never waits for other messages.
 fn is_vital(message_id: u32) -> bool {
     matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
 }

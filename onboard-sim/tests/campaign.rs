@@ -1,13 +1,12 @@
-//! The campaign's command line, and that a logged flight can be flown again from its log alone.
+//! Tests the campaign's command line, and that a logged flight can be flown again from its log alone.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Output};
 
-use flight::estimator::StartUncertainty;
-use flight::mission::Mission;
-use flight::pilot::Pilot;
+use flight::computer::{Computer, Input};
+use flight::guidance::baseline::Law;
 use prost::Message as _;
 use protocol::log::flight_v1::{PilotStart, PilotTick};
 use protocol::log::reader::{LogItem, LogReader};
@@ -23,7 +22,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A map's files appear whole, and replace nothing unasked.
+/// A map's files appear complete, and replace existing ones only on request.
 #[test]
 fn a_map_overwrites_no_file_without_force() {
     let directory = tempfile::tempdir().unwrap();
@@ -49,7 +48,7 @@ fn a_map_overwrites_no_file_without_force() {
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2);
 }
 
-/// With sensors, a fault in the estimator's way and a restart in the middle.
+/// With sensors, a fault that affects the estimator, and a restart in the middle.
 #[test]
 fn a_logged_flight_flies_again_bit_for_bit() {
     let directory = tempfile::tempdir().unwrap();
@@ -80,28 +79,28 @@ fn a_logged_flight_flies_again_bit_for_bit() {
     assert_eq!(reader.damage(), None);
     assert!(ticks.len() > 2000, "{} frames", ticks.len());
 
-    let (mission, start) = (Mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
+    let (mission, start) = (vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
     let believed = state_from_log(&start.believed);
-    let mut pilot =
-        Pilot::at_apogee(&mission, start.time_s, &believed, &StartUncertainty::at_apogee()).unwrap();
+    let mut computer = Computer::in_space(&mission, Law::Nmpc, &believed).released();
     let (mut expected_frame, mut restarts) = (1, 0);
     for tick in &ticks {
         let input = input_from_log(&tick.input).unwrap();
         if input.frame > expected_frame {
-            // It was dead meanwhile, and came back at the end of the frame before this.
-            pilot = pilot.restarted((input.frame - 1) as f64 * 5.0 * 1e-3);
+            // The computer was dead and came back at the end of the frame before this one.
+            computer.restart((input.frame - 1) as f64 * 5.0 * 1e-3);
             restarts += 1;
         }
-        let output = output_to_log(&pilot.step(&input));
-        assert_eq!(output, tick.output, "frame {}", input.frame);
-        assert_eq!(pilot.digest(), tick.state_digest, "frame {}", input.frame);
+        computer.step(&Input::in_the_air(&input));
+        let (_, output) = computer.piloted().unwrap();
+        assert_eq!(output_to_log(output), tick.output, "frame {}", input.frame);
+        assert_eq!(computer.flight_digest(), tick.state_digest, "frame {}", input.frame);
         expected_frame = input.frame + 1;
     }
     assert_eq!(restarts, 1);
 }
 
 #[test]
-fn what_is_asked_for_wrongly_is_refused_with_the_reason() {
+fn a_wrong_request_is_refused_with_the_reason() {
     let directory = tempfile::tempdir().unwrap();
     for (arguments, words) in [
         (&["--out", "x", "--dispersion", "windy"][..], "neither a built-in set of dispersions"),

@@ -1,8 +1,9 @@
-//! Encoding and decoding beside rust-mavlink's own typed reader and writer, on the same stream in the same run.
+//! Compares encoding and decoding with rust-mavlink's own typed reader and writer, on the same stream in the same
+//! run.
 //!
 //! `cargo bench -p protocol --bench throughput`. Rounds alternate between the two, so that a machine that slows down
-//! slows both; the shortest rounds are compared. "and keep" is ours with a copy of every frame's
-//! bytes, which theirs does not make.
+//! slows both; the shortest rounds are compared. "and keep" is our decoder with a copy of every frame's bytes, which
+//! rust-mavlink does not make.
 
 use std::hint::black_box;
 use std::io::{Read, Write as _};
@@ -20,10 +21,10 @@ use protocol::identity::VEHICLE;
 /// Messages in the stream.
 const COUNT: usize = 10_000;
 const ROUNDS: usize = 201;
-/// A driver hands up pieces of about this size.
+/// A transport reads pieces of about this size.
 const PIECE: usize = 1_024;
 
-/// The vehicle's own mixture.
+/// The mixture of messages that the vehicle sends.
 fn messages() -> Vec<MavMessage> {
     let kinds = |k: usize| {
         let time_boot_ms = 20 * k as u32;
@@ -89,7 +90,7 @@ fn decode_ours(stream: &[u8]) -> usize {
     count
 }
 
-/// With every frame kept, as vehicle and ground do for their logs.
+/// Keeps every frame, as vehicle and ground do for their logs.
 fn decode_and_keep_ours(stream: &[u8]) -> usize {
     let mut framer = Framer::new();
     let mut count = 0;
@@ -105,7 +106,7 @@ fn decode_and_keep_ours(stream: &[u8]) -> usize {
     count
 }
 
-/// The same pieces for a reader that asks for them.
+/// Gives the same pieces to a reader that asks for them.
 struct Pieces<'a>(&'a [u8]);
 
 impl Read for Pieces<'_> {
@@ -139,7 +140,7 @@ fn encode_theirs(messages: &[MavMessage]) -> usize {
     let mut sum = 0;
     for message in messages {
         frame.clear();
-        // Into memory, which takes everything.
+        // Writing to memory does not fail.
         let _ = write_v2_msg(&mut frame, header, message);
         header.sequence = header.sequence.wrapping_add(1);
         sum += black_box(&frame).len();
@@ -160,7 +161,7 @@ fn compare(
     theirs: &mut dyn FnMut() -> usize,
 ) -> std::io::Result<()> {
     assert_eq!(ours(), theirs(), "{name}: both do the same work");
-    // The shortest of many: whatever else the machine does only adds.
+    // The shortest round is the best measure, because other load on the machine can only add time.
     let mut shortest = [Duration::MAX; 2];
     for _ in 0..ROUNDS {
         shortest[0] = shortest[0].min(timed(ours));

@@ -1,7 +1,7 @@
-//! MAVLink FTP for a vehicle without files: every request is declined at once.
+//! Declines every MAVLink FTP request at once, because the vehicle has no files.
 //!
-//! A client that hears nothing waits and asks again; MAVProxy stalls for about 11 s before it reads parameters the
-//! plain way. Protocol: <https://mavlink.io/en/services/ftp.html>.
+//! A client that gets no answer waits and asks again; MAVProxy waits about 11 s before it requests the parameters
+//! without FTP. Protocol: <https://mavlink.io/en/services/ftp.html>.
 
 use crate::dialect::{FILE_TRANSFER_PROTOCOL_DATA, MavMessage};
 use crate::frame::Frame;
@@ -15,15 +15,13 @@ const ACK: u8 = 128;
 const NAK: u8 = 129;
 const ERROR_UNKNOWN_COMMAND: u8 = 7;
 const ERROR_FILE_NOT_FOUND: u8 = 10;
-/// Opcodes that name a file: open for reading, create, remove, open for writing.
+/// Opcodes that name a file or a directory: list, open for reading, create, remove, open for writing.
 const OPENING: [u8; 5] = [3, 4, 6, 8, 11];
 
-/// A file request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileRequest {
-    /// Who asks.
     pub source: Address,
-    /// Who is asked; 0 means all.
+    /// The addressed component; id 0 means all.
     pub target: Address,
     sequence: u16,
     session: u8,
@@ -31,8 +29,8 @@ pub struct FileRequest {
 }
 
 impl FileRequest {
-    /// The request in a FILE_TRANSFER_PROTOCOL frame; `None` for any other message, and for answers, which
-    /// nobody may answer again.
+    /// Parses the request in a FILE_TRANSFER_PROTOCOL frame; returns `None` for any other message and for answers,
+    /// which must not be answered.
     pub fn from_frame(frame: &Frame) -> Option<Self> {
         if frame.message_id() != FILE_TRANSFER_PROTOCOL_ID {
             return None;
@@ -48,7 +46,7 @@ impl FileRequest {
         })
     }
 
-    /// The answer of a vehicle without files: nothing is found, nothing was open, nothing else is known.
+    /// Builds the answer of a vehicle without files: no file exists, no session is open, no other command is known.
     pub fn decline(&self) -> MavMessage {
         let (opcode, error) = match self.opcode {
             TERMINATE_SESSION | RESET_SESSIONS => (ACK, None),
@@ -93,7 +91,8 @@ mod tests {
 
     #[test]
     fn every_request_is_declined_with_the_next_number_and_its_own_opcode() {
-        // Open for reading: not found. Burst read: not known. Reset: nothing was open, so it is done.
+        // Opcode 4 opens a file, which is not found; 15 is a burst read, which is unknown; 2 is a reset, which
+        // succeeds.
         assert_eq!(answer(4), Some([0, 0, 3, NAK, 1, 4, 0, 0, 0, 0, 0, 0, ERROR_FILE_NOT_FOUND]));
         assert_eq!(answer(15), Some([0, 0, 3, NAK, 1, 15, 0, 0, 0, 0, 0, 0, ERROR_UNKNOWN_COMMAND]));
         assert_eq!(answer(2), Some([0, 0, 3, ACK, 0, 2, 0, 0, 0, 0, 0, 0, 0]));

@@ -1,7 +1,7 @@
-//! Hostile input for every decoder of this crate: what the fuzz targets (`fuzz/`) and the bounded tests both run.
+//! Feeds hostile input to every decoder of this crate; the fuzz targets (`fuzz/`) and the tests call it.
 //!
-//! Each function takes any bytes, makes the most of them, and panics only if a promise is broken. Checksums are put
-//! right, so that what is behind them is reached, too.
+//! Each function accepts any bytes and panics only if a decoder breaks a promise. It corrects checksums, so that the
+//! code behind the checksum is reached as well.
 
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -13,7 +13,7 @@ use crate::frame::{Encoder, Frame, Framer};
 use crate::ftp::FileRequest;
 use crate::hub::{Hub, News, Received};
 use crate::identity::{Address, GROUND};
-use crate::link::LinkStats;
+use crate::link_stats::LinkStats;
 use crate::log::reader::LogReader;
 use crate::log::record::{Event, EventLevel, Record};
 use crate::log::v1::OperatorAction;
@@ -22,7 +22,8 @@ use crate::parameter::ParamRequest;
 use crate::signing::{Key, Memory, Signing};
 use crate::text::{Reassembler, printable};
 
-/// A frame of these bytes: message id (low byte, then high), source, payload. `None` for an id outside the dialect.
+/// Builds a frame from these bytes: message id (low byte, then high), source, payload. Returns `None` for an id
+/// outside the dialect.
 pub fn frame_of(bytes: &[u8]) -> Option<Frame> {
     let [low, high, system_id, component_id, payload @ ..] = bytes else { return None };
     let source = Address { system_id: *system_id, component_id: *component_id };
@@ -31,10 +32,10 @@ pub fn frame_of(bytes: &[u8]) -> Option<Frame> {
     Encoder::new(source).encode_payload(u32::from(u16::from_le_bytes([*low, *high])), payload)
 }
 
-/// Bytes of a stream in pieces whose sizes the bytes choose themselves. Every byte is accounted for.
+/// Frames a stream in pieces whose sizes come from the bytes themselves, and checks that every byte is counted.
 ///
 /// # Panics
-/// One is not, or the framer holds more than one frame.
+/// A byte was not counted as framed or as garbage.
 pub fn stream(data: &[u8]) {
     let mut framer = Framer::new();
     let mut framed = 0;
@@ -53,13 +54,13 @@ pub fn stream(data: &[u8]) {
         framed += frame.as_bytes().len();
     }
     let garbage = usize::try_from(framer.counters().garbage_bytes).unwrap_or(usize::MAX);
-    assert_eq!(garbage + framed, data.len(), "every byte is garbage or framed");
+    assert_eq!(garbage + framed, data.len(), "some bytes are counted neither as framed nor as garbage");
 }
 
-/// Frames with right checksums through every decoder. A byte of length stands before each.
+/// Passes frames with correct checksums through every decoder. A length byte precedes each frame.
 ///
 /// # Panics
-/// A frame does not survive its own bytes, or a text could move a terminal's cursor.
+/// A frame changes when it is framed again, or a text contains a control character.
 pub fn frames(data: &[u8]) {
     let mut texts = Reassembler::new();
     let mut stats = LinkStats::new();
@@ -73,7 +74,7 @@ pub fn frames(data: &[u8]) {
         let Some(frame) = frame_of(piece) else { continue };
         let mut framer = Framer::new();
         framer.push_datagram(frame.as_bytes());
-        assert_eq!(framer.next_frame().as_ref(), Some(&frame), "a frame survives its bytes");
+        assert_eq!(framer.next_frame().as_ref(), Some(&frame), "a frame changed when it was framed again");
         every_decoder(&frame);
         stats.on_frame(&frame, now);
         if let Some(answer) = CommandAnswer::from_frame(&frame) {
@@ -90,10 +91,10 @@ pub fn frames(data: &[u8]) {
     sender.poll(now);
 }
 
-/// Several links that bring anything; with a key, nothing of it is believed.
+/// Passes any input to several links; with a key, unsigned and forged frames must be rejected.
 ///
 /// # Panics
-/// Something is.
+/// A frame was accepted although it was not signed with the key.
 pub fn hub(data: &[u8]) {
     let key = Signing::new(Key::new([7; Key::LEN]), Memory::default());
     let mut hubs = [Hub::new(2, None), Hub::new(2, Some(key))];
@@ -104,13 +105,13 @@ pub fn hub(data: &[u8]) {
         rest = after;
         now += Duration::from_millis(u64::from(*kind));
         let link = usize::from(kind % 3);
-        let peer = u64::from(kind >> 6);
+        let stream = u64::from(kind >> 6);
         let received = match (kind >> 2) % 6 {
             0 => datagram(piece.to_vec()),
-            1 => Received::Stream(peer, piece.to_vec()),
-            2 => Received::Silence(peer),
-            3 => Received::Gone(peer),
-            // Frames that are whole, so that more than framing is reached.
+            1 => Received::Stream(stream, piece.to_vec()),
+            2 => Received::Silence(stream),
+            3 => Received::Gone(stream),
+            // Whole frames, so that the code behind the framing is reached.
             _ => match frame_of(piece) {
                 Some(frame) if kind & 1 == 0 => datagram(frame.as_bytes().to_vec()),
                 Some(frame) => datagram(forged(&frame)),
@@ -120,8 +121,8 @@ pub fn hub(data: &[u8]) {
         for (keyed, hub) in hubs.iter_mut().enumerate() {
             for news in hub.take(link, received.clone(), now, 1_000) {
                 if let (1, News::Frame(frame) | News::Copy(frame)) = (keyed, news) {
-                    // A radio's report about itself is all that may come unsigned.
-                    assert_eq!(frame.message_id(), 109, "believed without a signature");
+                    // A radio's report about itself is the only message that may be unsigned.
+                    assert_eq!(frame.message_id(), 109, "a frame was accepted without a signature");
                 }
             }
         }
@@ -132,7 +133,8 @@ fn datagram(bytes: Vec<u8>) -> Received {
     Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
 }
 
-/// The bytes as a flight log; and a good log with some of its bytes changed: two of place, one of value, and so on.
+/// Reads the bytes as a flight log, and then a good log in which these bytes change others: two bytes of position and
+/// one of value for each change.
 ///
 /// # Panics
 /// A good log cannot be written to memory, or a log in memory cannot be read to its end.
@@ -147,7 +149,7 @@ pub fn log(data: &[u8]) {
     read_log(&changed);
 }
 
-/// A few records of each encoding, in two chunks.
+/// A log with a few records of each encoding in two chunks.
 static GOOD_LOG: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let written = || -> Result<Vec<u8>, LogWriteError> {
         let mut writer = LogWriter::new(Cursor::new(Vec::new()), &LogHeader::default())?;
@@ -163,22 +165,22 @@ static GOOD_LOG: LazyLock<Vec<u8>> = LazyLock::new(|| {
         }
         Ok(writer.finish()?.into_inner())
     };
-    written().expect("memory takes a log")
+    written().expect("a log can be written to memory")
 });
 
 fn read_log(bytes: &[u8]) {
     let mut reader = LogReader::new(bytes);
-    while reader.next_item().expect("memory can be read").is_some() {}
+    while reader.next_item().expect("a log can be read from memory").is_some() {}
 }
 
-/// Signed with a key that is not the hub's.
+/// Signs a frame with another key than the hub's.
 fn forged(frame: &Frame) -> Vec<u8> {
     let mut forger = Signing::new(Key::new([8; Key::LEN]), Memory::default());
     forger.sign(frame, 0, 2_000).as_bytes().to_vec()
 }
 
 fn every_decoder(frame: &Frame) {
-    // What they say is theirs; that they return is ours.
+    // The results do not matter; the calls must return.
     let _ = frame.decode();
     let _ = frame.for_log();
     let _ = frame.without_signature();

@@ -1,4 +1,4 @@
-//! Key files: the only place a signing key lives, and beside it what must be remembered of timestamps.
+//! Stores a signing key in a file, and the timestamps to remember beside it.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
@@ -7,60 +7,45 @@ use std::path::{Path, PathBuf};
 
 use crate::signing::{Key, Memory, MemoryError, Signing};
 
-/// For the owner alone.
-const MODE: u32 = 0o600;
-/// What is appended to remembered timestamps before they are written anew.
-const APPENDED_MOST: usize = 64 << 10;
-/// Anything for group or others.
-const OTHERS: u32 = 0o077;
+/// Only the owner may read and write.
+const OWNER_ONLY: u32 = 0o600;
+/// After this many appended bytes the timestamp file is written anew.
+const APPEND_LIMIT_BYTES: usize = 64 << 10;
+/// The permission bits of group and others.
+const GROUP_AND_OTHERS: u32 = 0o077;
 
-/// Why a key file is not used.
+/// Why a key file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyFileError {
     /// It cannot be read or written.
     #[error("key file {path}")]
     Io {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// Others may read or change it.
-    #[error("key file {path}: mode {mode:03o} lets others at the key; run `chmod 600 {path}`")]
-    Permissions {
-        /// The file.
-        path: PathBuf,
-        /// Its permission bits.
-        mode: u32,
-    },
-    /// It holds no key.
-    #[error("key file {path}: must be 64 hexadecimal digits; `onboard-sim keygen` makes one")]
-    NoKey {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The timestamps beside it make no sense. That is no fresh start: whoever was heard could be replayed.
-    #[error("timestamp file {path}: {why}; delete it only if nobody can have recorded the runs before")]
-    Memory {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: MemoryError,
-    },
+    /// Other users may read or change it.
+    #[error("key file {path}: mode {mode:03o} gives other users access to the key; run `chmod 600 {path}`")]
+    Permissions { path: PathBuf, mode: u32 },
+    /// It does not contain a key.
+    #[error("key file {path}: must be 64 hexadecimal digits; `onboard-sim keygen` makes a key")]
+    NoKey { path: PathBuf },
+    /// The timestamps beside it cannot be parsed. Starting afresh would make a replay possible.
+    #[error("timestamp file {path}: {why}; delete it only if nobody can have recorded earlier runs")]
+    Memory { path: PathBuf, why: MemoryError },
 }
 
-/// A key file in use.
 #[derive(Debug)]
 pub struct KeyFile {
     stamps_path: PathBuf,
-    /// What the file says, to the end of its last line.
+    /// What the timestamp file contains up to its last complete line.
     written: Memory,
-    /// The file, once this run has written it, and how much was appended since.
+    /// The timestamp file, once this run has written it, and how many bytes were appended since.
     appending: Option<(File, usize)>,
 }
 
 impl KeyFile {
-    /// Makes a new key, random by the system, in a new file for its owner alone.
+    /// Creates a new file, readable only by its owner, with a random key from the operating system.
     ///
     /// # Errors
     /// The file exists, or cannot be written.
@@ -72,27 +57,27 @@ impl KeyFile {
         Self::create_with(path, &Key::new(bytes))
     }
 
-    /// Puts this key into a new file for its owner alone.
+    /// Creates a new file, readable only by its owner, with this key.
     ///
     /// # Errors
     /// The file exists, or cannot be written.
     pub fn create_with(path: &Path, key: &Key) -> Result<(), KeyFileError> {
         let failed = |source| KeyFileError::Io { path: path.to_owned(), source };
         let mut file =
-            OpenOptions::new().write(true).create_new(true).mode(MODE).open(path).map_err(failed)?;
+            OpenOptions::new().write(true).create_new(true).mode(OWNER_ONLY).open(path).map_err(failed)?;
         writeln!(file, "{}", key.to_hex()).and_then(|()| file.sync_all()).map_err(failed)
     }
 
-    /// Reads a key and what `user` remembers beside it (`FILE.USER.stamps`): vehicle and ground may share a key on
-    /// one machine, but not a memory.
+    /// Reads a key and the timestamps of `user` beside it (`FILE.USER.stamps`). Vehicle and ground may use one key
+    /// file on the same machine, but each has its own timestamps.
     ///
     /// # Errors
-    /// The file cannot be read, others can read it, or it holds no key; or what is remembered makes no sense.
+    /// The file cannot be read, other users can read it, or it contains no key; or the timestamps cannot be parsed.
     pub fn open(path: &Path, user: &str) -> Result<(Self, Signing), KeyFileError> {
         let failed = |source| KeyFileError::Io { path: path.to_owned(), source };
         let mut file = File::open(path).map_err(failed)?;
         let mode = file.metadata().map_err(failed)?.permissions().mode() & 0o777;
-        if mode & OTHERS != 0 {
+        if mode & GROUP_AND_OTHERS != 0 {
             return Err(KeyFileError::Permissions { path: path.to_owned(), mode });
         }
         let no_key = || KeyFileError::NoKey { path: path.to_owned() };
@@ -115,8 +100,8 @@ impl KeyFile {
         Ok((file, Signing::new(key, memory)))
     }
 
-    /// Remembers timestamps, so that they outlive this process, however it ends. Cheap enough to be done before anything
-    /// that was believed is acted on: a line of some thirty bytes for each stream that was heard.
+    /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to be called before
+    /// every accepted frame is acted on: it writes a line of some thirty bytes for each stream.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -125,9 +110,9 @@ impl KeyFile {
         if lines.is_empty() {
             return Ok(());
         }
-        // One write: of a process that is killed all of it is in the file or nothing.
+        // One write call: if the process is killed, the file contains all of it or nothing.
         if let Some((file, appended)) = &mut self.appending
-            && *appended < APPENDED_MOST
+            && *appended < APPEND_LIMIT_BYTES
             && file.write_all(lines.as_bytes()).is_ok()
         {
             *appended += lines.len();
@@ -140,13 +125,14 @@ impl KeyFile {
         Ok(())
     }
 
-    /// Whole or not at all. What could not be appended is not tried again there: it may have been cut off.
+    /// Writes a new file and then renames it, so that it is complete or absent. A file to which appending failed is
+    /// replaced as well: its last line may have been cut off.
     fn write_anew(&self, memory: &Memory) -> Result<File, KeyFileError> {
         let mut beside = self.stamps_path.clone().into_os_string();
         beside.push(".new");
         let write = || {
             let mut file =
-                OpenOptions::new().write(true).create(true).truncate(true).mode(MODE).open(&beside)?;
+                OpenOptions::new().write(true).create(true).truncate(true).mode(OWNER_ONLY).open(&beside)?;
             file.write_all(memory.to_text().as_bytes())?;
             fs::rename(&beside, &self.stamps_path)?;
             Ok(file)
@@ -163,7 +149,7 @@ mod tests {
     use crate::identity::GROUND;
 
     #[test]
-    fn a_new_key_is_its_owner_s_alone_and_no_file_is_overwritten() {
+    fn a_new_key_is_readable_by_its_owner_only_and_overwrites_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.key");
         KeyFile::create(&path).unwrap();
@@ -180,12 +166,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_key_is_refused_by_name() {
+    fn a_file_without_a_key_is_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("bad.key");
         for content in [&b""[..], b"hello", &[0xFF; 64]] {
-            let mut file =
-                OpenOptions::new().write(true).create(true).truncate(true).mode(MODE).open(&path).unwrap();
+            let mut file = OpenOptions::new()
+                .write(true)
+                .create(true)
+                .truncate(true)
+                .mode(OWNER_ONLY)
+                .open(&path)
+                .unwrap();
             file.write_all(content).unwrap();
             let error = KeyFile::open(&path, "ground").unwrap_err();
             assert!(matches!(error, KeyFileError::NoKey { .. }), "{error}");
@@ -194,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn timestamps_are_found_again() {
+    fn timestamps_survive_a_restart() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.key");
         KeyFile::create(&path).unwrap();
@@ -204,15 +195,15 @@ mod tests {
         signing.check(&signed, 1_000).unwrap();
         file.remember(&signing.memory()).unwrap();
         let (_, mut restarted) = KeyFile::open(&path, "vehicle").unwrap();
-        assert!(restarted.check(&signed, 0).is_err(), "replayed after the restart");
+        assert!(restarted.check(&signed, 0).is_err(), "the frame was accepted again after the restart");
         fs::write(folder.path().join("flight.key.vehicle.stamps"), "nonsense").unwrap();
         let error = KeyFile::open(&path, "vehicle").unwrap_err().to_string();
         assert!(error.contains("flight.key.vehicle.stamps") && error.contains("nonsense"), "{error}");
     }
 
-    /// What a power cut leaves of a file that was just written.
+    /// A power cut leaves such a file if it was just written.
     #[test]
-    fn an_empty_file_of_timestamps_is_no_fresh_start() {
+    fn an_empty_timestamp_file_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.key");
         KeyFile::create(&path).unwrap();
@@ -225,9 +216,9 @@ mod tests {
         }
     }
 
-    /// A run that is killed has no last words: what it was told before must be in the file.
+    /// A killed process cannot store anything at its end, so everything must be in the file before.
     #[test]
-    fn every_frame_that_was_remembered_outlives_a_kill() {
+    fn every_stored_timestamp_survives_a_kill() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.key");
         KeyFile::create(&path).unwrap();
@@ -235,7 +226,7 @@ mod tests {
         let mut encoder = Encoder::new(GROUND);
         let mut beat = || encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
         let (mut file, mut ground) = KeyFile::open(&path, "ground").unwrap();
-        // More than is appended before the file is written anew.
+        // There are more frames than are appended before the file is written anew.
         let mut longest = 0;
         for number in 0..5_000 {
             let signed = vehicle.sign(&beat(), 0, 1_000 + 300 * number);
@@ -250,11 +241,11 @@ mod tests {
                 restarted.check(&vehicle.sign(&beat(), 0, 0), 1_000).unwrap();
             }
         }
-        assert!(longest < 2 * APPENDED_MOST as u64, "{longest} bytes");
+        assert!(longest < 2 * APPEND_LIMIT_BYTES as u64, "{longest} bytes");
     }
 
     #[test]
-    fn a_passphrase_makes_the_key_of_its_sha_256() {
+    fn the_key_of_a_passphrase_is_its_sha_256() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("flight.key");
         KeyFile::create_with(&path, &Key::from_passphrase("abc")).unwrap();

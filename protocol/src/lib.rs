@@ -1,16 +1,29 @@
-//! What the vehicle, the ground station and replay share: the MAVLink dialect, framing, commands,
-//! parameters, status text, link statistics and the records of the flight log.
+//! The code that vehicle, ground station and replay share: MAVLink messages and their frames, commands, signing, links
+//! and the flight log.
 //!
-//! The core has no sockets, no clocks and no threads: bytes go in, frames come out, and `now` is an
-//! argument (a [`std::time::Duration`] since an epoch of the caller's choice). Two rooms touch the
-//! world and say so: [`log::recorder`] owns a thread that writes a file, and `transport` (a feature)
-//! moves bytes over UDP, TCP and serial lines.
+//! The core has no sockets, no clocks and no threads: bytes go in, frames come out, and `now` is an argument (a
+//! [`std::time::Duration`] since an epoch that the caller chooses). Only [`log::recorder`] (a thread that writes a
+//! file) and the modules of the feature `transport` do I/O.
+//!
+//! In reading order:
+//!
+//! * [`identity`]: the MAVLink addresses of vehicle and ground;
+//! * [`dialect`]: the message types, generated from XML;
+//! * [`frame`]: bytes to checked frames, and messages to frames;
+//! * [`text`], [`parameter`], [`command`], [`ftp`]: the MAVLink services, each over frames;
+//! * [`signing`]: signatures and their check;
+//! * [`duplicate`] and [`link_stats`]: copies of a frame, and the rates and the loss of a link;
+//! * [`hub`]: several links to one peer, made of the modules above;
+//! * `transport` (a feature): UDP, TCP and serial links;
+//! * `key_file` (the same feature): the file of a signing key;
+//! * [`log`]: the flight log;
+//! * [`hostile`]: hostile input for tests and fuzzing.
 //!
 //! # On a flight computer
 //!
-//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; frames that were not heard before and are to be
-//! believed come out. What is to be sent goes through an [`frame::Encoder`], one for each component, and the hub again,
-//! which signs it for each link. Nothing waits, nothing reads a clock:
+//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; valid frames that were not heard before come out. A
+//! message is sent through a [`frame::Encoder`], one for each component, and then through the hub, which signs it for
+//! each link. Nothing here waits or reads a clock:
 //!
 //! ```
 //! use std::time::Duration;
@@ -43,9 +56,8 @@
 //! assert_eq!(uart_out[7], 77, "a COMMAND_ACK");
 //! ```
 //!
-//! With a key, [`signing::Signing`] wants two things of its owner: the time of day, as well as it is known, and that
-//! [`hub::Hub::signing_memory`] outlives a power cycle.
-#![warn(missing_docs)]
+//! With a key, the caller must pass the time of day, as far as it is known, and must store
+//! [`hub::Hub::signing_memory`] so that it survives a power cycle.
 
 pub mod command;
 pub mod dialect;
@@ -57,7 +69,7 @@ pub mod hub;
 pub mod identity;
 #[cfg(feature = "transport")]
 pub mod key_file;
-pub mod link;
+pub mod link_stats;
 pub mod log;
 pub mod parameter;
 pub mod signing;

@@ -1,7 +1,7 @@
-//! The parameter protocol's messages: questions read off the wire, answers put on it.
+//! Parses the requests of the parameter protocol and builds the answers.
 //!
-//! Protocol: <https://mavlink.io/en/services/parameter.html>. Questions are read by their bytes, because a
-//! PARAM_SET of a type that the dialect does not know must be answered, too. Values are MAV_PARAM_TYPE_REAL32.
+//! Protocol: <https://mavlink.io/en/services/parameter.html>. Requests are parsed from their bytes, because a
+//! PARAM_SET with a type that the dialect does not know must be answered, too. Values are MAV_PARAM_TYPE_REAL32.
 
 use mavlink::types::CharArray;
 
@@ -13,78 +13,68 @@ const REQUEST_READ_ID: u32 = 20;
 const REQUEST_LIST_ID: u32 = 21;
 const SET_ID: u32 = 23;
 
-/// A parameter's name as it stands in a message: up to 16 bytes, ended by a NUL unless all 16 are used.
+/// A parameter's name as it is sent: up to 16 bytes, ended by a NUL unless all 16 are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParamId([u8; ParamId::MAX_LEN]);
 
 impl ParamId {
-    /// Longest name, bytes.
+    /// Length of the longest name, bytes.
     pub const MAX_LEN: usize = 16;
 
-    /// A name of ours. What does not fit is cut, which a test of the names forbids.
+    /// Converts one of our names. A longer name is cut; a test makes sure that we have none.
     pub fn new(name: &str) -> Self {
         Self::from_bytes(name.as_bytes())
     }
 
     fn from_bytes(bytes: &[u8]) -> Self {
         let mut id = [0; Self::MAX_LEN];
-        // What stands behind a NUL is not part of the name.
+        // Bytes after a NUL are not part of the name.
         for (place, byte) in id.iter_mut().zip(bytes.iter().take_while(|byte| **byte != 0)) {
             *place = *byte;
         }
         Self(id)
     }
 
-    /// Whether it is this name.
     pub fn is(&self, name: &str) -> bool {
         *self == Self::new(name)
     }
 
-    /// The name, made fit for a terminal.
+    /// The name without control characters, for a terminal.
     pub fn printable(&self) -> String {
         let len = self.0.iter().position(|byte| *byte == 0).unwrap_or(Self::MAX_LEN);
         crate::text::printable(&self.0[..len])
     }
 }
 
-/// Which parameter is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParamKey {
-    /// By name.
     Name(ParamId),
-    /// By its place in the list.
+    /// By its index in the list.
     Index(i16),
 }
 
-/// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ParamQuestion {
-    /// Every parameter.
     List,
-    /// One parameter.
     Read(ParamKey),
-    /// A new value.
     Set {
-        /// Of this parameter.
         id: ParamId,
-        /// The value, as a REAL32 would have it.
+        /// The value, read as a REAL32.
         value: f32,
-        /// The MAV_PARAM_TYPE number that the asker gave.
+        /// The MAV_PARAM_TYPE number in the request.
         value_type: u8,
     },
 }
 
-/// A question about parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParamRequest {
-    /// Who is asked; 0 means all.
+    /// The addressed component; id 0 means all.
     pub target: Address,
-    /// What is asked.
     pub question: ParamQuestion,
 }
 
 impl ParamRequest {
-    /// The question in a frame; `None` for any other message.
+    /// Parses the request in a frame; returns `None` for any other message.
     pub fn from_frame(frame: &Frame) -> Option<Self> {
         let bytes = frame.padded_payload();
         let target = |at: usize| Address { system_id: bytes[at], component_id: bytes[at + 1] };
@@ -92,7 +82,7 @@ impl ParamRequest {
             REQUEST_LIST_ID => Self { target: target(0), question: ParamQuestion::List },
             REQUEST_READ_ID => {
                 let index = i16::from_le_bytes([bytes[0], bytes[1]]);
-                // -1 says that the name counts.
+                // Index -1 means that the name selects the parameter.
                 let key = if index == -1 {
                     ParamKey::Name(ParamId::from_bytes(&bytes[4..20]))
                 } else {
@@ -113,12 +103,13 @@ impl ParamRequest {
     }
 }
 
-/// Whether a PARAM_SET's type is the one that this project speaks.
+/// Returns whether a PARAM_SET has the type that this project uses.
 pub fn is_real32(value_type: u8) -> bool {
     value_type == MavParamType::MAV_PARAM_TYPE_REAL32 as u8
 }
 
-/// PARAM_VALUE: the parameter at `index` of `count`. Broadcast, so that every ground hears of a change.
+/// Builds a PARAM_VALUE for the parameter at `index` of `count`. It is broadcast, so that every ground station learns
+/// of a change.
 pub fn value_message(name: &str, value: f32, index: u16, count: u16) -> MavMessage {
     MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
         param_value: value,
@@ -129,7 +120,7 @@ pub fn value_message(name: &str, value: f32, index: u16, count: u16) -> MavMessa
     })
 }
 
-/// PARAM_ERROR: there is no value to answer with.
+/// Builds a PARAM_ERROR for a request that no value can answer.
 pub fn error_message(key: ParamKey, error: MavParamError, asker: Address) -> MavMessage {
     let (param_id, param_index) = match key {
         ParamKey::Name(id) => (id.0, -1),
@@ -163,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_of_sixteen_bytes_has_no_terminator_and_nothing_counts_behind_one() {
+    fn a_name_ends_after_sixteen_bytes_or_at_its_first_nul() {
         for (bytes, name) in [(b"ABCDEFGHIJKLMNOP", "ABCDEFGHIJKLMNOP"), (b"ABC\0EFGHIJKLMNOP", "ABC")] {
             let ParamQuestion::Set { id, value, value_type } = set(bytes).question else { panic!("a set") };
             assert!(id.is(name) && !id.is("ABCD") && is_real32(value_type));
@@ -172,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_type_outside_the_dialect_is_still_a_question() {
+    fn a_request_with_an_unknown_type_is_parsed() {
         let mut payload = [0; 23];
         payload[6..9].copy_from_slice(b"ABC");
         payload[22] = 200;

@@ -1,4 +1,4 @@
-//! STATUSTEXT: long texts in 50-byte chunks, put together again, and made fit for a terminal.
+//! Splits a text into the 50-byte chunks of STATUSTEXT, reassembles texts, and removes control characters.
 //!
 //! <https://mavlink.io/en/messages/common.html#STATUSTEXT>
 
@@ -12,16 +12,16 @@ use crate::identity::Address;
 
 const CHUNK_LEN: usize = 50;
 const MAX_CHUNKS: usize = 8;
-/// A text whose last chunk is missing for this long is shown with a gap.
-pub const REASSEMBLY_TIMEOUT: Duration = Duration::from_secs(2);
+/// A text whose chunks are not complete after this time is shown with a gap.
+const REASSEMBLY_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Splits a text into STATUSTEXT messages. `id` ties the chunks together and must differ from that of
-/// the texts before it; 0 is allowed only when one chunk is enough and is then used anyway.
+/// Splits a text into STATUSTEXT messages. `id` marks the chunks of one text and must differ from the ids of the
+/// texts before it. A text that fits into one chunk is sent with id 0.
 pub fn chunks(severity: MavSeverity, text: &str, id: u16) -> Vec<STATUSTEXT_DATA> {
     let bytes = &text.as_bytes()[..text.len().min(CHUNK_LEN * MAX_CHUNKS)];
     let single = bytes.len() <= CHUNK_LEN;
     let mut pieces: Vec<&[u8]> = bytes.chunks(CHUNK_LEN).collect();
-    // A full last chunk has no terminator: an empty one ends the text.
+    // If the last chunk is full, it has no terminator, so an empty chunk ends the text.
     if bytes.is_empty() || (!single && bytes.len().is_multiple_of(CHUNK_LEN)) {
         pieces.push(&[]);
     }
@@ -41,14 +41,14 @@ pub fn chunks(severity: MavSeverity, text: &str, id: u16) -> Vec<STATUSTEXT_DATA
         .collect()
 }
 
-/// A text put together again and made printable.
+/// A reassembled text without control characters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Text {
-    /// Who said it.
+    /// The sender.
     pub source: Address,
     /// RFC 5424 severity, 0 emergency to 7 debug.
     pub severity: u8,
-    /// The text; `[...]` marks a chunk that never came.
+    /// The text; `[...]` marks a missing chunk.
     pub text: String,
 }
 
@@ -60,22 +60,21 @@ struct Partial {
     first_seen: Duration,
 }
 
-/// Puts chunked texts together again. Bounded: at most [`Reassembler::MAX_PARTIAL`] texts wait.
+/// Reassembles chunked texts. At most [`Reassembler::MAX_PARTIAL`] incomplete texts are kept.
 #[derive(Debug, Default)]
 pub struct Reassembler {
     partial: BTreeMap<(Address, u16), Partial>,
 }
 
 impl Reassembler {
-    /// Texts that may wait for their chunks at the same time; the oldest is given up first.
+    /// This many texts may wait for their chunks at the same time; the oldest one is given up first.
     pub const MAX_PARTIAL: usize = 16;
 
-    /// Nothing waiting.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes a chunk; returns the texts that are ready.
+    /// Takes a chunk and returns the texts that are ready.
     pub fn push(&mut self, source: Address, chunk: &STATUSTEXT_DATA, now: Duration) -> Vec<Text> {
         let bytes: &[u8; CHUNK_LEN] = &chunk.text;
         let end = bytes.iter().position(|byte| *byte == 0);
@@ -114,7 +113,7 @@ impl Reassembler {
         ready
     }
 
-    /// Texts that waited too long for a chunk.
+    /// Returns the texts that have waited too long for a chunk.
     pub fn expire(&mut self, now: Duration) -> Vec<Text> {
         let mut late = Vec::new();
         let keys: Vec<_> = self
@@ -142,7 +141,7 @@ impl Partial {
             .ended_at
             .unwrap_or_else(|| self.chunks.iter().rposition(Option::is_some).map_or(0, |last| last + 1))
             .min(MAX_CHUNKS - 1);
-        // Put together as bytes first: a character may be cut by a chunk's edge.
+        // The bytes are joined first, because a character may be split between two chunks.
         let mut bytes = Vec::new();
         for chunk in &self.chunks[..=end] {
             bytes.extend_from_slice(chunk.as_deref().unwrap_or(b"[...]"));
@@ -151,8 +150,8 @@ impl Partial {
     }
 }
 
-/// Makes received bytes fit for a terminal: what is not UTF-8 becomes U+FFFD, and control characters
-/// (with them every escape sequence's start) become U+FFFD too, so that a radio cannot move the cursor.
+/// Makes received bytes safe for a terminal: bytes that are not UTF-8 and control characters become U+FFFD, so that
+/// no escape sequence that was sent by radio reaches the terminal.
 pub fn printable(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes)
         .chars()
@@ -160,7 +159,7 @@ pub fn printable(bytes: &[u8]) -> String {
         .collect()
 }
 
-/// Characters that reorder what stands around them on the screen (Unicode UAX #9).
+/// Characters that change the order of the text around them (Unicode UAX #9).
 fn is_bidi_control(c: char) -> bool {
     matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

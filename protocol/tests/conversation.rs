@@ -1,4 +1,4 @@
-//! Commands, texts and link figures, on a simulated clock.
+//! Commands, texts and link statistics, on a simulated clock.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use protocol::command::{CommandAnswer, CommandEvent, CommandRequest, CommandSend
 use protocol::dialect::{HEARTBEAT_DATA, MavCmd, MavMessage, MavResult, MavSeverity};
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::link::LinkStats;
+use protocol::link_stats::LinkStats;
 use protocol::text::{Reassembler, chunks, printable};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -21,7 +21,7 @@ fn answer(command: MavCmd, result: MavResult) -> CommandAnswer {
     CommandAnswer { command: command as u16, result: result as u8, progress: 0, target: GROUND }
 }
 
-/// Sends for `seconds` without an answer; returns when something was sent.
+/// Polls for `seconds` without an answer; returns the times of sending and the events.
 fn unanswered(resend: Resend, seconds: u64) -> (Vec<u64>, Vec<CommandEvent>) {
     let mut sender = CommandSender::new();
     sender.submit(VEHICLE, ARM, [1.0; 7], resend, ms(0));
@@ -54,10 +54,10 @@ fn an_abort_is_sent_until_it_is_withdrawn() {
             confirmations.push(command.confirmation);
         }
     }
-    // Twenty in the first second, five in each of the 199 after it.
+    // It is sent twenty times in the first second and five times in each of the 199 seconds after it.
     assert_eq!(confirmations.len(), 20 + 5 * 199);
     assert_eq!(&confirmations[..3], &[0, 1, 2]);
-    assert_eq!(confirmations.last(), Some(&255), "the count of resends saturates");
+    assert_eq!(confirmations.last(), Some(&255), "the count of resends does not overflow");
     sender.on_answer(&answer(ABORT, MavResult::MAV_RESULT_ACCEPTED), ms(200_000));
     assert!(sender.is_pending(ABORT), "an answer does not end it");
     sender.withdraw_one(ticket, ms(200_100));
@@ -77,7 +77,7 @@ fn a_command_in_progress_gets_three_more_seconds_and_no_resend() {
 }
 
 #[test]
-fn requests_and_answers_survive_the_wire() {
+fn the_answer_to_an_unknown_command_is_decoded_again() {
     let mut encoder = Encoder::new(VEHICLE);
     let request = CommandRequest {
         source: GROUND,
@@ -93,7 +93,7 @@ fn requests_and_answers_survive_the_wire() {
 }
 
 #[test]
-fn addresses_take_their_own_ids_and_the_broadcast() {
+fn an_address_accepts_its_own_ids_and_the_broadcast() {
     let of = |system_id, component_id| Address { system_id, component_id };
     for target in [of(0, 0), of(1, 0), of(0, 1), of(1, 1)] {
         assert!(VEHICLE.accepts(target), "{target:?}");
@@ -104,7 +104,7 @@ fn addresses_take_their_own_ids_and_the_broadcast() {
 }
 
 #[test]
-fn a_missing_chunk_is_marked_after_its_time() {
+fn a_missing_chunk_is_marked_after_the_timeout() {
     let text = "a".repeat(50) + &"b".repeat(50) + &"c".repeat(20);
     let parts = chunks(MavSeverity::MAV_SEVERITY_WARNING, &text, 7);
     assert_eq!(parts.len(), 3);
@@ -129,7 +129,7 @@ fn a_flood_of_unfinished_texts_stays_bounded() {
 }
 
 #[test]
-fn a_terminal_cannot_be_commanded_over_the_radio() {
+fn a_text_received_by_radio_contains_no_control_characters() {
     let hostile = b"ok\x1b[2J\x07\r\n\x9b1mred \xff\xfe \xe2\x80\xae evil";
     let shown = printable(hostile);
     assert!(shown.starts_with("ok"));
@@ -144,7 +144,7 @@ fn heartbeats(encoder: &mut Encoder, count: usize) -> Vec<Frame> {
 fn loss_and_rate_are_those_of_the_last_ten_seconds() {
     let mut stats = LinkStats::new();
     let mut encoder = Encoder::new(VEHICLE);
-    // Ten frames a second for 30 s; every fifth is lost during the last ten.
+    // Ten frames a second arrive for 30 s; every fifth is lost during the last ten.
     for (k, frame) in heartbeats(&mut encoder, 300).iter().enumerate() {
         let now = ms(100 * k as u64);
         if k < 200 || k % 5 != 0 {
@@ -182,7 +182,7 @@ fn each_component_has_its_own_loss_and_each_message_its_age() {
 }
 
 #[test]
-fn a_frame_that_was_overtaken_is_not_lost() {
+fn a_frame_that_arrives_late_is_not_lost() {
     let frames = heartbeats(&mut Encoder::new(VEHICLE), 20);
     let mut stats = LinkStats::new();
     for place in [0, 1, 3, 2, 4, 7, 5, 6, 8] {

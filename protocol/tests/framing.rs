@@ -1,4 +1,4 @@
-//! Framing against chunking, garbage, cuts and random bytes.
+//! Framing under every chunk size, garbage, cut frames and random bytes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use proptest::prelude::*;
@@ -16,7 +16,7 @@ fn messages() -> Vec<MavMessage> {
             ..HEARTBEAT_DATA::default()
         }),
         MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
-            // 0xFD and 0xFE, the two start markers, inside a payload.
+            // The two start markers, 0xFD and 0xFE, occur inside the payload.
             time_boot_ms: 0xFEFD_FDFE,
             q1: 1.0,
             ..ATTITUDE_QUATERNION_DATA::default()
@@ -54,7 +54,7 @@ fn every_chunk_size_finds_every_frame_between_garbage() {
         stream.extend_from_slice(&garbage);
         stream.extend_from_slice(frame.as_bytes());
     }
-    // A candidate that begins in the garbage may need up to one frame's worth of bytes to be refuted.
+    // A candidate that begins in the garbage may need up to one frame's length of bytes before it is rejected.
     stream.extend_from_slice(&[0; 300]);
     for chunk in 1..=stream.len() {
         let mut framer = Framer::new();
@@ -73,7 +73,7 @@ fn what_was_encoded_is_decoded() {
     for (sequence, (frame, message)) in frames().iter().zip(messages()).enumerate() {
         assert_eq!(frame.source(), VEHICLE);
         assert_eq!(usize::from(frame.sequence()), sequence);
-        // NaN is not equal to itself; its text is.
+        // NaN does not equal itself, but its text does.
         assert_eq!(format!("{:?}", frame.decode().unwrap()), format!("{message:?}"));
     }
 }
@@ -82,7 +82,7 @@ fn bytes(hex: &str) -> Vec<u8> {
     (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
 }
 
-/// Frames packed by pymavlink 2.4.50 (MAVLink 2, system 1, component 1): read as meant, and ours are the same bytes.
+/// Frames packed by pymavlink 2.4.50 (MAVLink 2, system 1, component 1). We decode them and encode the same bytes.
 #[test]
 fn val_pymavlink_frames_byte_for_byte() {
     let by_pymavlink = [
@@ -107,7 +107,7 @@ fn val_pymavlink_frames_byte_for_byte() {
 }
 
 #[test]
-fn a_flipped_bit_anywhere_is_noticed() {
+fn a_flipped_bit_anywhere_is_detected() {
     let frame = &frames()[1];
     let bytes = frame.as_bytes();
     for bit in 0..bytes.len() * 8 {
@@ -121,26 +121,26 @@ fn a_flipped_bit_anywhere_is_noticed() {
 }
 
 #[test]
-fn a_datagram_s_end_ends_its_frame() {
+fn a_frame_does_not_continue_in_the_next_datagram() {
     let frame = &frames()[0];
     let (head, tail) = frame.as_bytes().split_at(7);
     let mut framer = Framer::new();
     framer.push_datagram(head);
     assert!(framer.next_frame().is_none());
     framer.push_datagram(tail);
-    assert!(framer.next_frame().is_none(), "two halves in two datagrams are no frame");
+    assert!(framer.next_frame().is_none(), "a frame was joined from two datagrams");
     framer.push_datagram(frame.as_bytes());
     assert_eq!(framer.next_frame().as_ref(), Some(frame));
 }
 
-/// Stray bytes, markers of both protocol versions among them, and the beginnings of frames that lost their rest.
+/// Stray bytes, among them markers of both protocol versions, and the beginnings of frames whose rest is lost.
 fn noises() -> Vec<Vec<u8>> {
     let cut = frames()[1].as_bytes()[..20].to_vec();
     vec![vec![0xFE], vec![0xFD], vec![0xFE, 0xFD], vec![0xFD, 0xFF, 0x00], vec![0xFD, 0xFF, 0x01, 0x00], cut]
 }
 
 #[test]
-fn noise_before_a_frame_in_its_datagram_hides_nothing() {
+fn noise_before_a_frame_in_a_datagram_does_not_hide_it() {
     let frame = &frames()[3];
     for noise in noises() {
         let mut framer = Framer::new();
@@ -150,7 +150,7 @@ fn noise_before_a_frame_in_its_datagram_hides_nothing() {
 }
 
 #[test]
-fn noise_before_a_frame_on_a_line_hides_nothing_once_the_line_is_silent() {
+fn noise_before_a_frame_hides_it_only_until_the_line_is_silent() {
     let frame = &frames()[3];
     for noise in noises() {
         let mut framer = Framer::new();
@@ -178,7 +178,7 @@ fn an_unknown_message_id_is_counted_and_skipped() {
 
 proptest! {
     #[test]
-    fn random_bytes_never_panic_and_are_all_accounted_for(
+    fn random_bytes_never_panic_and_are_all_counted(
         chunks in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..600), 0..8)
     ) {
         let mut framer = Framer::new();
@@ -198,7 +198,7 @@ proptest! {
         prop_assert_eq!(framer.counters().garbage_bytes as usize + framed, total);
     }
 
-    /// Random payloads under a right CRC get past the framing to the typed decoders.
+    /// Random payloads with a correct CRC pass the framing and reach the typed decoders.
     #[test]
     fn random_payloads_never_panic_a_decoder(
         message_id in prop_oneof![0u32..=511, 54_000u32..=54_010],

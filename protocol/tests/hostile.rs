@@ -1,9 +1,9 @@
-//! The fuzz targets for a bounded time, by proptest. `PROPTEST_CASES` makes it longer.
+//! Runs the fuzz targets for a bounded time with proptest. `PROPTEST_CASES` sets how many cases.
 
 use proptest::prelude::*;
 use protocol::hostile;
 
-/// Bytes with the shape of what they pretend to be: lengths, and message ids that exist.
+/// Bytes in the format that the fuzz targets parse: lengths, and message ids that exist.
 fn pieces() -> impl Strategy<Value = Vec<u8>> {
     let id = prop_oneof![0u16..=512, 54_000u16..=54_010, any::<u16>()];
     let piece = (id, any::<[u8; 2]>(), prop::collection::vec(any::<u8>(), 0..251));
@@ -47,7 +47,7 @@ proptest! {
 
     #[test]
     fn any_links_are_carried(kinds in prop::collection::vec(any::<u8>(), 0..12), data in pieces()) {
-        // Each piece is led by what kind of thing a link brings.
+        // A byte before each piece says what the link receives.
         let mut bytes = Vec::new();
         let mut rest = &data[..];
         for kind in kinds {

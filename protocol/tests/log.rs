@@ -1,4 +1,4 @@
-//! Logs: what goes in comes out, and what a killed recorder leaves can be read.
+//! Logs: what is written is read again, and the log of a killed recorder can be read.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::collections::BTreeMap;
@@ -87,7 +87,7 @@ fn a_whole_log_is_read_as_written() {
     ]);
     let contents = read(&bytes);
     assert_eq!(contents.damage, None);
-    assert_eq!(contents.metadata, ["build", "run"]);
+    assert_eq!(contents.metadata, ["build", "schema", "run"]);
     assert_eq!(contents.attachments, ["profile.toml", "touchdown.xml"]);
     let topics: Vec<_> = contents.messages.iter().map(|(topic, _)| topic.as_str()).collect();
     assert_eq!(topics, [TOPIC_OPERATOR, TOPIC_RAW_RX, TOPIC_EVENTS, TOPIC_PLANT_TRUTH, "/tf"]);
@@ -95,7 +95,7 @@ fn a_whole_log_is_read_as_written() {
     assert_eq!(v1::PlantTruth::decode(contents.messages[3].1.as_slice()).unwrap(), truth);
 }
 
-/// The encoder may drop a field that equals its default, and -0.0 equals 0.0: the schema must not let it.
+/// An encoder may drop a field that equals its default, and -0.0 equals 0.0; our schema must prevent that.
 #[test]
 fn both_zeros_and_every_nan_survive() {
     for bits in
@@ -111,7 +111,7 @@ fn both_zeros_and_every_nan_survive() {
 }
 
 #[test]
-fn every_cut_leaves_what_was_flushed_before_it() {
+fn a_cut_log_contains_everything_flushed_before_the_cut() {
     let records: Vec<_> = (0..100).map(operator).collect();
     let bytes = written(&records);
     let whole: Vec<_> = read(&bytes).messages;
@@ -119,7 +119,7 @@ fn every_cut_leaves_what_was_flushed_before_it() {
     for cut in 0..bytes.len() {
         let contents = read(&bytes[..cut]);
         assert_eq!(contents.messages[..], whole[..contents.messages.len()], "cut at {cut}");
-        assert!(contents.messages.len() >= most, "more bytes never give less");
+        assert!(contents.messages.len() >= most, "a longer file contains fewer messages");
         most = contents.messages.len();
         if cut < 8 {
             assert_eq!(contents.damage, Some(Damage::NotMcap), "cut at {cut}");
@@ -132,7 +132,7 @@ fn every_cut_leaves_what_was_flushed_before_it() {
 }
 
 #[test]
-fn foreign_files_are_called_so() {
+fn other_files_are_reported_as_not_mcap() {
     for foreign in [&b""[..], b"\x89PNG\r\n\x1a\n and more", b"time,altitude\n0,15\n"] {
         let contents = read(foreign);
         assert_eq!(contents.damage, Some(Damage::NotMcap));
@@ -153,20 +153,21 @@ fn a_recorder_never_overwrites_and_ends_its_file() {
     recorder.finish().unwrap();
     assert_eq!(recorder.dropped(), 0);
     recorder.try_record(operator(0), 0);
-    assert_eq!(recorder.dropped(), 1, "what comes after the end is counted");
+    assert_eq!(recorder.dropped(), 1, "a record after the end counts as dropped");
     let contents = read(&std::fs::read(&path).unwrap());
     assert_eq!((contents.messages.len(), contents.damage), (20_000, None));
 }
 
 proptest! {
     #[test]
-    fn random_bytes_are_never_more_than_damage(bytes in prop::collection::vec(any::<u8>(), 0..400), magic: bool) {
+    fn random_bytes_are_reported_as_damage(bytes in prop::collection::vec(any::<u8>(), 0..400), magic: bool) {
         let mut file = if magic { mcap::MAGIC.to_vec() } else { Vec::new() };
         file.extend(bytes);
         prop_assert!(read(&file).damage.is_some());
     }
 
-    /// One flipped bit costs a chunk or the rest, never a wrong message: a checksum stands before each.
+    /// A flipped bit costs a chunk or the rest of the log, but never changes a message, because checksums protect all
+    /// of them.
     #[test]
     fn a_flipped_bit_never_changes_a_message(at in any::<prop::sample::Index>(), bit in 0u32..8) {
         let records: Vec<_> = (0..30).map(operator).collect();

@@ -1,23 +1,23 @@
-//! Flight logs after the flight: what is in them, whether the controller decides again what it decided then, what it
-//! would have done with other settings, and how flights compare.
+//! Answers questions about flight logs after the flight: what is in a log, whether the controller of this build makes
+//! the recorded decisions again, what it would have done with other settings, and how flights differ.
 //!
-//! * [`log`]: a log opened and streamed, with memory that does not grow with its frames; and a whole flight in memory.
-//! * [`info`]: what is in a log, how complete it is and what can be done with it.
-//! * [`verify`]: every tick re-executed from its recorded input and compared by bits.
-//! * [`settings`]: other settings for a recorded flight, by the names of its profile.
-//! * [`controller`]: the controller that a log's ticks came from.
-//! * [`mod@evaluate`]: the controller alone under other settings, on recorded inputs (open loop).
-//! * [`mod@refly`]: the flight flown again in simulation from a chosen moment (closed loop).
-//! * [`mod@sweep`]: many settings over many flights, ranked; and the smallest change that turns a verdict.
-//! * [`mod@tick`]: one tick solved again alone.
-//! * [`mod@compare`]: flights side by side, signal by signal; [`table`]: a log as tables.
-//! * [`output`]: files that appear whole and overwrite nothing unasked.
-//! * [`export`], [`import`] and [`mod@recover`]: into other formats and from them, and whole again out of a damaged log.
-//! * [`mod@report`]: a flight as one page of HTML.
-//! * [`mod@print`]: all of it as text for people, JSON for programs and JUnit XML for build servers.
+//! In reading order:
 //!
-//! Everything but [`log`] and [`mod@print`] works on values: records in, reports out.
-#![warn(missing_docs)]
+//! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
+//! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
+//! * [`controller`]: builds the flight computer or planar controller that a log's ticks came from.
+//! * [`verify`]: runs every tick again on its recorded input and compares the results bit for bit.
+//! * [`settings`]: other settings for a recorded flight, named as in its profile.
+//! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
+//! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
+//! * [`sweep`](mod@sweep): flies many flights with many settings and ranks them; finds the smallest change of a setting
+//!   that changes the verdict.
+//! * [`tick`](mod@tick): solves one recorded tick again.
+//! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
+//! * [`report`](mod@report): writes a flight as one HTML page.
+//! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
+//! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
+//! * [`print`](mod@print): prints reports as text for people, JSON for programs and JUnit XML for build servers.
 
 pub mod compare;
 pub mod controller;

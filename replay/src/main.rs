@@ -14,8 +14,8 @@ fn main() -> ExitCode {
     let answered = match Cli::try_parse() {
         Ok(cli) => cli.run(),
         Err(usage) => {
-            // Help goes to stdout and is no failure; anything else goes to stderr. Nothing is left to do if even
-            // that cannot be written.
+            // Help goes to stdout and is not an error; anything else goes to stderr. If writing fails here, there is
+            // nothing left to do.
             let _ = usage.print();
             return ExitCode::from(if usage.use_stderr() { cli::EXIT_NO_ANSWER } else { 0 });
         }

@@ -1,5 +1,5 @@
-//! New files. A file appears under its name once it is whole, and replaces one that is there only if that is asked for;
-//! the log that is being read is never replaced.
+//! Writes new files safely. A file gets its name once it is complete, and replaces an existing one only on request. The
+//! log that is being read is never replaced.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-/// What to do with a file that is there already.
+/// What to do with an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Overwrite {
     /// Keep it and fail.
@@ -18,18 +18,18 @@ pub enum Overwrite {
 }
 
 impl Overwrite {
-    /// As a flag `--force` says it.
+    /// From the flag `--force`.
     pub fn if_forced(force: bool) -> Self {
         if force { Self::Always } else { Self::Never }
     }
 }
 
-/// Where a file is to be.
+/// The destination of a new file.
 #[derive(Debug, Clone, Copy)]
 pub struct Destination<'a> {
     /// Its name.
     pub path: &'a Path,
-    /// What to do if a file is there.
+    /// What to do if the file exists.
     pub overwrite: Overwrite,
 }
 
@@ -45,7 +45,7 @@ impl<'a> From<&'a PathBuf> for Destination<'a> {
     }
 }
 
-/// A file being written, under another name beside its own until it is whole; dropped, it leaves nothing.
+/// A file being written, under a temporary name in the same directory until it is complete. If dropped, it is removed.
 #[derive(Debug)]
 pub struct NewFile {
     path: PathBuf,
@@ -56,15 +56,15 @@ pub struct NewFile {
 #[derive(Debug)]
 enum Place {
     Beside(NamedTempFile),
-    /// A pipe or a device: nothing is there that could be lost.
+    /// A pipe or a device has no content that could be lost.
     Device(File),
 }
 
 impl NewFile {
-    /// A file to be at a destination; `input` is the file that is read for it.
+    /// Creates a file for a destination; `input` is the file that is being read.
     ///
     /// # Errors
-    /// A file is there and may not be replaced, it is the input, or none can be made in its directory.
+    /// The file exists and may not be replaced, it is the input, or it cannot be created in its directory.
     pub fn create(Destination { path, overwrite }: Destination, input: &Path) -> io::Result<Self> {
         if same_file(path, input) {
             let words = "it is the file that is being read, and never overwritten";
@@ -84,15 +84,15 @@ impl NewFile {
         Ok(Self { path: path.to_owned(), overwrite, place })
     }
 
-    /// The file's own name.
+    /// The final name of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The file is whole: it takes its name.
+    /// Finishes the file and gives it its name.
     ///
     /// # Errors
-    /// It could not be written to the disk, or a file has appeared there meanwhile that may not be replaced.
+    /// It could not be written to the disk, or a file has appeared there in the meantime that may not be replaced.
     pub fn commit(self) -> io::Result<()> {
         let Self { path, overwrite, place } = self;
         let Place::Beside(file) = place else {
@@ -137,7 +137,7 @@ fn exists() -> io::Error {
     io::Error::new(io::ErrorKind::AlreadyExists, "it exists already; --force replaces it")
 }
 
-/// By whatever names; a file that is not there is no other.
+/// Whether two paths name the same file; a missing file is never the same as another.
 fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
@@ -149,7 +149,7 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     let unfinished = {
         use std::os::unix::fs::PermissionsExt as _;
-        // As for any new file: the user's mask decides. Alone, only the owner could read it.
+        // Apply the user's umask as for any new file; a temporary file would be readable by its owner only.
         unfinished.permissions(std::fs::Permissions::from_mode(0o666))
     };
     unfinished.tempfile_in(folder)
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1, "nothing else is left");
     }
 
-    /// Somebody else makes the file while it is written.
+    /// Another program creates the file while this one is being written.
     #[test]
     fn a_file_that_appears_meanwhile_is_kept() {
         let directory = tempfile::tempdir().unwrap();

@@ -1,46 +1,43 @@
-//! From the plant's state to the screen's model: how old a value is when the ground knows it.
+//! Measures how old a value is when it reaches the ground's model.
 //!
-//! `cargo bench -p e2e --bench latency`. A landing is flown in real time by the vehicle's own run loop; the ground's
-//! own links and model receive it. At each controller tick the time is noted, and the state that a message carries is
-//! dated from the tick before it by the message's time since boot. Both clocks are this process's one.
+//! `cargo bench -p e2e --bench latency`. The vehicle's own run loop flies a landing in real time; the ground's own
+//! links and model receive it. The benchmark notes the time of each controller tick. The time since boot in a message
+//! then gives the time of its state, counted from the tick before it. Vehicle and ground are in one process and use
+//! one clock.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use e2e::SerialLine;
+use e2e::{SerialLine, now};
 use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
-use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_profile};
-use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
+use onboard_sim::vehicle::VehicleEvent;
 use protocol::dialect::MavMessage;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
+use sim::plane::DeadlinePolicy;
 use tokio::sync::watch;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
-/// In flight the controller ticks this often, ms.
+/// The controller's period in flight, ms.
 const TICK_MS: u32 = 100;
 
-/// When each tick was, by milliseconds since boot.
+/// The time of each tick, by milliseconds since boot.
 type Ticks = Arc<Mutex<BTreeMap<u32, Instant>>>;
 
-#[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
-fn now() -> Instant {
-    Instant::now()
-}
-
-/// Flies in a thread of its own, as a vehicle would.
+/// Flies in a thread of its own, as a vehicle would in a process of its own.
 fn start_vehicle(
-    link: Endpoint,
+    link: LinkAddress,
     ticks: &Ticks,
 ) -> Result<std::thread::JoinHandle<Result<(), Failure>>, Failure> {
     let ticks = Arc::clone(ticks);
     let options = FlyOptions {
         system_id: 1,
-        profile: load_profile("paper-calibrated")?,
+        profile: load_flight("paper-calibrated")?,
         links: vec![link],
         key_file: None,
         recorder: None,
@@ -67,7 +64,7 @@ fn start_vehicle(
     Ok(std::thread::Builder::new().name("vehicle".to_owned()).spawn(fly)?)
 }
 
-/// Milliseconds since boot of the two messages that carry the state.
+/// The milliseconds since boot in the two messages that carry the state.
 fn boot_ms_of(message: &MavMessage) -> Option<u32> {
     match message {
         MavMessage::ATTITUDE_QUATERNION(data) => Some(data.time_boot_ms),
@@ -76,14 +73,14 @@ fn boot_ms_of(message: &MavMessage) -> Option<u32> {
     }
 }
 
-/// Receives with the ground's own links and model until the vehicle is silent for a while; returns the latencies.
-async fn receive(listening: Endpoint, vehicle: Option<Endpoint>) -> Result<Vec<Duration>, Failure> {
+/// Receives with the ground's own links and model until the vehicle's flight has ended; returns the latencies.
+async fn receive(listening: LinkAddress, vehicle: Option<LinkAddress>) -> Result<Vec<Duration>, Failure> {
     let clock = Clock::start();
     let mut wire =
         Wire::open(protocol::identity::GROUND, vec![listening], None, clock, None, LogTime::Run(clock))
             .await?;
     let ticks = Ticks::default();
-    // Over UDP the vehicle speaks to the port that the system chose.
+    // Over UDP the vehicle sends to the port that the system chose.
     let bound = wire.endpoints().next().map(ToString::to_string).unwrap_or_default();
     let vehicle = vehicle.map_or_else(|| bound.replace("udpin", "udpout").parse(), Ok)?;
     let vehicle = start_vehicle(vehicle, &ticks)?;
@@ -115,7 +112,7 @@ async fn receive(listening: Endpoint, vehicle: Option<Endpoint>) -> Result<Vec<D
     Ok(latencies)
 }
 
-/// When the state of this time since boot was: counted from the controller tick before it, in real time.
+/// The time at which the vehicle had the state of this time since boot, counted from the controller tick before it.
 fn state_was_at(ticks: &Ticks, boot_ms: u32) -> Option<Instant> {
     let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
     let (tick_ms, tick_at) = ticks.range(..=boot_ms).next_back()?;
@@ -144,8 +141,8 @@ fn main() -> Result<(), Failure> {
     report("udp", udp)?;
     for baud in [57_600, 115_200] {
         let line = SerialLine::new(baud);
-        let [near, far] = [&line.near, &line.far].map(|device| format!("serial:{}:{baud}", device.display()));
-        let serial = runtime.block_on(receive(far.parse()?, Some(near.parse()?)))?;
+        let (near, far) = (line.near_link().parse()?, line.far_link().parse()?);
+        let serial = runtime.block_on(receive(far, Some(near)))?;
         report(&format!("serial {baud}"), serial)?;
     }
     Ok(())

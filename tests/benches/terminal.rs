@@ -1,9 +1,9 @@
-//! What the ground station costs on a real terminal, and how long an abort takes from the key to the wire.
+//! Measures what the ground station costs on a real terminal, and how long an abort takes from the key to the wire.
 //!
-//! `cargo bench -p e2e --bench terminal`. The programs are real, and so is the terminal: a pseudo-terminal of 80 by
-//! 24 cells, whose far end types and counts what is written to it. For the abort a vehicle of frames alone tells of a
-//! landing at its usual rates, so that the screen is drawn ten times a second meanwhile; each time runs from the write
-//! of the chord's last key to the arrival of the datagram with the command.
+//! `cargo bench -p e2e --bench terminal`. The programs and the terminal are real: a pseudo-terminal of 80 by 24
+//! cells, whose other end types keys and counts the bytes written to it. For the abort, a vehicle made of one socket
+//! reports a landing at the usual rates, so that the screen is drawn ten times a second. Each time runs from the
+//! write of the chord's last key to the arrival of the datagram with the command.
 
 use std::io::Write as _;
 use std::net::{SocketAddr, UdpSocket};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use e2e::{BareGround, Bound, Program, Running, Terminal, program};
+use e2e::{BareGround, Bound, Program, Running, Terminal, now, program};
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavModeFlag,
@@ -24,18 +24,18 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 const SIZE: (u16, u16) = (80, 24);
 const TRIALS: u32 = 200;
-/// How long the pad is watched.
+/// How long the cost on the pad is measured.
 const IDLE: Duration = Duration::from_secs(30);
 const FLIGHTS: u32 = 3;
-/// An abort that is later than this was not sent.
+/// An abort that takes longer was not sent.
 const GIVEN_UP_AFTER: Duration = Duration::from_secs(5);
 
-/// A way to type the chord.
+/// A way to type the chord that aborts.
 struct Hand {
     name: &'static str,
     tells_repeats: bool,
     keys: [&'static [u8]; 2],
-    /// Between the two keys, at least.
+    /// The least time between the two keys.
     pause: Duration,
 }
 
@@ -52,7 +52,7 @@ const HANDS: [Hand; 4] = [
         keys: [b"\x18", b"\x18"],
         pause: Duration::from_millis(150),
     },
-    // Ctrl-X by kitty's protocol; Enter stays what it was.
+    // Ctrl-X as kitty's protocol encodes it; Enter is unchanged.
     Hand {
         name: "repeats told, Ctrl-X Enter",
         tells_repeats: true,
@@ -67,11 +67,6 @@ const HANDS: [Hand; 4] = [
     },
 ];
 
-#[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
-fn now() -> Instant {
-    Instant::now()
-}
-
 fn ground(folder: &tempfile::TempDir, tells_repeats: bool) -> Terminal {
     let mut command = program(Program::Ground);
     command
@@ -81,8 +76,8 @@ fn ground(folder: &tempfile::TempDir, tells_repeats: bool) -> Terminal {
     Terminal::start(&command, SIZE, tells_repeats)
 }
 
-/// Says what a landing vehicle says, until it is told to stop.
-fn speak(socket: &UdpSocket, ground: SocketAddr, stop: &AtomicBool) {
+/// Sends what a landing vehicle sends, until `stop` is set.
+fn send_telemetry(socket: &UdpSocket, ground: SocketAddr, stop: &AtomicBool) {
     let mut encoder = Encoder::new(VEHICLE);
     for count in 0_u32.. {
         if stop.load(Ordering::Relaxed) {
@@ -114,15 +109,15 @@ fn speak(socket: &UdpSocket, ground: SocketAddr, stop: &AtomicBool) {
             messages.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
         }
         for message in messages {
-            // A ground that does not listen yet hears the next one.
+            // A ground that does not listen yet receives the next message.
             let _ = socket.send_to(encoder.encode(&message).as_bytes(), ground);
         }
         std::thread::sleep(Duration::from_millis(40));
     }
 }
 
-/// Waits for a command of the ground; `None` if it does not come in time.
-fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
+/// Waits for an abort of the ground; `None` if it does not come in time.
+fn wait_for_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
     let mut datagram = [0; 2048];
     let deadline = now() + GIVEN_UP_AFTER;
     loop {
@@ -139,7 +134,7 @@ fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
             let Some(request) = CommandRequest::from_frame(&frame) else { continue };
             if request.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16 {
                 let answer = CommandAnswer::to(&request, MavResult::MAV_RESULT_ACCEPTED);
-                // Its sequence is its own; nobody counts it.
+                // Nobody counts its sequence numbers.
                 if let Some(frame) = answer.encode(&mut Encoder::new(VEHICLE)) {
                     socket.send_to(frame.as_bytes(), from)?;
                 }
@@ -149,39 +144,42 @@ fn hear_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
     }
 }
 
-/// The time of each abort that was sent; a chord of two Ctrl-X that reach a busy machine as if one were held sends none.
+/// The latency of each abort that was sent. On a busy machine two Ctrl-X may arrive as if the key was held, and then
+/// no abort is sent.
 fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
     let folder = tempfile::tempdir()?;
     let mut terminal = ground(&folder, hand.tells_repeats);
     let port = terminal.bound_port(Bound::Udp);
     let socket = UdpSocket::bind("127.0.0.1:0")?;
     let stop = Arc::new(AtomicBool::new(false));
-    let speaker = {
+    let sender = {
         let (socket, stop) = (socket.try_clone()?, Arc::clone(&stop));
         let to = SocketAddr::from(([127, 0, 0, 1], port));
-        std::thread::Builder::new().name("vehicle".to_owned()).spawn(move || speak(&socket, to, &stop))?
+        std::thread::Builder::new()
+            .name("vehicle".to_owned())
+            .spawn(move || send_telemetry(&socket, to, &stop))?
     };
-    // Heard, and drawn for a while.
+    // The ground hears the vehicle and draws it for a while.
     std::thread::sleep(Duration::from_secs(3));
     let mut latencies = Vec::new();
     for trial in 0..TRIALS {
-        // Spread over the screen's and the clock's periods.
+        // The pauses spread the keys over the periods of screen and clock.
         std::thread::sleep(Duration::from_millis(u64::from(trial * 37 % 100)));
         terminal.type_bytes(hand.keys[0]);
         std::thread::sleep(hand.pause + Duration::from_millis(u64::from(trial * 13 % 20)));
         let typed_at = now();
         terminal.type_bytes(hand.keys[1]);
-        let heard_at = hear_abort(&socket)?;
+        let heard_at = wait_for_abort(&socket)?;
         latencies.extend(heard_at.map(|at| at.saturating_duration_since(typed_at)));
         // The answer arrives before the next chord begins.
         std::thread::sleep(Duration::from_millis(100));
     }
     stop.store(true, Ordering::Relaxed);
-    speaker.join().map_err(|_panic| "the vehicle's thread has panicked")?;
+    sender.join().map_err(|_panic| "the vehicle's thread has panicked")?;
     Ok(latencies)
 }
 
-/// What a program used and wrote over a time.
+/// What a program used and wrote in a time.
 #[derive(Default)]
 struct Cost {
     time: Duration,
@@ -207,11 +205,12 @@ impl Cost {
     }
 }
 
-fn mark(terminal: &Terminal) -> (Instant, Duration, u64) {
+fn cost_so_far(terminal: &Terminal) -> (Instant, Duration, u64) {
     (now(), terminal.processor_time(), terminal.written())
 }
 
-/// A real flight, armed and started by the hand; what the screen cost on the pad and during the landing.
+/// Flies a real flight, armed and started by typed keys, and adds up what the screen cost on the pad and during the
+/// landing.
 fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let mut watch = BareGround::new();
@@ -220,16 +219,13 @@ fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Fai
     let mut vehicle = program(Program::OnboardSim);
     vehicle.args(["fly", "--stay", "--mavlink", &format!("udpout:127.0.0.1:{port}")]);
     let _vehicle = Running::start(vehicle.args(["--mavlink", &watch.link()]).current_dir(folder.path()));
-    watch.wait_for("every check passed", |_, message| match message {
-        Some(MavMessage::TD_FLIGHT_STATUS(status)) if status.checks_failed.is_empty() => Some(()),
-        _ => None,
-    });
+    watch.wait_until_ready();
     std::thread::sleep(Duration::from_secs(2));
-    let before = mark(&terminal);
+    let before = cost_so_far(&terminal);
     std::thread::sleep(watched);
     idle.add(&terminal, before);
     terminal.type_by_hand(b"AARM\r");
-    // The ground offers to start once a heartbeat says armed, and it hears the vehicle when we do.
+    // The ground offers the start once a heartbeat says armed; it receives that heartbeat when we do.
     watch.wait_for("an armed heartbeat", |_, message| match message {
         Some(MavMessage::HEARTBEAT(beat)) => {
             beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED).then_some(())
@@ -241,7 +237,7 @@ fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Fai
     std::thread::sleep(Duration::from_millis(200));
     terminal.type_bytes(b"\r");
     watch.wait_for_phase(TdPhase::TD_PHASE_POWERED);
-    let before = mark(&terminal);
+    let before = cost_so_far(&terminal);
     watch.wait_for_phase(TdPhase::TD_PHASE_TOUCHDOWN);
     landing.add(&terminal, before);
     Ok(())

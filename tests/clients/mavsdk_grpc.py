@@ -1,4 +1,4 @@
-"""MAVSDK 3.x with its server against a vehicle that listens on 127.0.0.1:PORT.
+"""Checks MAVSDK 3.x with its server against a vehicle that listens on 127.0.0.1:PORT.
 
 Usage: mavsdk_grpc.py PORT.
 """
@@ -42,7 +42,7 @@ async def refused(awaitable):
 
 
 async def port_of(server):
-    """The server tells its port once it has found the vehicle."""
+    """Waits until the server prints its port, which it does once it has found the vehicle."""
     async for line in server.stdout:
         told = re.search(rb"listen on [0-9.]+:(\d+)", line)
         if told:
@@ -51,7 +51,7 @@ async def port_of(server):
 
 
 async def main():
-    # Port 0: the system chooses one that is nobody's, which the library would not learn of the server that it starts.
+    # With port 0 the system chooses a free port. The library would not learn the port of a server that it starts itself.
     program = os.path.join(os.path.dirname(mavsdk.__file__), "bin", "mavsdk_server")
     options = ["-p", "0", f"udpout://127.0.0.1:{sys.argv[1]}"]
     server = await asyncio.create_subprocess_exec(program, *options, stdout=asyncio.subprocess.PIPE)

@@ -1,6 +1,6 @@
-// node-mavlink against a vehicle that speaks to the loopback port that it listens on.
+// Checks node-mavlink: it listens on HOST:PORT, and a vehicle sends to that address.
 //
-// Usage: node node_client.mjs, in the folder that node-mavlink is installed in.
+// Usage: node node_client.mjs HOST:PORT, in the folder that node-mavlink is installed in.
 
 import { createRequire } from 'node:module'
 import { createSocket } from 'node:dgram'
@@ -39,7 +39,7 @@ packets.on('data', packet => {
 function message(clazz, wanted = () => true) {
   return new Promise((resolve, reject) => {
     waiting.push({ clazz, wanted, resolve })
-    setTimeout(() => reject(new Error(`waited in vain for ${clazz.MSG_NAME}`)), PATIENCE_MS).unref()
+    setTimeout(() => reject(new Error(`no ${clazz.MSG_NAME} within the time limit`)), PATIENCE_MS).unref()
   })
 }
 
@@ -59,7 +59,7 @@ async function command(number, param1) {
   return (await answer).result
 }
 
-// As a ground station does; without it the vehicle is not armed.
+// A ground station sends heartbeats; without them the vehicle refuses to arm.
 function beat() {
   const data = new minimal.Heartbeat()
   data.type = minimal.MavType.GCS
@@ -73,7 +73,8 @@ function check(fact, holds) {
   console.log('ok', fact)
 }
 
-socket.bind(0, '127.0.0.1', async () => {
+const [host, port] = process.argv[2].split(':')
+socket.bind(Number(port), host, async () => {
   try {
     const first = await message(minimal.Heartbeat)
     setInterval(beat, 500).unref()

@@ -1,8 +1,8 @@
-"""pymavlink against a vehicle on udpin:127.0.0.1:PORT: every answer that protocol promises, as a stranger asks for it.
+"""Checks with pymavlink that a vehicle on udpin:127.0.0.1:PORT answers as the MAVLink standard requires.
 
-The dialect is the one that pymavlink's generator makes of our XML.
+The dialect is generated from our XML by pymavlink's generator.
 
-Usage: pymavlink_client.py PORT. Prints a line a fact; fails by an exception.
+Usage: pymavlink_client.py PORT. Prints a line for each fact; fails with an exception.
 """
 
 import os
@@ -25,7 +25,7 @@ class Ground:
         self.me = (system, component)
         self.texts = []
         self.chunks = {}
-        # Whether heartbeats are sent while it waits, and when the next is due.
+        # Whether it sends heartbeats while it waits, and when the next one is due.
         self.beats = False
         self.beat_at = 0.0
 
@@ -42,7 +42,7 @@ class Ground:
             found = wanted(message)
             if found:
                 return found
-        raise AssertionError(f"waited in vain for {what}; heard: {self.texts}")
+        raise AssertionError(f"no {what} within the time limit; heard: {self.texts}")
 
     def hear_text(self, message):
         if message.id == 0:
@@ -73,7 +73,7 @@ class Ground:
 
     def command(self, command, *params):
         params = list(params) + [float("nan")] * (7 - len(params))
-        # Many refusals in a row are not all answered: whoever wants an answer asks again, as the standard has it.
+        # The vehicle does not answer every one of many refusals in a row, so ask again, as the standard says.
         for confirmation in range(3):
             self.link.mav.command_long_send(1, 1, command, confirmation, *params)
             try:
@@ -215,7 +215,7 @@ def arming(ground):
 
 def main():
     ground = Ground(f"udpout:127.0.0.1:{sys.argv[1]}")
-    # As a ground station does; without it the vehicle is not armed.
+    # A ground station sends heartbeats; without them the vehicle refuses to arm.
     ground.beats = True
     identity(ground)
     ground.message("HEARTBEAT", lambda m: m.custom_mode == 1)

@@ -1,6 +1,6 @@
-"""pymavlink flies a rocket from apogee: arms, starts, watches the descent, aborts, and sees the parachute open.
+"""Flies a rocket from apogee with pymavlink: arms, starts, watches the descent, aborts, and sees the parachute open.
 
-Usage: pymavlink_rocket.py PORT, or pymavlink_rocket.py DEVICE BAUD. Prints a line a fact; fails by an exception.
+Usage: pymavlink_rocket.py PORT, or pymavlink_rocket.py DEVICE BAUD. Prints a line for each fact; fails with an exception.
 """
 
 import sys

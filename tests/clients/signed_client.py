@@ -1,4 +1,4 @@
-"""Signed by pymavlink with the vehicle's own key; then unsigned, wrongly signed, replayed, old and bit-flipped.
+"""Sends commands to a vehicle with a key: signed by pymavlink, unsigned, wrongly signed, replayed, old and bit-flipped.
 
 Usage: signed_client.py PORT KEYFILE.
 """
@@ -13,7 +13,7 @@ EPOCH_S = 1420070400
 
 
 class Recorder:
-    """Remembers what goes out, so that it can be sent again."""
+    """Remembers the last bytes sent, so that they can be sent again."""
 
     def __init__(self, link):
         self.write, self.last = link.write, b""
@@ -25,7 +25,7 @@ class Recorder:
 
 
 def silence(ground, what, seconds=2.0):
-    """Nothing is acknowledged, and the vehicle lives."""
+    """Checks that the vehicle acknowledges nothing for a while and still sends heartbeats."""
     deadline = time.monotonic() + seconds
     alive = False
     while time.monotonic() < deadline:
@@ -49,7 +49,7 @@ def main():
     ground.link.mav.robust_parsing = True
     ground.link.setup_signing(key, sign_outgoing=True, allow_unsigned_callback=None)
 
-    # The vehicle does not know where the ground is before it has heard it.
+    # The vehicle learns the address of the ground from its first frame.
     ground.beat()
     beat = ground.message("HEARTBEAT")
     check("the vehicle's frames are signed", beat.get_signed())
@@ -90,7 +90,7 @@ def main():
 
 
 def replay_after_restart():
-    """The last command of the run before, sent to the restarted vehicle."""
+    """Sends the last command of the previous run to the restarted vehicle."""
     port, key_path = sys.argv[1:3]
     with open(key_path, encoding="ascii") as file:
         key = bytes.fromhex(file.read().strip())

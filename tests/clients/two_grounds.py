@@ -1,4 +1,4 @@
-"""Two grounds with different system ids on one vehicle: each is answered for itself.
+"""Checks that a vehicle answers each of two grounds with different system ids.
 
 Usage: two_grounds.py PORT.
 """

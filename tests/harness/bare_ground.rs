@@ -1,4 +1,4 @@
-//! A ground station of sockets and frames alone, to ask the vehicle what the real one would never ask.
+//! A ground station that a test controls. It sends requests that the real ground station would never send.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -12,20 +12,29 @@ use protocol::frame::{Encoder, Frame, Framer};
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::text::printable;
 
-use crate::process::{left, now};
-use crate::{Air, PATIENCE};
+use crate::time::{left, now};
+use crate::{PATIENCE, UdpProxy};
 
-/// How often it says that it is there while it waits: as a ground station does while a vehicle is armed.
-const BEATS_EVERY: Duration = Duration::from_millis(100);
+/// It sends heartbeats at this interval while it waits, as a ground station does while a vehicle is armed.
+const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A bound UDP port that a vehicle speaks to.
+/// The command that arms with param1 = 1 and disarms with 0.
+pub const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+/// The command that starts the countdown.
+pub const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+/// The command that aborts with param1 = 1.
+pub const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+/// MAV_RESULT_ACCEPTED as a number.
+pub const ACCEPTED: u8 = 0;
+
+/// A ground station on one UDP socket.
 pub struct BareGround {
     socket: UdpSocket,
     vehicle: Option<SocketAddr>,
     framer: Framer,
     encoder: Encoder,
     beats_at: Instant,
-    /// Everything the vehicle has said in words.
+    /// The texts that the vehicle has sent.
     pub texts: Vec<String>,
 }
 
@@ -36,10 +45,7 @@ impl Default for BareGround {
 }
 
 impl BareGround {
-    /// Binds a free loopback port.
-    ///
-    /// # Panics
-    /// There is none.
+    /// Binds a loopback port, which it keeps.
     pub fn new() -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
         Self {
@@ -52,26 +58,17 @@ impl BareGround {
         }
     }
 
-    /// One that speaks through the air, first.
-    ///
-    /// # Panics
-    /// There is no free port.
-    pub fn through(air: &Air) -> Self {
-        Self { vehicle: Some(air.ground_address()), ..Self::new() }
+    /// A ground station that sends to the proxy first.
+    pub fn through(proxy: &UdpProxy) -> Self {
+        Self { vehicle: Some(proxy.ground_address()), ..Self::new() }
     }
 
-    /// What the vehicle is to be given for `--mavlink`.
-    ///
-    /// # Panics
-    /// The socket has no address.
+    /// The vehicle's link, for `--mavlink`.
     pub fn link(&self) -> String {
         format!("udpout:{}", self.socket.local_addr().expect("bound"))
     }
 
-    /// Waits until `wanted` says something of a frame.
-    ///
-    /// # Panics
-    /// It never does.
+    /// Waits until `wanted` returns something for a frame.
     pub fn wait_for<T>(
         &mut self,
         what: &str,
@@ -90,9 +87,9 @@ impl BareGround {
                 }
             }
             let wait = left(deadline);
-            assert!(!wait.is_zero(), "waited in vain for {what}; heard: {:?}", self.texts);
+            assert!(!wait.is_zero(), "no {what} within the time limit; heard: {:?}", self.texts);
             self.beat_if_due();
-            // A time limit of nought would be none.
+            // A time limit of zero would mean no limit.
             let wait = wait.min(left(self.beats_at)).max(Duration::from_millis(1));
             self.socket.set_read_timeout(Some(wait)).expect("a time limit");
             if let Ok((count, from)) = self.socket.recv_from(&mut datagram) {
@@ -102,27 +99,43 @@ impl BareGround {
         }
     }
 
-    /// Its heartbeat, once the vehicle has been heard.
+    /// Sends a heartbeat if it is due and the vehicle's address is known.
     fn beat_if_due(&mut self) {
         if !left(self.beats_at).is_zero() {
             return;
         }
-        self.beats_at = now() + BEATS_EVERY;
+        self.beats_at = now() + HEARTBEAT_INTERVAL;
         let Some(vehicle) = self.vehicle else { return };
         let frame = heartbeat_frame(&mut self.encoder);
-        // A vehicle that has ended is waited for in vain, which is what is then said.
+        // If the vehicle has ended, the wait for it fails and reports that.
         let _ = self.socket.send_to(frame.as_bytes(), vehicle);
     }
 
     /// Waits until the vehicle reports this phase.
     pub fn wait_for_phase(&mut self, phase: TdPhase) -> TD_FLIGHT_STATUS_DATA {
-        self.wait_for(&format!("{phase:?}"), |_, message| match message {
-            Some(MavMessage::TD_FLIGHT_STATUS(status)) if status.phase == phase => Some(status.clone()),
+        self.wait_for_status(&format!("{phase:?}"), |status| status.phase == phase)
+    }
+
+    /// Waits until the vehicle is idle on its pad and all its arming checks pass.
+    pub fn wait_until_ready(&mut self) {
+        self.wait_for_status("every check passed", |status| {
+            status.phase == TdPhase::TD_PHASE_PAD_IDLE && status.checks_failed.is_empty()
+        });
+    }
+
+    /// Waits until a flight status of the vehicle is as wanted.
+    pub fn wait_for_status(
+        &mut self,
+        what: &str,
+        wanted: impl Fn(&TD_FLIGHT_STATUS_DATA) -> bool,
+    ) -> TD_FLIGHT_STATUS_DATA {
+        self.wait_for(what, |_, message| match message {
+            Some(MavMessage::TD_FLIGHT_STATUS(status)) if wanted(status) => Some(status.clone()),
             _ => None,
         })
     }
 
-    /// Waits for a heartbeat.
+    /// Waits for a heartbeat of the vehicle.
     pub fn wait_for_heartbeat(&mut self) -> HEARTBEAT_DATA {
         self.wait_for("a heartbeat", |frame, message| match message {
             Some(MavMessage::HEARTBEAT(beat)) if frame.source() == VEHICLE => Some(beat.clone()),
@@ -130,7 +143,7 @@ impl BareGround {
         })
     }
 
-    /// Sends a command and waits for its answer; returns the MAV_RESULT.
+    /// Sends a command, waits for the answer, and returns its MAV_RESULT.
     pub fn command(&mut self, command: MavCmd, param1: f32) -> u8 {
         self.send_command(command, param1);
         self.wait_for(&format!("an answer to {command:?}"), |frame, _| {
@@ -139,10 +152,6 @@ impl BareGround {
         .result
     }
 
-    /// Sends a command.
-    ///
-    /// # Panics
-    /// The vehicle has not been heard yet.
     pub fn send_command(&mut self, command: MavCmd, param1: f32) {
         let frame = command_frame(&mut self.encoder, command, param1);
         let vehicle = self.vehicle.expect("a vehicle that has been heard");
@@ -160,7 +169,7 @@ pub fn heartbeat_frame(encoder: &mut Encoder) -> Frame {
     }))
 }
 
-/// COMMAND_LONG to the vehicle.
+/// A COMMAND_LONG to the vehicle.
 pub fn command_frame(encoder: &mut Encoder, command: MavCmd, param1: f32) -> Frame {
     encoder.encode(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         command,

@@ -1,29 +1,39 @@
-//! What the end-to-end tests share: the built programs, running processes, terminals, serial lines, bad air, a bare ground station.
+//! What the end-to-end tests share: the built programs, running processes, terminals, serial lines, a UDP proxy that
+//! impairs a link, and a ground station that a test controls.
 //!
-//! Waiting is always for something that happens, with a limit; nothing here sleeps and hopes.
+//! A helper that waits has a time limit, waits for an event, and panics (fails the test) if the event does not come.
+#![expect(clippy::missing_panics_doc, reason = "a helper that panics fails its test, which is its purpose")]
 
-mod air;
 mod bare_ground;
+mod flight;
+mod keys;
 mod log_file;
 mod ports;
 mod process;
 mod programs;
+mod random;
 mod serial_line;
 mod terminal;
+mod time;
+mod udp_proxy;
 mod window;
 
-pub use air::{Air, Weather};
-pub use bare_ground::{BareGround, command_frame, heartbeat_frame};
+pub use bare_ground::{ABORT, ACCEPTED, ARM, BareGround, START, command_frame, heartbeat_frame};
+pub use flight::{auto_ground, expect_identical_replay, expect_landing, last_time_s, vehicle};
+pub use keys::{keygen, signing_with_key_in};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
-pub use ports::Bound;
+pub use ports::{Bound, unshared_address};
 pub use process::{Ended, Running};
 pub use programs::{Program, program};
+pub use random::Random;
 pub use serial_line::SerialLine;
 pub use terminal::Terminal;
+pub use time::{now, signing_clock};
+pub use udp_proxy::{Impairment, UdpProxy};
 pub use window::Window;
 
 use std::time::Duration;
 
-/// Longer than anything here takes on a busy machine; reaching it fails the test.
+/// The time limit of every wait. Nothing here takes this long, even on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(90);

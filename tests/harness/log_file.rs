@@ -1,4 +1,4 @@
-//! Reading logs, and writing them anew with something changed.
+//! Reads logs, and writes changed copies of them.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -11,17 +11,11 @@ use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
 
 /// The controller ticks of a log, in file order.
-///
-/// # Panics
-/// The log cannot be read.
 pub fn ticks_of(path: &Path) -> Vec<v1::ControllerTick> {
     read(path).1
 }
 
-/// The raw frames of a log's direction (`rx` or `tx`), in file order.
-///
-/// # Panics
-/// The log cannot be read.
+/// The raw frames of one direction of a log (`rx` or `tx`), in file order.
 pub fn raw_frames_of(path: &Path, direction: &str) -> Vec<Vec<u8>> {
     let topic = format!("/mavlink/{direction}/raw");
     let mut reader = LogReader::new(BufReader::new(File::open(path).expect("the log")));
@@ -36,10 +30,7 @@ pub fn raw_frames_of(path: &Path, direction: &str) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Writes the ticks and the profile of a log into a new one, after `change`.
-///
-/// # Panics
-/// A log cannot be read or written.
+/// Changes the ticks of a log and writes them, with its profile, into a new log.
 pub fn rewrite_log(from: &Path, to: &Path, change: impl FnOnce(&mut Vec<v1::ControllerTick>)) {
     let (profile_toml, mut ticks) = read(from);
     change(&mut ticks);

@@ -1,19 +1,23 @@
-//! Which port a program has bound. A program under test binds port 0, and the system gives it one that is nobody's: a test
-//! that chose a port and let go of it would find it taken now and then.
+//! Finds ports and addresses that no other program takes.
+//!
+//! A program under test binds port 0, and [`bound_port`] finds out which port the system gave it. A port that must stay
+//! the same while a program is restarted belongs to an [`unshared_address`]. No test binds a port only to learn a free
+//! number: another program may take that port before it is used.
 
 use std::collections::BTreeSet;
-use std::net::Ipv6Addr;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::path::Path;
 use std::process::Child;
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
 use crate::PATIENCE;
-use crate::process::{left, now};
+use crate::time::{left, now};
 
-/// The system does not report that a program has bound a port; it is looked for this often.
-const LOOKS_EVERY: Duration = Duration::from_millis(10);
+/// The system does not notify us when a program binds a port, so we poll at this interval.
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// A transport protocol.
+/// The kind of a bound socket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {
     /// A UDP socket.
@@ -22,10 +26,17 @@ pub enum Bound {
     Tcp,
 }
 
-/// The loopback port that a program has bound; waits until it has.
+/// A loopback address with a port that only this process uses, also while nothing is bound to it.
 ///
-/// # Panics
-/// It does not bind one.
+/// The network address is made from the process id, which Linux keeps below 2^22. The port lies below the range from
+/// which Linux chooses ports by itself, so a socket that is bound to every address cannot have it by chance.
+pub fn unshared_address() -> SocketAddr {
+    static NEXT_PORT: AtomicU16 = AtomicU16::new(20_000);
+    let [_, a, b, c] = (std::process::id() << 2).to_be_bytes();
+    (Ipv4Addr::new(127, a, b, c), NEXT_PORT.fetch_add(1, Ordering::Relaxed)).into()
+}
+
+/// Waits until a program has bound a loopback port, and returns the port.
 pub(crate) fn bound_port(child: &mut Child, bound: Bound) -> u16 {
     let deadline = now() + PATIENCE;
     loop {
@@ -34,7 +45,7 @@ pub(crate) fn bound_port(child: &mut Child, bound: Bound) -> u16 {
         }
         let ended = child.try_wait().expect("a process");
         assert!(ended.is_none() && !left(deadline).is_zero(), "no {bound:?} port is bound ({ended:?})");
-        std::thread::sleep(LOOKS_EVERY);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -53,8 +64,8 @@ fn port_of(process: u32, bound: Bound) -> Option<u16> {
     tables.flat_map(|table| ports_in(&table, &sockets, bound)).next()
 }
 
-/// The loopback ports in one of the kernel's tables, of these sockets. A socket bound to every address speaks to somebody
-/// else's port.
+/// The loopback ports of these sockets in one of the kernel's tables. Sockets bound to every address are left out: a
+/// program only sends from them.
 fn ports_in(table: &str, sockets: &BTreeSet<String>, bound: Bound) -> Vec<u16> {
     let port = |line: &str| {
         let fields: Vec<&str> = line.split_whitespace().collect();
@@ -67,7 +78,7 @@ fn ports_in(table: &str, sockets: &BTreeSet<String>, bound: Bound) -> Vec<u16> {
     table.lines().skip(1).filter_map(port).collect()
 }
 
-/// The kernel writes an address as words of four bytes in the machine's order.
+/// The kernel writes an address as four-byte words in the machine's byte order.
 fn is_loopback(address: &str) -> bool {
     let words: Option<Vec<u32>> = (0..address.len())
         .step_by(8)

@@ -1,45 +1,38 @@
-//! A running program whose output is read as it comes and which dies with its test.
+//! A running program. Its output is read as it comes, and the program is killed when its test ends.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use crate::PATIENCE;
 use crate::ports::{Bound, bound_port};
+use crate::time::{left, now};
 
-/// A running program.
 pub struct Running {
     child: Child,
     lines: Receiver<String>,
     seen: Vec<String>,
 }
 
-/// A program that ended.
 #[derive(Debug)]
 pub struct Ended {
     /// Exit code; `None` if a signal ended it.
     pub code: Option<i32>,
-    /// Everything it wrote, standard output and error as they came.
+    /// Everything it wrote to standard output and standard error, in the order of arrival.
     pub output: String,
 }
 
 impl Running {
-    /// Starts a program. Its standard input is closed and its output is no terminal.
-    ///
-    /// # Panics
-    /// It cannot be started.
+    /// Starts a program with no standard input and with its output in a pipe.
     pub fn start(command: &mut Command) -> Self {
         Self::spawn(command.stdin(Stdio::null()))
     }
 
-    /// Starts a program that is typed to. Its output is no terminal.
-    ///
-    /// # Panics
-    /// It cannot be started.
+    /// Starts a program with its standard input and its output in pipes.
     pub fn start_with_input(command: &mut Command) -> (ChildStdin, Self) {
         let mut running = Self::spawn(command.stdin(Stdio::piped()));
         (running.child.stdin.take().expect("piped"), running)
@@ -71,13 +64,10 @@ impl Running {
     }
 
     /// Waits for a line that contains `words`, and returns it.
-    ///
-    /// # Panics
-    /// It does not come.
     pub fn wait_for_line(&mut self, words: &str) -> String {
         let deadline = now() + PATIENCE;
         loop {
-            match self.lines.recv_timeout(deadline.saturating_duration_since(now())) {
+            match self.lines.recv_timeout(left(deadline)) {
                 Ok(line) => {
                     self.seen.push(line.clone());
                     if line.contains(words) {
@@ -89,15 +79,12 @@ impl Running {
         }
     }
 
-    /// Waits for the end.
-    ///
-    /// # Panics
-    /// It does not end.
+    /// Waits for the program's end.
     pub fn wait(mut self) -> Ended {
         let deadline = now() + PATIENCE;
-        // The output ends when the program does.
+        // The output ends when the program ends.
         loop {
-            match self.lines.recv_timeout(deadline.saturating_duration_since(now())) {
+            match self.lines.recv_timeout(left(deadline)) {
                 Ok(line) => self.seen.push(line),
                 Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break,
                 Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {
@@ -109,36 +96,29 @@ impl Running {
         Ended { code: status.code(), output: self.seen.join("\n") }
     }
 
-    /// Processor time that it has used so far.
-    ///
-    /// # Panics
-    /// The system does not say.
+    /// The processor time that the program has used so far.
     pub fn processor_time(&self) -> Duration {
         processor_time_of(self.child.id())
     }
 
-    /// Resident memory, bytes.
-    ///
-    /// # Panics
-    /// The system does not say.
+    /// The program's resident memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
         let statm = std::fs::read_to_string(format!("/proc/{}/statm", self.child.id())).expect("it runs");
         let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
         pages * 4096
     }
 
-    /// The loopback port that it has bound, given port 0; waits until it has.
-    ///
-    /// # Panics
-    /// It does not bind one.
+    /// Waits until the program has bound a loopback port, and returns the port.
     pub fn bound_port(&mut self, bound: Bound) -> u16 {
         bound_port(&mut self.child, bound)
     }
 
+    /// The link by which another program speaks to the UDP port that the program has bound.
+    pub fn udp_link(&mut self) -> String {
+        format!("udpout:127.0.0.1:{}", self.bound_port(Bound::Udp))
+    }
+
     /// Sends a signal.
-    ///
-    /// # Panics
-    /// It cannot be sent.
     pub fn signal(&self, signal: Signal) {
         let pid = i32::try_from(self.child.id()).expect("a process id");
         kill(Pid::from_raw(pid), signal).expect("the process runs");
@@ -152,28 +132,18 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It has usually ended; a test that fails must not leave it behind.
+        // It has usually ended; a test that fails must not leave it running.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Processor time that a process has used so far.
+/// The processor time that a process has used so far.
 pub(crate) fn processor_time_of(process: u32) -> Duration {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
-    // The fields behind the name, which may hold spaces: user and system time are the 14th and 15th.
+    // The fields after the name, which may contain spaces. User and system time are the 14th and 15th.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
-    // 100 a second on every Linux.
+    // Linux counts 100 clock ticks a second.
     Duration::from_millis(10 * clock_ticks)
-}
-
-#[expect(clippy::disallowed_methods, reason = "waiting for real processes has a real limit")]
-pub(crate) fn now() -> Instant {
-    Instant::now()
-}
-
-/// Time left until a deadline.
-pub(crate) fn left(deadline: Instant) -> Duration {
-    deadline.saturating_duration_since(now())
 }

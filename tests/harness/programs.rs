@@ -1,4 +1,4 @@
-//! The programs under test, built as the tests are.
+//! Builds the programs under test with the profile of the tests.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -7,18 +7,12 @@ use std::sync::OnceLock;
 /// One of the project's programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
-    /// `ground`
     Ground,
-    /// `onboard-sim`
     OnboardSim,
-    /// `replay`
     Replay,
 }
 
-/// A command that runs the program; the first call builds all of them.
-///
-/// # Panics
-/// They do not build.
+/// A command that runs the program. The first call builds all programs.
 pub fn program(program: Program) -> Command {
     let name = match program {
         Program::Ground => "ground",
@@ -28,8 +22,8 @@ pub fn program(program: Program) -> Command {
     Command::new(built().join(name))
 }
 
-/// The folder with this build's programs. Cargo gives a test the paths of its own package's programs only, so
-/// they are built here, with the profile and into the target folder that the test itself was built with.
+/// The folder with the programs of this build. Cargo tells a test only the paths of its own package's programs, so
+/// they are built here, with the profile and into the target folder of the test itself.
 fn built() -> &'static PathBuf {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -38,8 +32,8 @@ fn built() -> &'static PathBuf {
         let folder = test.ancestors().nth(2).expect("the folder of the profile").to_owned();
         let target = folder.parent().expect("the target folder");
         let mut build = Command::new(env!("CARGO"));
-        // With any one test among them, the programs are those that `cargo test` has built already. Without, their
-        // dependencies would lack what the tests' own dependencies want of them, and half of all would be built anew.
+        // Building one test as well makes Cargo choose the same dependency features as `cargo test`, which has built
+        // the programs already. Otherwise half of the dependencies would be built again.
         build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
         build.args(["build", "--quiet", "--bins", "--test", "outside_clients"]);
         build.arg("--target-dir").arg(target);

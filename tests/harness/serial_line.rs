@@ -1,4 +1,4 @@
-//! Two serial ports joined by a line of limited speed: pseudo-terminals with a paced copy between them.
+//! Two serial ports joined by a line of limited speed: two pseudo-terminals with a paced copy between them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -15,34 +15,28 @@ use nix::pty::openpty;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use nix::unistd::ttyname;
 
-use crate::process::now;
+use crate::time::now;
 
-/// A line between two serial ports.
 pub struct SerialLine {
-    /// Device of one end.
+    /// The device of one end.
     pub near: PathBuf,
-    /// Device of the other end.
+    /// The device of the other end.
     pub far: PathBuf,
+    baud: u32,
     carried: [Arc<AtomicU64>; 2],
     cut: Arc<AtomicBool>,
     copies: Vec<JoinHandle<()>>,
-    /// Held open, so that the line survives a program that closes its end.
+    /// Kept open, so that the line survives a program that closes its end.
     _ends: [OwnedFd; 2],
 }
 
 impl SerialLine {
-    /// Joins two ports by a line of this baud rate (ten bits a byte).
-    ///
-    /// # Panics
-    /// The system has no pseudo-terminals.
+    /// Joins two ports by a line of this baud rate, with ten bits a byte.
     pub fn new(baud: u32) -> Self {
         Self::joined(baud, true)
     }
 
-    /// The same, but nothing sent from the near end is ever taken: a radio that has stopped.
-    ///
-    /// # Panics
-    /// The system has no pseudo-terminals.
+    /// The same, but bytes sent from the near end are never read, as if the radio had stopped.
     pub fn that_takes_nothing_from_near(baud: u32) -> Self {
         Self::joined(baud, false)
     }
@@ -66,7 +60,17 @@ impl SerialLine {
                 .expect("a thread")
         });
         let copies = copies.collect();
-        Self { near, far, carried, cut, copies, _ends: [near_end, far_end] }
+        Self { near, far, baud, carried, cut, copies, _ends: [near_end, far_end] }
+    }
+
+    /// The near end as a link.
+    pub fn near_link(&self) -> String {
+        format!("serial:{}:{}", self.near.display(), self.baud)
+    }
+
+    /// The far end as a link.
+    pub fn far_link(&self) -> String {
+        format!("serial:{}:{}", self.far.display(), self.baud)
     }
 
     /// Bytes carried from near to far, and from far to near.
@@ -79,7 +83,7 @@ impl Drop for SerialLine {
     fn drop(&mut self) {
         self.cut.store(true, Ordering::Relaxed);
         for copy in self.copies.drain(..) {
-            // A copy that panicked has already failed its test by carrying nothing.
+            // If the thread panicked, the test has failed by missing its bytes.
             let _ = copy.join();
         }
     }
@@ -90,7 +94,7 @@ fn raw_terminal() -> (File, OwnedFd) {
     let mut settings = tcgetattr(&pair.slave).expect("terminal settings");
     cfmakeraw(&mut settings);
     tcsetattr(&pair.slave, SetArg::TCSANOW, &settings).expect("raw mode");
-    // A program under test that inherited an end would hold the line together by itself.
+    // If a program under test inherited an end, it would keep the line open.
     for end in [&pair.master, &pair.slave] {
         fcntl(end, FcntlArg::F_SETFD(FdFlag::FD_CLOEXEC)).expect("a descriptor");
     }
@@ -103,12 +107,12 @@ fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut:
     let mut free_at = now();
     while !cut.load(Ordering::Relaxed) {
         let mut ready = [PollFd::new(from.as_fd(), PollFlags::POLLIN)];
-        // Looks up now and then, to notice that the line was cut.
+        // The time limit lets the thread notice that the line was cut.
         if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) == 0 {
             continue;
         }
         let Ok(count @ 1..) = from.read(&mut buffer) else { continue };
-        // The line is busy for as long as the bytes take; that is its speed, not a wait for luck.
+        // The line is busy for as long as its speed requires for these bytes.
         free_at = free_at.max(now()) + byte_time * count as u32;
         std::thread::sleep(free_at.saturating_duration_since(now()));
         if to.write_all(&buffer[..count]).is_err() {

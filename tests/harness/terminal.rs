@@ -1,4 +1,5 @@
-//! A program on a real terminal: a pseudo-terminal whose far end types, shows and answers like a terminal's window.
+//! A program on a real terminal: a pseudo-terminal whose other end types keys, keeps the screen and answers requests,
+//! as a terminal's window does.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -14,53 +15,51 @@ use rustix::termios::{Winsize, tcsetwinsize};
 
 use crate::PATIENCE;
 use crate::ports::{Bound, bound_port};
-use crate::process::{left, now, processor_time_of};
+use crate::process::processor_time_of;
+use crate::time::{left, now};
 use crate::window::Window;
 
-/// Asks whether the terminal tells a held key's repeats from presses (kitty's keyboard protocol).
-const QUESTION: &[u8] = b"\x1b[?u";
-/// "No flag is set, but I know what you mean."
-const ANSWER: &[u8] = b"\x1b[?0u";
-/// What every terminal answers when asked what it is; it ends the wait for an answer to the question.
+/// The program asks with this whether the terminal distinguishes a held key's repeats from presses (kitty's keyboard
+/// protocol).
+const REPEATS_QUERY: &[u8] = b"\x1b[?u";
+/// The answer of a terminal that knows the protocol and has no flag set.
+const REPEATS_ANSWER: &[u8] = b"\x1b[?0u";
+/// Every terminal answers this when it is asked what it is; it ends the wait for the answer above.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
-/// A crew that sees nothing come of its keys types them again.
-const TYPED_AGAIN_AFTER: Duration = Duration::from_secs(3);
-/// Between two keys of an unhurried hand.
-const BETWEEN_KEYS: Duration = Duration::from_millis(150);
+/// A crew that sees no effect of its keys types them again after this time.
+const RETYPE_AFTER: Duration = Duration::from_secs(3);
+/// The pause between two keys that a person types.
+const KEY_INTERVAL: Duration = Duration::from_millis(150);
 
-/// A running program and the terminal that it runs on.
 pub struct Terminal {
     child: Child,
     keyboard: File,
-    window: Arc<Shown>,
-    /// The terminal's modes before the program had it.
+    shown: Arc<Shown>,
+    /// The terminal's modes before the program started.
     modes: Termios,
 }
 
-/// The window, and the news that it has changed.
+/// The window and a notification of its changes.
 struct Shown {
     window: Mutex<Window>,
     changed: Condvar,
-    /// Held while nothing is read.
+    /// Locked while a test stops the reading.
     reading: Mutex<()>,
 }
 
 impl Shown {
-    /// A test that has failed while it looked has failed already.
-    fn look(&self) -> MutexGuard<'_, Window> {
+    /// A test that panicked with the lock has failed already.
+    fn lock(&self) -> MutexGuard<'_, Window> {
         self.window.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Terminal {
-    /// Starts a program on a terminal of this size (columns, rows), which tells key repeats from presses or does not.
-    /// `setsid` (util-linux) makes it the program's controlling terminal.
-    ///
-    /// # Panics
-    /// The system has no pseudo-terminals, or the program cannot be started.
+    /// Starts a program on a terminal of this size (columns, rows). `tells_repeats` says whether the terminal
+    /// distinguishes key repeats from presses. `setsid` (util-linux) makes it the program's controlling terminal.
     pub fn start(command: &Command, (columns, rows): (u16, u16), tells_repeats: bool) -> Self {
-        // Closed in every program but this one: a copy in another test's program would hold the terminal open.
+        // Other programs do not inherit it: a copy in another test's program would keep the terminal open.
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let keyboard = openpt(flags).expect("a pseudo-terminal");
         unlockpt(&keyboard).expect("a pseudo-terminal");
@@ -89,60 +88,47 @@ impl Terminal {
             .stderr(end())
             .spawn()
             .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-        let window = Arc::new(Shown {
+        let shown = Arc::new(Shown {
             window: Mutex::new(Window::new((columns, rows))),
             changed: Condvar::new(),
             reading: Mutex::new(()),
         });
         let keyboard = File::from(keyboard);
-        let (pipe, shown) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&window));
+        let (pipe, filled) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&shown));
         std::thread::Builder::new()
             .name("terminal window".to_owned())
-            .spawn(move || fill_window(pipe, &shown, tells_repeats))
+            .spawn(move || fill_window(pipe, &filled, tells_repeats))
             .expect("a thread");
-        Self { child, keyboard, window, modes }
+        Self { child, keyboard, shown, modes }
     }
 
-    /// Types these bytes.
-    ///
-    /// # Panics
-    /// The terminal is gone.
     pub fn type_bytes(&mut self, bytes: &[u8]) {
         self.keyboard.write_all(bytes).expect("a terminal that takes keys");
     }
 
-    /// Types these keys as a hand does, one after the other.
-    ///
-    /// # Panics
-    /// The terminal is gone.
+    /// Types these keys with a pause between them, as a person does.
     pub fn type_by_hand(&mut self, keys: &[u8]) {
         for (k, key) in keys.iter().enumerate() {
             if k > 0 {
-                pause(BETWEEN_KEYS);
+                pause(KEY_INTERVAL);
             }
             self.type_bytes(&[*key]);
         }
     }
 
-    /// Types this by hand until these words are shown; returns how often. On a busy machine two keys may arrive together,
-    /// which no hand types.
-    ///
-    /// # Panics
-    /// Nothing comes of it.
+    /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine two keys may
+    /// arrive together and are then ignored by the program.
     pub fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
         for typed in 1..=20 {
             self.type_by_hand(keys);
-            if self.wait_within(TYPED_AGAIN_AFTER, |window| window.shows(words).then_some(())).is_some() {
+            if self.wait_within(RETYPE_AFTER, |window| window.shows(words).then_some(())).is_some() {
                 return typed;
             }
         }
-        panic!("no `{words}` on:\n{}", self.look().rows().join("\n"));
+        panic!("no `{words}` on:\n{}", self.window().rows().join("\n"));
     }
 
-    /// Holds a key down for so many repeats, on a keyboard that repeats it after half a second and every 33 ms then.
-    ///
-    /// # Panics
-    /// The terminal is gone.
+    /// Holds a key down for this many repeats. The keyboard repeats it after half a second and then every 33 ms.
     pub fn hold(&mut self, key: u8, repeats: usize) {
         self.type_bytes(&[key]);
         pause(Duration::from_millis(500));
@@ -152,38 +138,32 @@ impl Terminal {
         }
     }
 
-    /// Pastes a text: between marks if the program has asked for them, as terminals do.
-    ///
-    /// # Panics
-    /// The terminal is gone.
+    /// Pastes a text, in brackets if the program has asked for them, as terminals do.
     pub fn paste(&mut self, text: &str) {
         let typed = text.replace('\n', "\r");
-        if self.look().wants_pastes_marked() {
+        if self.window().has_bracketed_paste() {
             self.type_bytes(format!("\x1b[200~{typed}\x1b[201~").as_bytes());
         } else {
             self.type_bytes(typed.as_bytes());
         }
     }
 
-    /// What its window shows now. The program's output waits while the answer is held.
-    pub fn look(&self) -> impl std::ops::Deref<Target = Window> + '_ {
-        self.window.look()
+    /// The window. The program's output waits while the returned lock is held.
+    pub fn window(&self) -> impl std::ops::Deref<Target = Window> + '_ {
+        self.shown.lock()
     }
 
-    /// Waits until the window shows what is wanted; returns what `wanted` found.
-    ///
-    /// # Panics
-    /// It never does.
+    /// Waits until `wanted` returns something for the window.
     pub fn wait_until<T>(&self, what: &str, wanted: impl FnMut(&Window) -> Option<T>) -> T {
         self.wait_within(PATIENCE, wanted).unwrap_or_else(|| {
-            panic!("waited in vain for {what} on:\n{}", self.look().rows().join("\n"));
+            panic!("no {what} within the time limit on:\n{}", self.window().rows().join("\n"));
         })
     }
 
-    /// The same for a shorter time; `None` if it does not come.
+    /// The same with another time limit; `None` if the time is over.
     pub fn wait_within<T>(&self, limit: Duration, mut wanted: impl FnMut(&Window) -> Option<T>) -> Option<T> {
         let deadline = now() + limit;
-        let mut window = self.window.look();
+        let mut window = self.shown.lock();
         loop {
             if let Some(found) = wanted(&window) {
                 return Some(found);
@@ -192,91 +172,70 @@ impl Terminal {
             if wait.is_zero() {
                 return None;
             }
-            let waited = self.window.changed.wait_timeout(window, wait);
+            let waited = self.shown.changed.wait_timeout(window, wait);
             window = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
-    /// Waits for these words in some row; returns the row.
-    ///
-    /// # Panics
-    /// They do not come.
+    /// Waits until a row contains these words; returns the row.
     pub fn wait_for(&self, words: &str) -> String {
         self.wait_until(words, |window| window.row_with(words))
     }
 
-    /// Another size (columns, rows), as when a person pulls at the window.
-    ///
-    /// # Panics
-    /// The terminal is gone.
+    /// Changes the size of the window (columns, rows).
     pub fn resize(&self, (columns, rows): (u16, u16)) {
-        // Nothing is written between the window's new size and the program's news of it.
-        let mut window = self.window.look();
+        // The lock makes sure that no output is processed between the change of the window and the program's
+        // notification.
+        let mut window = self.shown.lock();
         window.resize((columns, rows));
         tcsetwinsize(&self.keyboard, window_size((columns, rows))).expect("a terminal with a size");
     }
 
-    /// Whether the terminal is as it was: its modes, its screen, its cursor, its keyboard.
-    ///
-    /// # Panics
-    /// The terminal is gone.
+    /// Whether modes, screen, cursor and keyboard of the terminal are as before the program started.
     pub fn is_restored(&self) -> bool {
         let modes = tcgetattr(&self.keyboard).expect("a terminal's modes");
-        let window = self.look();
+        let window = self.window();
         let count = |what: &[u8]| window.bytes().windows(what.len()).filter(|bytes| *bytes == what).count();
-        // Key flags pushed and popped (kitty's keyboard protocol).
+        // The program must pop as many key flags as it pushed (kitty's keyboard protocol).
         modes == self.modes
-            && !window.is_taken()
-            && !window.wants_pastes_marked()
+            && !window.is_held()
+            && !window.has_bracketed_paste()
             && count(b"\x1b[>") == count(b"\x1b[<1u")
     }
 
-    /// Takes nothing of what the program writes while the answer is held: a stopped scroll, a session that hangs.
-    pub fn stall(&self) -> impl Sized + '_ {
-        self.window.reading.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Reads no output while the returned lock is held, as after Ctrl-S or in a hanging session.
+    pub fn stop_reading(&self) -> impl Sized + '_ {
+        self.shown.reading.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The process on it that was started first.
+    /// The id of the process that was started first.
     pub fn pid(&self) -> u32 {
         self.child.id()
     }
 
-    /// Sends the program a signal.
-    ///
-    /// # Panics
-    /// It cannot be sent.
     pub fn signal(&self, signal: Signal) {
         let pid = i32::try_from(self.child.id()).expect("a process id");
         kill(Pid::from_raw(pid), signal).expect("the process runs");
     }
 
     /// Waits for the program's end; returns its exit code, `None` if a signal ended it.
-    ///
-    /// # Panics
-    /// It does not end.
     pub fn wait_for_end(&mut self) -> Option<i32> {
-        // The terminal closes when its last program ends.
+        // The terminal closes when the last program on it ends.
         self.wait_until("the end of the program", |window| window.is_closed().then_some(()));
         self.child.wait().expect("it ended").code()
     }
 
-    /// Bytes that the program has written to its terminal.
+    /// How many bytes the program has written to its terminal.
     pub fn written(&self) -> u64 {
-        self.look().bytes().len() as u64
+        self.window().bytes().len() as u64
     }
 
-    /// The loopback port that the program has bound, given port 0; waits until it has.
-    ///
-    /// # Panics
-    /// It does not bind one.
+    /// Waits until the program has bound a loopback port, and returns the port.
     pub fn bound_port(&mut self, bound: Bound) -> u16 {
         bound_port(&mut self.child, bound)
     }
 
-    /// Processor time that the program has used.
-    ///
-    /// # Panics
-    /// The system does not say.
+    /// The processor time that the program has used.
     pub fn processor_time(&self) -> Duration {
         processor_time_of(self.child.id())
     }
@@ -284,13 +243,12 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // It may have ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Time passes at the keyboard.
+/// Waits as long as a person at the keyboard would.
 fn pause(time: Duration) {
     let end = now() + time;
     while !left(end).is_zero() {
@@ -302,21 +260,21 @@ fn window_size((columns, rows): (u16, u16)) -> Winsize {
     Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 }
 }
 
-/// Shows what the program writes, until its end; answers what a terminal answers.
+/// Processes the program's output until its end, and answers as a terminal does.
 fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
     let mut buffer = [0; 16 * 1024];
-    // The question comes in one piece with the first frame at most.
+    // The question arrives in one piece, at most together with the first frame.
     while let Ok(length @ 1..) = pipe.read(&mut buffer) {
         drop(shown.reading.lock());
-        shown.look().take(&buffer[..length]);
+        shown.lock().take(&buffer[..length]);
         shown.changed.notify_all();
-        if buffer[..length].windows(QUESTION.len()).any(|bytes| bytes == QUESTION) {
-            let known = if tells_repeats { ANSWER } else { &[] };
+        if buffer[..length].windows(REPEATS_QUERY.len()).any(|bytes| bytes == REPEATS_QUERY) {
+            let known = if tells_repeats { REPEATS_ANSWER } else { &[] };
             if pipe.write_all(&[known, DEVICE_ATTRIBUTES].concat()).is_err() {
                 break;
             }
         }
     }
-    shown.look().close();
+    shown.lock().close();
     shown.changed.notify_all();
 }

@@ -1,22 +1,22 @@
-//! What a terminal's window shows, and what else the program asked of it.
+//! What a terminal's window shows, and what the program asked the terminal to do.
 
 use std::num::NonZeroU16;
 
-/// A window's cells, and every byte that made them.
+/// A window's cells and every byte that was written to it.
 pub struct Window {
     parser: vt100::Parser<Asked>,
     bytes: Vec<u8>,
-    /// So many of the bytes have become cells.
+    /// This many of the bytes have been processed.
     shown: usize,
     closed: bool,
 }
 
-/// U+FFFD, for what is no character. The parser drops it; every terminal shows it in a cell of its own.
-const NO_CHARACTER: &[u8] = "\u{fffd}".as_bytes();
-/// Shown in its place.
-const SHOWN_FOR_IT: &[u8] = b"?";
+/// U+FFFD, the replacement character. The parser drops it, but every terminal shows it in a cell.
+const REPLACEMENT: &[u8] = "\u{fffd}".as_bytes();
+/// What replaces it.
+const SHOWN_INSTEAD: &[u8] = b"?";
 
-/// What a program can ask of a terminal besides cells.
+/// What a program can ask a terminal to do besides showing cells.
 #[derive(Debug, Default)]
 struct Asked {
     bells: usize,
@@ -61,13 +61,13 @@ impl Window {
     pub(crate) fn take(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
         let mut rest = &self.bytes[self.shown..];
-        while let Some(at) = rest.windows(NO_CHARACTER.len()).position(|found| found == NO_CHARACTER) {
+        while let Some(at) = rest.windows(REPLACEMENT.len()).position(|found| found == REPLACEMENT) {
             self.parser.process(&rest[..at]);
-            self.parser.process(SHOWN_FOR_IT);
-            rest = &rest[at + NO_CHARACTER.len()..];
+            self.parser.process(SHOWN_INSTEAD);
+            rest = &rest[at + REPLACEMENT.len()..];
         }
-        // Its last bytes may be yet to come.
-        let begun = (1..NO_CHARACTER.len()).rev().find(|length| rest.ends_with(&NO_CHARACTER[..*length]));
+        // The rest of a replacement character may arrive later.
+        let begun = (1..REPLACEMENT.len()).rev().find(|length| rest.ends_with(&REPLACEMENT[..*length]));
         let (now, later) = rest.split_at(rest.len() - begun.unwrap_or(0));
         self.parser.process(now);
         self.shown = self.bytes.len() - later.len();
@@ -82,18 +82,18 @@ impl Window {
         self.closed = true;
     }
 
-    /// The rows from the top, without the blanks at their ends.
+    /// The rows from the top, without trailing blanks.
     pub fn rows(&self) -> Vec<String> {
         let (_, columns) = self.parser.screen().size();
         self.parser.screen().rows(0, columns.get()).map(|row| row.trim_end().to_owned()).collect()
     }
 
-    /// The first row with these words.
+    /// The first row that contains these words.
     pub fn row_with(&self, words: &str) -> Option<String> {
         self.rows().into_iter().find(|row| row.contains(words))
     }
 
-    /// Whether some row holds these words.
+    /// Whether a row contains these words.
     pub fn shows(&self, words: &str) -> bool {
         self.row_with(words).is_some()
     }
@@ -103,34 +103,34 @@ impl Window {
         &self.bytes
     }
 
-    /// How often it was to ring.
+    /// How often the program rang the bell.
     pub fn bells(&self) -> usize {
         self.parser.callbacks().bells
     }
 
-    /// How often a title, the clipboard or another size was asked for: what this program never asks for.
-    pub fn liberties(&self) -> usize {
+    /// How often the program asked for a title, the clipboard or another size, which it should never do.
+    pub fn forbidden_requests(&self) -> usize {
         let asked = self.parser.callbacks();
         asked.titles + asked.clipboard + asked.resizes
     }
 
-    /// Whether a program holds the screen: the alternate one, or no cursor.
-    pub fn is_taken(&self) -> bool {
+    /// Whether a program uses the alternate screen or hides the cursor.
+    pub fn is_held(&self) -> bool {
         self.parser.screen().alternate_screen() || self.parser.screen().hide_cursor()
     }
 
-    /// Whether a program has asked that what is pasted comes between marks.
-    pub fn wants_pastes_marked(&self) -> bool {
+    /// Whether a program has asked for brackets around pasted text.
+    pub fn has_bracketed_paste(&self) -> bool {
         self.parser.screen().bracketed_paste()
     }
 
-    /// Whether the last program on it has ended.
+    /// Whether the last program on the terminal has ended.
     pub fn is_closed(&self) -> bool {
         self.closed
     }
 }
 
-/// Rows and columns. A window of nought cells does not exist.
+/// Rows and columns, each at least one.
 fn cells((columns, rows): (u16, u16)) -> (NonZeroU16, NonZeroU16) {
     let some = |count| NonZeroU16::new(count).unwrap_or(NonZeroU16::MIN);
     (some(rows), some(columns))

@@ -1,4 +1,4 @@
-//! Every way a screen ends: the terminal is given back, and the log is whole.
+//! Every way in which a screen ends: the terminal is restored and the log is complete.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,9 +12,9 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 
-use crate::stage::{SIZE, Stage, ground};
+use crate::rig::{Rig, SIZE, ground};
 
-/// Reads a log to its end; what its messages on this topic hold.
+/// Reads a log to its end and returns the messages on this topic.
 fn whole_log(path: &Path, topic: &str) -> Vec<String> {
     let mut reader = LogReader::new(std::fs::File::open(path).unwrap());
     let mut found = Vec::new();
@@ -29,7 +29,7 @@ fn whole_log(path: &Path, topic: &str) -> Vec<String> {
     found
 }
 
-/// Not the facts of the arming before it.
+/// Waits for the facts about the abort, not about the arming before it.
 fn wait_for_abort(screen: &Terminal) {
     screen.wait_until("an abort that was seen", |window| {
         window
@@ -39,61 +39,61 @@ fn wait_for_abort(screen: &Terminal) {
 }
 
 #[test]
-fn quit_and_terminated_it_gives_the_terminal_back_and_ends_its_log() {
+fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     type Ending = fn(&mut Terminal);
     let endings: [(Ending, bool); 4] = [
         (|terminal| terminal.type_bytes(b"q"), false),
-        // Ctrl-C, as a terminal that tells repeats apart writes it.
+        // Ctrl-C, as a terminal that distinguishes repeats sends it.
         (|terminal| terminal.type_bytes(b"\x1b[99;5u"), true),
         (|terminal| terminal.signal(Signal::SIGTERM), true),
         (|terminal| terminal.signal(Signal::SIGINT), false),
     ];
     for (end, tells_repeats) in endings {
-        let mut stage = Stage::set_on("paper-calibrated", tells_repeats, "xterm-256color");
-        stage.terminal.wait_for("GO: every arming check passes");
-        assert!(!stage.terminal.is_restored(), "it has taken the terminal");
-        stage.terminal.type_bytes(b"5");
-        stage.terminal.wait_for("[5Link]");
-        end(&mut stage.terminal);
-        assert_eq!(stage.terminal.wait_for_end(), Some(0));
-        assert!(stage.terminal.is_restored(), "{:?}", stage.terminal.look().rows());
-        // What it says last is said on the terminal as it was.
-        stage.terminal.wait_for("log: ground.mcap");
-        let keys = whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
+        let mut rig = Rig::on_terminal("paper-calibrated", tells_repeats, "xterm-256color");
+        rig.terminal.wait_for("GO: every arming check passes");
+        assert!(!rig.terminal.is_restored(), "the screen is not open");
+        rig.terminal.type_bytes(b"5");
+        rig.terminal.wait_for("[5Link]");
+        end(&mut rig.terminal);
+        assert_eq!(rig.terminal.wait_for_end(), Some(0));
+        assert!(rig.terminal.is_restored(), "{:?}", rig.terminal.window().rows());
+        // Its last line is written to the restored terminal.
+        rig.terminal.wait_for("log: ground.mcap");
+        let keys = whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
         assert!(keys.iter().any(|key| key.contains("key") && key.contains('5')), "{keys:?}");
     }
 }
 
 #[test]
-fn armed_its_screen_quits_by_a_typed_word_alone_and_the_station_goes_on() {
-    let mut stage = Stage::set("paper-calibrated");
-    stage.arm();
-    stage.terminal.type_by_hand(b"q");
-    stage.terminal.wait_for("QUIT although armed or in flight");
-    stage.terminal.type_by_hand(b"x");
-    stage.terminal.wait_for("quit: cancelled");
-    // What it says from now on is said on the terminal as it was.
-    stage.type_until(b"qquit\r", "the screen was quit; armed or in flight, so the station");
-    assert!(stage.terminal.is_restored() && !stage.terminal.look().is_closed());
-    stage.terminal.signal(Signal::SIGINT);
-    stage.terminal.wait_for("SIGINT: the station goes on while armed or in flight");
-    let mut second = Terminal::start(&ground(stage.folder.path(), &["attach"]), SIZE, false);
+fn while_armed_the_screen_quits_only_by_a_typed_word_and_the_station_continues() {
+    let mut rig = Rig::new("paper-calibrated");
+    rig.arm();
+    rig.terminal.type_by_hand(b"q");
+    rig.terminal.wait_for("QUIT although armed or in flight");
+    rig.terminal.type_by_hand(b"x");
+    rig.terminal.wait_for("quit: cancelled");
+    // From now on it writes lines to the restored terminal.
+    rig.type_until(b"qquit\r", "the screen was quit; armed or in flight, so the station");
+    assert!(rig.terminal.is_restored() && !rig.terminal.window().is_closed());
+    rig.terminal.signal(Signal::SIGINT);
+    rig.terminal.wait_for("SIGINT: the station continues while armed or in flight");
+    let mut second = Terminal::start(&ground(rig.folder.path(), &["attach"]), SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
     wait_for_abort(&second);
-    stage.terminal.signal(Signal::SIGTERM);
-    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
-    whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
+    rig.terminal.signal(Signal::SIGTERM);
+    assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
+    whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
 }
 
 #[test]
-fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
-    let mut stage = Stage::set("paper-calibrated");
-    stage.arm();
-    stage.terminal.signal(Signal::SIGHUP);
-    stage.terminal.wait_until("the terminal as it was", |window| (!window.is_taken()).then_some(()));
-    assert!(stage.terminal.is_restored());
-    let attach = ground(stage.folder.path(), &["attach"]);
+fn after_a_hangup_the_station_continues_and_another_screen_shows_everything() {
+    let mut rig = Rig::new("paper-calibrated");
+    rig.arm();
+    rig.terminal.signal(Signal::SIGHUP);
+    rig.terminal.wait_until("the terminal as it was", |window| (!window.is_held()).then_some(()));
+    assert!(rig.terminal.is_restored());
+    let attach = ground(rig.folder.path(), &["attach"]);
     let mut second = Terminal::start(&attach, SIZE, false);
     second.wait_for(" ARMED ");
     second.type_by_hand(b"6");
@@ -101,8 +101,8 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
     second.type_by_hand(b"0");
     second.type_bytes(b"\x18\r");
     wait_for_abort(&second);
-    // Who only looks cannot abort, nor take the station with it.
-    let watch = ground(stage.folder.path(), &["attach", "--watch"]);
+    // A watching screen can neither abort nor end the station.
+    let watch = ground(rig.folder.path(), &["attach", "--watch"]);
     let mut third = Terminal::start(&watch, SIZE, false);
     third.wait_for("WATCHING only");
     wait_for_abort(&third);
@@ -111,48 +111,48 @@ fn hung_up_it_goes_on_without_its_screen_and_another_screen_finds_everything() {
         screen.wait_for_end();
         assert!(screen.is_restored());
     }
-    stage.terminal.signal(Signal::SIGTERM);
-    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
-    let said = whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
+    rig.terminal.signal(Signal::SIGTERM);
+    assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
+    let said = whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
     assert!(said.iter().any(|said| said.contains("ABORT observed")), "{said:?}");
 }
 
-/// A stopped scroll, a session that hangs: nobody reads what the program writes.
+/// After Ctrl-S or in a hanging session nobody reads the program's output.
 #[test]
-fn a_terminal_that_takes_nothing_stops_neither_link_nor_abort_nor_log() {
-    let mut stage = Stage::set("paper-calibrated");
-    stage.arm();
-    let stalled = stage.terminal.stall();
-    // Whole frames of the largest size: several times what a terminal holds for its reader.
+fn a_terminal_that_reads_nothing_blocks_neither_link_nor_abort_nor_log() {
+    let mut rig = Rig::new("paper-calibrated");
+    rig.arm();
+    let not_reading = rig.terminal.stop_reading();
+    // Whole screens of the largest size are several times what the terminal's buffer holds.
     for step in 0..10 {
         let size = if step == 9 { SIZE } else { (300 - step % 2, 90) };
-        stage.terminal.resize(size);
-        stage.air.wait_for_ground();
+        rig.terminal.resize(size);
+        rig.proxy.wait_for_ground();
     }
-    let attach = ground(stage.folder.path(), &["attach"]);
+    let attach = ground(rig.folder.path(), &["attach"]);
     let mut second = Terminal::start(&attach, SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
     wait_for_abort(&second);
-    drop(stalled);
-    // Read again, it shows what is, not what was.
-    stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
-    stage.terminal.wait_until("everything in its place", |window| {
+    drop(not_reading);
+    // When the output is read again, the screen shows the present state.
+    rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    rig.terminal.wait_until("everything in its place", |window| {
         let rows = window.rows();
         (rows[1].contains(" disarmed ") && rows[23].starts_with("[1Pad] 2Descent")).then_some(())
     });
-    stage.terminal.signal(Signal::SIGTERM);
-    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
-    assert!(stage.terminal.is_restored());
-    whole_log(&stage.folder.path().join("ground.mcap"), "/operator");
+    rig.terminal.signal(Signal::SIGTERM);
+    assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
+    assert!(rig.terminal.is_restored());
+    whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
 }
 
-/// Set for the program of the test below, which is this test program again.
+/// This variable is set for the child process of the test below, which runs the same test program.
 const PANICS_HERE: &str = "TOUCHDOWN_TEST_PANICS_WITH_LOG";
 
-/// The program has no way to be made to panic; so what its session holds, a screen and a log, is held here.
+/// Nothing makes the real program panic, so the test opens a screen and a log of its own.
 #[test]
-fn a_panic_gives_the_terminal_back_says_what_it_was_and_ends_the_log() {
+fn a_panic_restores_the_terminal_is_reported_and_completes_the_log() {
     if let Some(log) = std::env::var_os(PANICS_HERE) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         return runtime.block_on(async {
@@ -167,17 +167,20 @@ fn a_panic_gives_the_terminal_back_says_what_it_was_and_ends_the_log() {
     }
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("panic.mcap");
-    let name = "endings::a_panic_gives_the_terminal_back_says_what_it_was_and_ends_the_log";
+    let name = "endings::a_panic_restores_the_terminal_is_reported_and_completes_the_log";
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--exact", name, "--nocapture"]).env(PANICS_HERE, &log);
     command.env("RUST_BACKTRACE", "0");
     for tells_repeats in [false, true] {
         let _ = std::fs::remove_file(&log);
         let mut terminal = Terminal::start(&command, SIZE, tells_repeats);
-        assert_eq!(terminal.wait_for_end(), Some(101), "the test program's word for a failed test");
+        assert_eq!(terminal.wait_for_end(), Some(101), "the exit code of a failed test");
         assert!(terminal.is_restored());
         terminal.wait_for("the screen has failed on purpose");
-        assert!(terminal.look().bytes().windows(8).any(|bytes| bytes == b"\x1b[?1049h"), "it had the screen");
+        assert!(
+            terminal.window().bytes().windows(8).any(|bytes| bytes == b"\x1b[?1049h"),
+            "the screen was not open"
+        );
         let said = whole_log(&log, "/events");
         assert!(said.iter().any(|said| said.contains("before the panic")), "{said:?}");
     }

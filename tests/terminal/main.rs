@@ -1,14 +1,15 @@
-//! The ground station on a real terminal, keys and all, with the real simulator beyond air that loses, delays and lies.
+//! The ground station on a real terminal with typed keys, and the real simulator behind a proxy that loses, delays
+//! and forges datagrams.
 //!
-//! Everything a test knows, it knows from the terminal's window and from what crossed the air.
+//! A test reads only the terminal's window and the datagrams that passed the proxy.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-mod attack;
+mod attached_screens;
+mod bad_link;
 mod endings;
-mod finding;
-mod hand;
+mod escape_sequences;
+mod pasted_keys;
 mod reboot;
 mod resize;
-mod stage;
-mod station;
-mod weather;
+mod rig;
+mod stations;

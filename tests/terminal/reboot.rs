@@ -1,50 +1,54 @@
-//! A vehicle that loses its power in flight.
+//! A vehicle that reboots in flight.
 
-use e2e::{Bound, Program, Running, Signal, Terminal, program};
+use e2e::{ARM, Program, Running, START, Signal, Terminal, program, unshared_address};
 
-use crate::stage::{ARM, SIZE, START, Stage, ground};
+use crate::rig::{Rig, SIZE, ground};
 
 #[test]
-fn a_vehicle_that_reboots_in_its_descent_is_said_to_and_nothing_is_armed_by_itself() {
-    let mut stage = Stage::set("mk2");
-    stage.arm();
-    stage.start();
-    stage.terminal.wait_for("AERO_DESCENT");
-    let (arms, starts) = (stage.sent(ARM, 1.0), stage.sent(START, 0.0));
-    stage.reboot_vehicle();
-    stage.terminal.wait_for("the vehicle has REBOOTED");
-    stage.terminal.wait_until("a pad and nothing armed", |window| {
+fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically() {
+    let mut rig = Rig::new("mk2");
+    rig.arm();
+    rig.start();
+    rig.terminal.wait_for("AERO_DESCENT");
+    let (arms, starts) = (rig.sent(ARM, 1.0), rig.sent(START, 0.0));
+    rig.reboot_vehicle();
+    rig.terminal.wait_for("the vehicle has REBOOTED");
+    rig.terminal.wait_until("a pad and nothing armed", |window| {
         let top = window.rows().swap_remove(1);
         (top.starts_with(" PAD_IDLE ") && top.contains(" disarmed ") && top.contains(" down 0s up 0s"))
             .then_some(())
     });
-    // What was known before is forgotten: no flight, no command that still waits.
-    assert!(!stage.terminal.look().shows("commanded "));
-    stage.terminal.wait_for("GO: every arming check passes");
-    assert_eq!((stage.sent(ARM, 1.0), stage.sent(START, 0.0)), (arms, starts), "nothing is asked by itself");
-    assert!(!stage.terminal.look().shows(" ARMED "));
-    // Commands work anew.
-    stage.arm();
-    stage.start();
-    stage.terminal.wait_for("AERO_DESCENT");
-    stage.abort();
-    stage.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
-    stage.terminal.signal(Signal::SIGTERM);
-    assert_eq!(stage.terminal.wait_for_end(), Some(4), "aborted");
+    // What was known before the reboot is gone: the flight, and commands that were waiting.
+    assert!(!rig.terminal.window().shows("commanded "));
+    rig.terminal.wait_for("GO: every arming check passes");
+    assert_eq!(
+        (rig.sent(ARM, 1.0), rig.sent(START, 0.0)),
+        (arms, starts),
+        "the ground sent a command automatically"
+    );
+    assert!(!rig.terminal.window().shows(" ARMED "));
+    // Commands work again.
+    rig.arm();
+    rig.start();
+    rig.terminal.wait_for("AERO_DESCENT");
+    rig.abort();
+    rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    rig.terminal.signal(Signal::SIGTERM);
+    assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
 }
 
-/// The vehicle listens; it is killed as it falls and started again on the very port.
+/// The vehicle listens. It is killed in its descent and started again at the same address.
 #[test]
-fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_new_commands() {
+fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands() {
     let folder = tempfile::tempdir().unwrap();
-    let vehicle = |port: u16| {
+    let address = unshared_address();
+    let vehicle = || {
         let mut command = program(Program::OnboardSim);
-        command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:127.0.0.1:{port}")]);
+        command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:{address}")]);
         Running::start(&mut command)
     };
-    let mut first = vehicle(0);
-    let port = first.bound_port(Bound::Udp);
-    let link = format!("udpout:127.0.0.1:{port}");
+    let mut first = vehicle();
+    let link = format!("udpout:{address}");
     let mut station =
         Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let fly = |station: &mut Terminal, flying: &mut Running| {
@@ -60,7 +64,7 @@ fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_
     first.signal(Signal::SIGKILL);
     first.wait();
     station.wait_for("LINK LOST");
-    let mut second = vehicle(port);
+    let mut second = vehicle();
     station.wait_for("the vehicle has REBOOTED");
     station.wait_until("a disarmed pad", |window| {
         let top = window.rows().swap_remove(1);
@@ -69,7 +73,7 @@ fn a_vehicle_that_is_killed_in_its_descent_and_started_again_waits_disarmed_for_
     fly(&mut station, &mut second);
     second.signal(Signal::SIGTERM);
     let ended = second.wait();
-    // It was armed and started by the second ladder alone.
+    // Only the second arming sequence armed and started it.
     assert_eq!(ended.output.matches("to PAD_ARMED").count(), 1, "{}", ended.output);
     assert_eq!(ended.output.matches("countdown started").count(), 1, "{}", ended.output);
 }

@@ -1,15 +1,15 @@
-//! A window that is pulled about.
+//! A window whose size changes.
 
 use e2e::Window;
 
-use crate::stage::{SIZE, Stage};
+use crate::rig::{Rig, SIZE};
 
-/// Corners first: the smallest screen, the largest, both odd shapes, the two sides of where panels begin.
+/// The smallest and the largest screen, both extreme shapes, and the sizes on both sides of where panels appear.
 const SIZES: [(u16, u16); 8] =
     [(20, 5), (300, 90), (300, 5), (20, 90), (80, 24), (79, 24), (80, 23), (133, 41)];
 const STORM: u16 = 400;
 
-/// Numbers change from frame to frame; everything else stands still on a pad.
+/// The rows without their numbers, which change from frame to frame; on a pad everything else stays the same.
 fn without_numbers(window: &Window) -> Vec<String> {
     let digits = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-');
     window.rows().iter().map(|row| row.split(digits).map(str::trim).collect()).collect()
@@ -18,20 +18,22 @@ fn without_numbers(window: &Window) -> Vec<String> {
 /// Clears the whole screen (ECMA-48, ED 2).
 const CLEAR: &[u8] = b"\x1b[2J";
 
-/// After a change of size nothing of what stood there before is left over: drawn whole again, the screen is what it was.
-fn assert_whole(stage: &mut Stage, size: (u16, u16)) {
-    stage.terminal.resize(size);
-    // A frame that answers a key was begun after the key: at the new size. These leave everything as it is.
-    stage.type_until(b"z\x18", "ENTER ABORTS");
-    stage.terminal.type_bytes(b"z");
-    let (before, written) = stage.terminal.wait_until("everything in its place", |window| {
+/// Changes the size and checks that nothing of the previous size is left: when the screen is drawn again from
+/// scratch, it looks the same.
+fn assert_whole(rig: &mut Rig, size: (u16, u16)) {
+    rig.terminal.resize(size);
+    // A frame that shows the effect of a key was drawn after the key, so at the new size. These keys change nothing
+    // else.
+    rig.type_until(b"z\x18", "ENTER ABORTS");
+    rig.terminal.type_bytes(b"z");
+    let (before, written) = rig.terminal.wait_until("everything in its place", |window| {
         let shown = window.rows();
         let heard = shown.iter().take(3).any(|row| row.contains(" down 0s up 0s"));
         let found = shown.len() == usize::from(size.1) && shown[1].starts_with(" PAD_IDLE") && heard;
         (found && !window.shows("ENTER ABORTS")).then(|| (without_numbers(window), window.bytes().len()))
     });
-    stage.terminal.type_bytes(b"\x0c");
-    stage.terminal.wait_until(
+    rig.terminal.type_bytes(b"\x0c");
+    rig.terminal.wait_until(
         &format!("the screen of {size:?} drawn whole, which was {before:#?}"),
         |window| {
             let cleared = window.bytes()[written..].windows(CLEAR.len()).any(|bytes| bytes == CLEAR);
@@ -41,40 +43,40 @@ fn assert_whole(stage: &mut Stage, size: (u16, u16)) {
 }
 
 #[test]
-fn after_a_storm_of_sizes_the_screen_is_right_at_every_size() {
-    let mut stage = Stage::set("paper-calibrated");
-    stage.terminal.wait_for("GO: every arming check passes");
+fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
+    let mut rig = Rig::new("paper-calibrated");
+    rig.terminal.wait_for("GO: every arming check passes");
     let mut number = 1_u32;
     for _ in 0..STORM {
         number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let (columns, rows) = (20 + (number >> 8) % 281, 5 + (number >> 20) % 86);
-        stage.terminal.resize((u16::try_from(columns).unwrap(), u16::try_from(rows).unwrap()));
+        rig.terminal.resize((u16::try_from(columns).unwrap(), u16::try_from(rows).unwrap()));
     }
     for size in SIZES {
-        assert_whole(&mut stage, size);
+        assert_whole(&mut rig, size);
     }
-    assert_whole(&mut stage, SIZE);
-    // The hand works after it as before it, and in the smallest window.
-    stage.terminal.resize((20, 5));
-    stage.type_until(b"AARM\r", " ARMED");
-    stage.terminal.resize(SIZE);
-    stage.start();
+    assert_whole(&mut rig, SIZE);
+    // Keys still work, also in the smallest window.
+    rig.terminal.resize((20, 5));
+    rig.type_until(b"AARM\r", " ARMED");
+    rig.terminal.resize(SIZE);
+    rig.start();
     for step in 0..STORM {
-        stage.terminal.resize(SIZES[usize::from(step % 8)]);
+        rig.terminal.resize(SIZES[usize::from(step % 8)]);
     }
-    stage.terminal.resize(SIZE);
-    stage.terminal.wait_until("a flight's end, and nothing left over", |window| {
+    rig.terminal.resize(SIZE);
+    rig.terminal.wait_until("a flight's end, and nothing left over", |window| {
         let shown = window.rows();
         let top = shown[1].starts_with(" TOUCHDOWN ") && shown[1].contains(" disarmed ");
         (top && shown[4].starts_with(" Review ───") && shown[23].contains("[4Review]")).then_some(())
     });
-    let before = without_numbers(&stage.terminal.look());
-    stage.terminal.type_bytes(b"\x0c");
-    stage.terminal.wait_until(&format!("{before:#?} drawn whole"), |window| {
+    let before = without_numbers(&rig.terminal.window());
+    rig.terminal.type_bytes(b"\x0c");
+    rig.terminal.wait_until(&format!("{before:#?} drawn whole"), |window| {
         (without_numbers(window) == before).then_some(())
     });
-    // Some time behind the key before it, as a finger is.
-    stage.terminal.type_by_hand(b"0q");
-    stage.terminal.wait_for_end();
-    assert!(stage.terminal.is_restored());
+    // The keys are typed with a pause after the previous key.
+    rig.terminal.type_by_hand(b"0q");
+    rig.terminal.wait_for_end();
+    assert!(rig.terminal.is_restored());
 }

@@ -1,11 +1,11 @@
-//! The command that tells of an alarm to whoever is not at the screen.
+//! Runs the command that reports an alarm to people who are not at the screen.
 
 use std::process::{Command, Stdio};
 
-/// Runs it by `sh -c`, with the alarm's words in `TOUCHDOWN_ALARM`, and does not wait for it.
+/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, without waiting for it.
 ///
 /// # Errors
-/// The system starts neither the command nor the thread that waits for it.
+/// The command, or the thread that waits for it, cannot be started.
 pub fn run(command: &str, alarm: &str) -> std::io::Result<()> {
     let mut child = Command::new("sh")
         .args(["-c", command])
@@ -16,7 +16,7 @@ pub fn run(command: &str, alarm: &str) -> std::io::Result<()> {
         .spawn()?;
     std::thread::Builder::new()
         .name("alarm command".to_owned())
-        // Whether it succeeded is its own affair; it must only not stay a zombie.
+        // Waiting only prevents a zombie process; the result is ignored.
         .spawn(move || drop(child.wait()))
         .map(drop)
 }

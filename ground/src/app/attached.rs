@@ -1,4 +1,4 @@
-//! The run loop of a screen that shows a station which runs elsewhere on this machine.
+//! The run loop of an attached screen: it shows a station in another process on this machine.
 
 use std::path::Path;
 use std::time::Duration;
@@ -15,35 +15,35 @@ use super::clock::Clock;
 use super::output::Output;
 use super::server::read_one;
 use super::signals::Signals;
-use super::status;
-use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_told, encode_asked};
-use crate::attach::place;
+use super::stations;
+use crate::attach::codec::{decode_to_screen, encode_to_station};
+use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
+use crate::attach::socket;
 use crate::config::Config;
 use crate::exit::{self, Exit};
+use crate::model::action::{Action, Request};
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
-use crate::update::{Action, Msg, update};
+use crate::update::{Msg, update};
 
-/// Dialogs and chords expire on time although the station is silent.
+/// The period of the screen's own ticks: dialogs and chords expire even while the station sends nothing.
 const TICK: Duration = Duration::from_millis(100);
-/// A station that is gone is looked for again this often.
+/// How often a lost station is looked for again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Messages waiting to be taken into the model.
+/// How many messages from the station may wait.
 const WAITING_MAX: usize = 4_096;
 
-/// Who sits at an attached screen.
+/// The person at an attached screen.
 #[derive(Debug, Clone)]
 pub struct Viewer {
-    /// Commands nothing.
     pub watch: bool,
-    /// Their name.
     pub operator: String,
 }
 
-/// Shows the station until the person at the screen quits; the station goes on. Without a terminal for a screen it tells
-/// the events in lines, and commands nothing.
+/// Shows the station until the person at the screen quits; the station keeps running. Without a terminal it prints
+/// the events as lines.
 ///
 /// # Errors
 /// No station runs there, or the terminal failed.
@@ -53,23 +53,23 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let path = status::the_station(named).await?;
-    let mut link = Link::open(&path, viewer).await.with_context(|| {
+    let path = stations::the_station(named).await?;
+    let mut link = StationConnection::open(&path, viewer).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
     })?;
     let clock = Clock::start();
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
     let mut times = Times::default();
-    // The history first: the first frame shows everything.
+    // Takes the history first, so that the first drawn frame is complete.
     let mut live = false;
     while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
-        live = told == Told::Live;
+        live = told == ToScreen::Live;
         take(&mut model, told, at, viewer)?;
     }
     let mut output = Output::open(interactive, config)?;
-    model.repeats_told = output.tells_repeats();
+    model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
@@ -79,7 +79,7 @@ pub async fn session(
         let actions = tokio::select! {
             biased;
             signal = signals.next() => {
-                model.warn(times.theirs(clock.now()), format!("{signal}: the screen ends, the station goes on"));
+                model.warn(times.theirs(clock.now()), format!("{signal}: the screen ends, the station continues"));
                 break;
             }
             msg = output.input() => {
@@ -92,7 +92,7 @@ pub async fn session(
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
                 match &told {
-                    Some((Told::Msg(msg), _)) => output.mark_message(msg, &model),
+                    Some((ToScreen::Msg(msg), _)) => output.mark_message(msg, &model),
                     _ => output.mark_changed(),
                 }
                 if let Some((told, at)) = told {
@@ -100,9 +100,9 @@ pub async fn session(
                     take_live(&mut model, told, at, viewer)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
-                    // An abort that waits for its answer must not die with the station that repeats it.
+                    // If the lost station was repeating an abort, the next station must send it.
                     model.link.abort_unsent |= !viewer.watch && model.commands.is_aborting();
-                    // Cut off while it told the past, it tells no more of it.
+                    // If the station went away while sending the history, the history ends here.
                     model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
                     update(&mut model, gone, times.theirs(clock.now()))
@@ -112,16 +112,16 @@ pub async fn session(
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
                 if let Some(mut found) = find_again(named, &model.settings.link_name, viewer).await {
                     let abort_unsent = model.link.abort_unsent
-                        && !found.ask(&Asked::Command(CommandKind::Abort)).await;
+                        && !found.ask(&ToStation::Request(Request::Command(CommandKind::Abort))).await;
                     link = found;
-                    // Another station: another clock, another history.
+                    // Another station has another clock and another history.
                     times = Times::default();
                     let pages = model.pages;
                     model = Model::new(settings(&Hello::default(), viewer));
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
-                    model.repeats_told = output.tells_repeats();
-                    output.begin_anew();
+                    model.repeats_reported = output.reports_repeats();
+                    output.start_over();
                     look_again_at = None;
                 }
                 Vec::new()
@@ -140,29 +140,29 @@ pub async fn session(
     Ok(exit::decide(&model.outcome, true))
 }
 
-/// Does what a screen does itself. Returns whether to quit.
+/// Does the actions that are a screen's own. Returns whether to quit.
 async fn act(
     actions: Vec<Action>,
     model: &mut Model,
-    link: &mut Link,
+    link: &mut StationConnection,
     output: &mut Output,
     now: Duration,
 ) -> bool {
     let mut quit = false;
     for action in actions {
         match action {
-            Action::Request(asked) => {
-                if !link.ask(&asked).await {
-                    unsent(model, &asked, now);
+            Action::Request(request) => {
+                if !link.ask(&ToStation::Request(request)).await {
+                    report_unsent(model, request, now);
                 }
             }
             Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
-                link.ask(&Asked::Key(action.detail)).await;
+                link.ask(&ToStation::Key(action.detail)).await;
             }
             Action::Redraw => output.clear(),
             Action::Bell => output.bell(),
             Action::Quit => quit = true,
-            // The station itself sends, records and tells.
+            // The station itself sends, records and reports.
             Action::Send(_)
             | Action::Record(_)
             | Action::SyncLog
@@ -174,70 +174,69 @@ async fn act(
     quit
 }
 
-/// The station on the named socket; else the one that holds the same link now, never another vehicle's.
-async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<Link> {
+/// Finds the station on the named socket, otherwise the one that now holds the same link; never a station of another
+/// vehicle.
+async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<StationConnection> {
     let place = match named {
         Some(path) => path.to_owned(),
-        None => status::station_over(links).await?,
+        None => stations::station_over(links).await?,
     };
-    Link::open(&place, viewer).await.ok()
+    StationConnection::open(&place, viewer).await.ok()
 }
 
-/// Says what the crew asked for and no station took.
-fn unsent(model: &mut Model, asked: &Asked, now: Duration) {
-    let text = match asked {
-        Asked::Command(CommandKind::Abort) => {
-            // Stands in the alarm line of every screen till there is a station.
+/// Tells the crew that a request has not reached any station.
+fn report_unsent(model: &mut Model, request: Request, now: Duration) {
+    let text = match request {
+        Request::Command(CommandKind::Abort) => {
+            // Stays in the alarm line of every page until there is a station again.
             model.link.abort_unsent = true;
             "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
         }
-        Asked::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),
-        Asked::Acknowledge(kind) => {
-            model.alarms.acknowledge(*kind);
+        Request::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),
+        Request::Acknowledge(kind) => {
+            model.alarms.acknowledge(kind);
             return;
         }
-        Asked::Hello { .. } | Asked::Parameters | Asked::Key(_) | Asked::Status | Asked::Stop { .. } => {
-            return;
-        }
+        Request::Parameters => return,
     };
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 
-fn take(model: &mut Model, told: Told, at: Duration, viewer: &Viewer) -> anyhow::Result<()> {
+fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> anyhow::Result<()> {
     match told {
-        Told::Hello(hello) => {
+        ToScreen::Hello(hello) => {
             let (ours, theirs) = (VERSION, hello.version);
             anyhow::ensure!(
                 ours == theirs,
-                "the station speaks version {theirs}, this screen {ours}; update"
+                "the station has version {theirs}, this screen has {ours}; update the older one"
             );
             model.settings = settings(&hello, viewer);
         }
-        Told::Live => model.history_ends(),
-        // What the station did then is done.
-        Told::Msg(msg) => drop(update(model, msg, at)),
-        // Answers to questions that a screen does not ask.
-        Told::Status(_) | Told::Stopping { .. } => {}
+        ToScreen::Live => model.history_ends(),
+        // The station has already done these actions.
+        ToScreen::Msg(msg) => drop(update(model, msg, at)),
+        // A screen does not ask for these.
+        ToScreen::Status(_) | ToScreen::Stopping { .. } => {}
     }
     Ok(())
 }
 
-fn take_live(model: &mut Model, told: Told, at: Duration, viewer: &Viewer) -> Vec<Action> {
+fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
     match told {
-        Told::Hello(hello) => {
+        ToScreen::Hello(hello) => {
             model.settings = settings(&hello, viewer);
             Vec::new()
         }
-        Told::Live => {
+        ToScreen::Live => {
             model.history_ends();
             Vec::new()
         }
-        Told::Msg(msg) => {
+        ToScreen::Msg(msg) => {
             let actions = update(model, msg, at);
-            // The station asks for what the crew asks; a screen only rings.
+            // The station does the actions; a screen only rings the bell.
             actions.into_iter().filter(|action| *action == Action::Bell).collect()
         }
-        Told::Status(_) | Told::Stopping { .. } => Vec::new(),
+        ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
     }
 }
 
@@ -257,7 +256,7 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
     }
 }
 
-/// The station's time and the screen's own.
+/// Converts between the station's clock and the screen's own.
 #[derive(Debug, Default, Clone, Copy)]
 struct Times {
     theirs_at: Duration,
@@ -280,30 +279,30 @@ impl Times {
     }
 }
 
-struct Link {
-    told: mpsc::Receiver<(Told, Duration)>,
+struct StationConnection {
+    told: mpsc::Receiver<(ToScreen, Duration)>,
     write: OwnedWriteHalf,
 }
 
-impl Link {
+impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
-        let (mut read, write) = place::connect(path).await?.into_split();
+        let (mut read, write) = socket::connect(path).await?.into_split();
         let (tell, told) = mpsc::channel(WAITING_MAX);
         tokio::spawn(async move {
             while let Some(bytes) = read_one(&mut read).await {
-                let Ok(told) = decode_told(&bytes) else { return };
+                let Ok(told) = decode_to_screen(&bytes) else { return };
                 if tell.send(told).await.is_err() {
                     return;
                 }
             }
         });
         let mut link = Self { told, write };
-        link.ask(&Asked::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
+        link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 
-    /// Whether the station took it; one that is gone takes nothing.
-    async fn ask(&mut self, asked: &Asked) -> bool {
-        self.write.write_all(&encode_asked(asked)).await.is_ok()
+    /// Sends a message. Returns whether the station still takes it.
+    async fn ask(&mut self, asked: &ToStation) -> bool {
+        self.write.write_all(&encode_to_station(asked)).await.is_ok()
     }
 }

@@ -1,4 +1,4 @@
-//! The only clock of the ground.
+//! The clock: the only place that reads the time.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -19,7 +19,7 @@ impl Clock {
         Self { start: Instant::now(), start_unix_ns: nanoseconds(since_epoch) }
     }
 
-    /// Since the start.
+    /// Time since the start.
     #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
     pub fn now(&self) -> Duration {
         Instant::now().saturating_duration_since(self.start)
@@ -39,17 +39,17 @@ impl Clock {
     }
 }
 
-/// The time that records are stamped with: one log, one clock.
+/// The clock for the time stamps of records; every record of one log uses the same.
 #[derive(Debug, Clone)]
 pub enum LogTime {
-    /// The ground's own, since the start of the run.
+    /// Time since the start of the run.
     Run(Clock),
-    /// The simulated vehicle's, which writes into the same log and may run faster or slower.
+    /// The clock of the simulated vehicle, which writes into the same log and may run faster or slower.
     Vehicle(LogClock),
 }
 
 impl LogTime {
-    /// Nanoseconds since the log's zero.
+    /// Nanoseconds since the start of the log.
     pub fn now_ns(&self) -> u64 {
         match self {
             Self::Run(clock) => nanoseconds(clock.now()),
@@ -58,7 +58,7 @@ impl LogTime {
     }
 }
 
-/// A duration as the log counts it.
+/// A duration in nanoseconds.
 fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! Without a screen: a line an event, and the verdict at the end.
+//! Output without a screen: one line per event, and the verdict at the end.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -10,6 +10,7 @@ use protocol::log::recorder::RecorderError;
 use crate::model::Model;
 use crate::model::motor::KeepAway;
 use crate::model::vehicle::Verdict;
+use crate::view::limit_rows::limit_rows;
 use crate::view::number::fixed;
 use crate::view::touchdown::verdict_word;
 
@@ -21,27 +22,27 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Nothing printed yet.
+    /// Prints every event from the first on.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What was said so far was shown elsewhere.
-    pub fn from_now_on(model: &Model) -> Self {
+    /// Prints only new events; the earlier ones were shown on a screen.
+    pub fn new_events_only(model: &Model) -> Self {
         Self { seen: model.events.total(), closed: false }
     }
 
-    /// Nobody reads them.
+    /// Prints nothing: nobody reads the output.
     pub fn closed() -> Self {
         Self { seen: 0, closed: true }
     }
 
-    /// The next model's events are counted from its first.
-    pub fn begin_anew(&mut self) {
+    /// Starts at the first event again, because a new model has a new list of events.
+    pub fn start_over(&mut self) {
         self.seen = 0;
     }
 
-    /// Prints the events that were not printed yet. A reader that has gone away ends the lines, not the flight.
+    /// Prints the new events. If nobody reads the output any more, printing stops and the flight continues.
     pub fn show(&mut self, model: &Model) {
         if self.closed || self.seen == model.events.total() {
             return;
@@ -57,10 +58,10 @@ impl Lines {
     }
 }
 
-/// The last words: the verdict limit by limit, and where the log is.
+/// Prints the closing lines: the verdict limit by limit, and where the log is.
 pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBuf>, &RecorderError>) {
-    if interactive && !super::paper::wait_for_end() {
-        // A terminal that takes nothing would hold the program, its port and its line for ever.
+    if interactive && !super::terminal_writer::wait_for_end() {
+        // A blocked terminal would keep the program and its link open for ever.
         return;
     }
     let mut text = String::new();
@@ -69,7 +70,7 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}
     }
-    // The last thing said before somebody walks up to it.
+    // The last warning before somebody approaches the vehicle.
     if let Some(away) = KeepAway::of(&model.vehicle) {
         let _ = writeln!(text, "{}", away.words());
     }
@@ -79,13 +80,13 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
     if let Ok(Some(path)) = log_path {
         let _ = writeln!(text, "log: {}", path.display());
     }
-    // The exit code says it even if nobody reads this.
+    // The exit code is decided even if nobody reads this.
     let _ = print(&text);
 }
 
 fn verdict_table(verdict: &Verdict, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> String {
     let mut text = String::from("landing verdict, against the vehicle's limits\n");
-    for row in verdict.touchdown.rows(limits) {
+    for row in limit_rows(&verdict.touchdown, limits) {
         let word = if row.kept { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(

@@ -1,4 +1,4 @@
-//! Where the log goes, and that it is ended whatever happens.
+//! Opens the log and makes sure that it is finished whatever happens.
 
 use std::path::{Path, PathBuf};
 
@@ -10,13 +10,13 @@ use time::macros::format_description;
 
 use crate::cli::LogChoice;
 
-/// Logs of the same second, at most.
+/// How many logs may start in the same second.
 const SAME_SECOND_MAX: u32 = 100;
 
-/// Opens the log that was asked for, and the telemetry log beside it; `Ok(None)` if none was wanted.
+/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted.
 ///
 /// # Errors
-/// A file exists or cannot be made, or a telemetry log is wanted without a log.
+/// A file exists or cannot be created, or a telemetry log is wanted without a log.
 pub fn open(
     choice: Option<&LogChoice>,
     tlog: Option<&LogChoice>,
@@ -25,7 +25,7 @@ pub fn open(
     match choice {
         Some(LogChoice::None) => {
             let alone = matches!(tlog, Some(LogChoice::File(_)));
-            anyhow::ensure!(!alone, "--tlog writes beside a log; leave --log none out");
+            anyhow::ensure!(!alone, "--tlog writes beside a log; do not give --log none");
             Ok(None)
         }
         Some(LogChoice::File(path)) => {
@@ -35,7 +35,7 @@ pub fn open(
     }
 }
 
-/// The telemetry log that was named, or the log's name with the other ending.
+/// The named telemetry log, or the name of the log with the extension `.tlog`.
 fn tlog_path(tlog: Option<&LogChoice>, log: &Path) -> Option<PathBuf> {
     match tlog {
         None => Some(log.with_extension("tlog")),
@@ -50,7 +50,7 @@ fn open_named_by_time(
     header: &LogHeader,
 ) -> anyhow::Result<Recorder> {
     let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
-        .context("the system's clock shows no date")?;
+        .context("the system clock is invalid")?;
     let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
     for number in 1..=SAME_SECOND_MAX {
         let suffix = if number == 1 { String::new() } else { format!("-{number}") };
@@ -66,7 +66,7 @@ fn open_named_by_time(
     )
 }
 
-/// Ends the log when it goes out of scope, also while a panic unwinds.
+/// Finishes the log when it goes out of scope, also while a panic unwinds.
 pub struct LogGuard {
     recorder: Option<Recorder>,
 }
@@ -77,11 +77,11 @@ impl LogGuard {
         Self { recorder }
     }
 
-    /// Takes the log away again: nothing has begun that it could tell of.
+    /// Deletes the log again, because the run has failed before it began.
     pub fn discard(mut self) {
         let Some(recorder) = self.recorder.take() else { return };
         let tlog = recorder.tlog_path().map(Path::to_owned);
-        // Whether it was written does not matter any more, and the files are this run's own.
+        // The files belong to this run, and whether they were written completely does not matter any more.
         if let Ok(path) = recorder.finish() {
             let _ = std::fs::remove_file(path);
         }
@@ -90,10 +90,10 @@ impl LogGuard {
         }
     }
 
-    /// Ends the log; returns its path.
+    /// Finishes the log and returns its path.
     ///
     /// # Errors
-    /// Some record could not be written.
+    /// A record could not be written.
     pub fn finish(mut self) -> Result<Option<PathBuf>, RecorderError> {
         self.recorder.take().map(|recorder| recorder.finish()).transpose()
     }
@@ -102,7 +102,7 @@ impl LogGuard {
 impl Drop for LogGuard {
     fn drop(&mut self) {
         if let Some(recorder) = self.recorder.take() {
-            // Another failure is on its way out already.
+            // Another error is already being reported.
             let _ = recorder.finish();
         }
     }

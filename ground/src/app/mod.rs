@@ -1,4 +1,4 @@
-//! The run loop: everything that touches the world, around a pure model.
+//! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
 
 pub mod alarm_command;
 pub mod attached;
@@ -8,14 +8,14 @@ pub mod log;
 mod operator;
 mod output;
 pub mod pace;
-mod paper;
 pub mod print;
 pub mod replaying;
 pub mod screen;
 pub mod server;
 pub mod signals;
 mod station;
-pub mod status;
+pub mod stations;
+mod terminal_writer;
 pub mod wire;
 
 use std::io::IsTerminal as _;
@@ -25,7 +25,7 @@ use anyhow::Context as _;
 use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
 
 use crate::cli::{Cli, Command, LogChoice, Seconds};
 use crate::config::Config;
@@ -67,8 +67,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     runtime.block_on(async {
         match (&cli.command, &cli.replay) {
-            (Some(Command::Status), _) => status::list().await,
-            (Some(Command::Stop { force }), _) => status::stop(socket, *force, operator).await,
+            (Some(Command::Status), _) => stations::list().await,
+            (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
             (Some(Command::Attach { watch }), _) => {
                 let viewer = Viewer { watch: *watch, operator };
                 attached::session(socket, &viewer, config, interactive).await
@@ -110,7 +110,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
             }
         };
     let ran = station.run(&mut model, &mut wire).await;
-    if let Some(msg) = wire.remember() {
+    if let Some(msg) = wire.save_timestamps() {
         update(&mut model, msg, clock.now());
     }
     station.close(&model).await;
@@ -121,7 +121,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     Ok(exit::decide(&model.outcome, interactive))
 }
 
-/// Opens everything that a station is, but its log.
+/// Opens everything that a station needs, except its log.
 async fn start(
     cli: &Cli,
     config: &Config,
@@ -130,10 +130,10 @@ async fn start(
     (clock, demo_options, recorder): (Clock, Option<DemoOptions>, Option<Recorder>),
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let is_daemon = matches!(cli.command, Some(Command::Daemon));
-    // The demonstration takes any free port, so that it runs beside a real ground station.
+    // The demonstration uses any free port, so that it can run beside a real ground station.
     let mut endpoints = cli.connect.clone();
     if endpoints.is_empty() {
-        endpoints.push(Endpoint::UdpIn("127.0.0.1:0".to_owned()));
+        endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
     let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
@@ -141,7 +141,7 @@ async fn start(
     let opened = Wire::open(cli.us(), endpoints, key, clock, recorder.clone(), log_time.clone()).await;
     let wire = match opened {
         Ok(wire) => wire,
-        Err(error) => return Err(status::explain(error, &cli.connect).await),
+        Err(error) => return Err(stations::explain(error, &cli.connect).await),
     };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
@@ -150,14 +150,14 @@ async fn start(
         _ => None,
     };
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
-    let links: Vec<String> = wire.endpoints().map(Endpoint::to_string).collect();
+    let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {
-        // Of several links, each has its own.
+        // With several links, each has its own capacity.
         link_capacity_bytes_s: wire
             .endpoints()
             .next()
             .filter(|_| links.len() == 1)
-            .and_then(Endpoint::capacity_bytes_s),
+            .and_then(LinkAddress::capacity_bytes_s),
         vehicle_name: demo.as_ref().map(|_| cli.demonstration().0.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
@@ -167,7 +167,7 @@ async fn start(
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         demonstration: demo.is_some(),
         auto,
-        // A daemon, too, goes on after a flight.
+        // A daemon also keeps running after a flight.
         interactive: interactive || is_daemon,
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
@@ -175,12 +175,12 @@ async fn start(
     let server = serve(cli, &mut model, interactive, &clock).await?;
     if demo.is_some()
         && !is_daemon
-        && let Some(line) = status::beside().await
+        && let Some(line) = stations::running_beside().await
     {
         model.info(clock.now(), line);
     }
     let output = Output::open(interactive, config)?;
-    model.repeats_told = output.tells_repeats();
+    model.repeats_reported = output.reports_repeats();
     let station = Station {
         clock,
         log_time,
@@ -197,7 +197,8 @@ async fn start(
     Ok((station, model, wire))
 }
 
-/// The socket of a station with a real vehicle, and of every daemon; a demonstration on a terminal needs none.
+/// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
+/// terminal needs none.
 async fn serve(
     cli: &Cli,
     model: &mut Model,
@@ -212,7 +213,7 @@ async fn serve(
     match Server::open(cli.socket.as_deref(), hello(model), first_screen).await {
         Ok(server) => Ok(Some(server)),
         Err(error) if is_daemon => Err(error),
-        // It has a screen, or lines, of its own.
+        // It has its own screen or lines, so it can run without the socket.
         Err(error) => {
             model.warn(clock.now(), format!("no other screen can attach: {error:#}"));
             Ok(None)
@@ -222,13 +223,13 @@ async fn serve(
 
 fn start_demo(
     options: &DemoOptions,
-    listening: Option<&Endpoint>,
+    listening: Option<&LinkAddress>,
     recorder: Option<Recorder>,
     log_clock: LogClock,
 ) -> anyhow::Result<Demo> {
-    let Some(Endpoint::UdpIn(address)) = listening else {
+    let Some(LinkAddress::UdpIn(address)) = listening else {
         anyhow::bail!("the demonstration listens on UDP, not on {listening:?}");
     };
-    Demo::start(options, Endpoint::UdpOut(address.clone()), recorder, log_clock)
+    Demo::start(options, LinkAddress::UdpOut(address.clone()), recorder, log_clock)
         .context("starting the simulator")
 }

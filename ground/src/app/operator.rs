@@ -1,8 +1,8 @@
-//! Who sits at this screen.
+//! Finds the name of the person at this screen.
 
-use crate::attach::codec::OPERATOR_MAX;
+use crate::attach::message::OPERATOR_MAX;
 
-/// The name that was given; else the user and where from, as in `anna on pts/3` or `anna from 192.168.1.7`.
+/// The given name, otherwise the user and the terminal or host, as in `anna on pts/3` or `anna from 192.168.1.7`.
 pub(super) fn operator(named: Option<&str>) -> String {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     let words = named.map_or_else(
@@ -18,7 +18,7 @@ pub(super) fn operator(named: Option<&str>) -> String {
     protocol::text::printable(words.as_bytes()).chars().take(OPERATOR_MAX).collect()
 }
 
-/// `client` as SSH tells it: address, port, port. `terminal` as a path.
+/// `client` is the value of SSH_CLIENT (address, port, port); `terminal` is a path.
 fn described(user: Option<&str>, client: Option<&str>, terminal: Option<&str>) -> String {
     let user = user.unwrap_or("somebody");
     let address = client.and_then(|client| client.split_whitespace().next());

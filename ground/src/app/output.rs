@@ -1,4 +1,4 @@
-//! Who looks: a full screen, or lines.
+//! The output of a run: a full screen or lines.
 
 use std::time::Duration;
 
@@ -10,17 +10,17 @@ use crate::config::Config;
 use crate::model::Model;
 use crate::update::Msg;
 
-/// Where a run is shown.
+/// The output of a run.
 pub(super) enum Output {
     Screen(Box<Screen>),
     Lines(Lines),
 }
 
 impl Output {
-    /// A full screen where a person sits at one, else lines.
+    /// Opens a full screen if a person sits at the terminal, otherwise lines.
     ///
     /// # Errors
-    /// The terminal refuses.
+    /// The terminal cannot be prepared.
     pub(super) fn open(interactive: bool, config: &Config) -> anyhow::Result<Self> {
         if interactive {
             Screen::open(config).map(|screen| Self::Screen(Box::new(screen)))
@@ -29,9 +29,9 @@ impl Output {
         }
     }
 
-    /// Whether the terminal tells a held key's repeats from presses.
-    pub(super) fn tells_repeats(&self) -> bool {
-        matches!(self, Self::Screen(screen) if screen.tells_repeats())
+    /// Whether the terminal distinguishes a held key's repeats from presses.
+    pub(super) fn reports_repeats(&self) -> bool {
+        matches!(self, Self::Screen(screen) if screen.reports_repeats())
     }
 
     pub(super) fn redraw_at(&self) -> Option<Duration> {
@@ -41,7 +41,7 @@ impl Output {
         }
     }
 
-    /// What the person at the terminal does; never, without one.
+    /// The next input of the person at the terminal; waits for ever without one.
     pub(super) async fn input(&mut self) -> Msg {
         match self {
             Self::Screen(screen) => screen.input().await,
@@ -73,15 +73,15 @@ impl Output {
         }
     }
 
-    /// What tells of one model tells of another from its beginning.
-    pub(super) fn begin_anew(&mut self) {
+    /// Starts over with a new model.
+    pub(super) fn start_over(&mut self) {
         match self {
             Self::Screen(screen) => screen.mark_changed(),
-            Self::Lines(lines) => lines.begin_anew(),
+            Self::Lines(lines) => lines.start_over(),
         }
     }
 
-    /// As it is now; `model_now` is the same moment by the model's clock.
+    /// Shows the present state; `model_now` is the same moment on the model's clock.
     pub(super) fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> anyhow::Result<()> {
         match self {
             Self::Screen(screen) => screen.show(model, now, model_now).context("drawing on the terminal"),

@@ -1,5 +1,5 @@
-//! When the screen is drawn: soon where a person waits for it, seldom where nobody does, and never so often that a slow line
-//! carries nothing else. What must be seen at once is drawn at once, whatever it costs.
+//! Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough for a slow line.
+//! Important changes are drawn at once in any case.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,38 +7,38 @@ use std::time::Duration;
 use protocol::dialect::TdPhase;
 
 use crate::model::Model;
-use crate::model::command::{Acknowledged, CommandKind};
+use crate::model::command::{Acknowledgement, CommandKind};
 use crate::model::page::Page;
 use crate::update::Msg;
 
-/// At most ten frames a second, while it matters.
+/// The shortest time between two frames, for input and important changes.
 const FRAME: Duration = Duration::from_millis(100);
-/// In flight, for what the radio brings: numbers that change more often than this cannot be read.
+/// The same in flight, for telemetry: numbers that change faster cannot be read.
 const FLIGHT_FRAME: Duration = Duration::from_millis(200);
-/// On the pad and after a flight, for what only the radio brings: a slow line has other things to carry.
+/// The same on the pad and after a flight, for telemetry, to save a slow line.
 const CALM_FRAME: Duration = Duration::from_millis(500);
-/// Ages grow even if nothing arrives.
+/// The longest time between two frames, because ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
 
-/// What is written is counted over this time.
+/// The bytes written are counted over this time.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Cells of an 80x24 terminal.
 const SMALL_CELLS: u32 = 80 * 24;
-/// Bytes that frames which can wait may bring any second to. What is left below the 5 and 8 kB of every second is for the one
-/// frame that cannot: another page, whole, takes up to 3 kB at 80x24.
+/// How many bytes per second frames that can wait may use. The rest of the 5 kB (80x24) or 8 kB per second is left
+/// for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
 const SMALL_ROOM_BYTES: usize = 1_400;
 const LARGE_ROOM_BYTES: usize = 1_400;
 
-/// What is drawn at once when it changes.
+/// The state whose changes are drawn at once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Urgent {
     page: Page,
     phase: Option<TdPhase>,
     armed: Option<bool>,
-    /// Alarms that nobody has seen, and when the newest was raised.
+    /// The number of unacknowledged alarms, and when the newest was raised.
     alarms: (usize, Option<Duration>),
-    /// What became of an abort.
-    abort: Option<(Acknowledged, bool)>,
+    /// The progress of an abort.
+    abort: Option<(Acknowledgement, bool)>,
 }
 
 impl Urgent {
@@ -55,31 +55,31 @@ impl Urgent {
     }
 }
 
-/// Says when the next frame is due, by what has happened and what was written.
+/// Computes when the next frame is due, from what has happened and how much was written.
 #[derive(Debug, Default)]
 pub struct Pace {
     wait: Duration,
     drawn_at: Option<Duration>,
     drawn: Option<Urgent>,
-    /// The next frame does not wait for room on the line.
+    /// Whether the next frame is drawn although the line is busy.
     urgent: bool,
     cells: u32,
-    /// When frames were drawn within the last second, and their bytes.
+    /// The frames of the last second: when they were drawn, and their bytes.
     written: VecDeque<(Duration, usize)>,
 }
 
 impl Pace {
-    /// A person has done something, and waits for it.
+    /// A person has done something and waits for the result.
     pub fn mark_changed(&mut self) {
         self.wait = self.wait.min(FRAME);
         self.urgent = true;
     }
 
-    /// A message was taken into the model: how soon it must be seen.
+    /// A message was taken into the model; its kind decides how soon it must be drawn.
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
         let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
         match msg {
-            // Time and what was sent change nothing that must be seen before the next second.
+            // These change nothing that must be drawn within the next second.
             Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
             Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
                 self.wait = self.wait.min(FLIGHT_FRAME);
@@ -89,8 +89,8 @@ impl Pace {
         }
     }
 
-    /// Looks whether something must be seen at once.
-    pub fn look(&mut self, model: &Model) {
+    /// Checks whether an important state has changed.
+    pub fn check_urgent(&mut self, model: &Model) {
         if self.drawn != Some(Urgent::of(model)) {
             self.mark_changed();
         }
@@ -103,7 +103,7 @@ impl Pace {
         if self.urgent { due } else { due.max(self.room_at()) }
     }
 
-    /// When a frame like the last one that could wait has room.
+    /// When the line has room for another frame.
     fn room_at(&self) -> Duration {
         let room = if self.cells > SMALL_CELLS { LARGE_ROOM_BYTES } else { SMALL_ROOM_BYTES };
         let mut left: usize = self.written.iter().map(|(_, bytes)| bytes).sum();
@@ -119,12 +119,12 @@ impl Pace {
         room_at
     }
 
-    /// The terminal has not taken the frame before yet: what is drawn later is as it is then.
-    pub fn put_off(&mut self, now: Duration) {
+    /// The terminal has not taken the previous frame yet, so drawing is postponed.
+    pub fn postpone(&mut self, now: Duration) {
         (self.drawn_at, self.wait) = (Some(now), FRAME);
     }
 
-    /// A frame was drawn, of this many cells and bytes.
+    /// A frame of this many cells and bytes was drawn.
     pub fn drew(&mut self, model: &Model, cells: u32, bytes: usize, now: Duration) {
         (self.drawn_at, self.wait, self.urgent) = (Some(now), IDLE_FRAME, false);
         self.drawn = Some(Urgent::of(model));

@@ -1,4 +1,4 @@
-//! What `ground` prints instead of running: settings, completions, the manual page.
+//! The commands that only print: settings, completions, the manual page.
 
 use std::io::Write as _;
 
@@ -12,7 +12,7 @@ use crate::exit::Exit;
 /// Checks the settings, or prints an example of them.
 ///
 /// # Errors
-/// The settings are wrong: where, and what would be accepted.
+/// The settings are wrong; the error says where, and what would be accepted.
 pub fn config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
     match command {
         ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
@@ -20,8 +20,8 @@ pub fn config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
             let config = Config::load(cli.config.as_deref())?;
             let file = cli.config.clone().or_else(usual_path);
             let said = match file {
-                Some(path) if path.exists() => format!("{}: understood", path.display()),
-                Some(path) => format!("{}: there is no such file; these are the defaults", path.display()),
+                Some(path) if path.exists() => format!("{}: valid", path.display()),
+                Some(path) => format!("{}: no such file; these are the defaults", path.display()),
                 None => "no settings file; these are the defaults".to_owned(),
             };
             print(format!("{said}\n{config:#?}\n").as_bytes())?;

@@ -1,4 +1,4 @@
-//! The run loop of a replay: a screen and a film, no link and no log.
+//! The run loop of a replay: a screen and a recording, without a link or a log.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::Path;
@@ -15,26 +15,26 @@ use crate::cli::{Cli, ReplayFrom};
 use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::{Role, Settings, words};
-use crate::replay::film::{Film, Progress};
 use crate::replay::player::Player;
+use crate::replay::recording::{Progress, Recording};
 use crate::update::Msg;
 
-/// Time moves on the screen this often.
+/// How often the time moves on.
 const STEP: Duration = Duration::from_millis(100);
 
-/// Shows a recorded flight until the person at the screen quits; without a screen, its events at once.
+/// Shows a recorded flight until the person at the screen quits; without a screen, prints its events at once.
 ///
 /// # Errors
-/// The log cannot be read, the terminal failed, or the film has no such phase.
+/// The log cannot be read, the terminal failed, or the recording has no such phase.
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let mut told = 0;
     let vehicle = cli.vehicle_sysid.map(|_| cli.vehicle());
-    let film = Film::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
-    let damage = film.damage.clone();
+    let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
+    let damage = recording.damage.clone();
     let name = path.display().to_string();
     let settings =
         Settings { log_path: Some(name.clone()), role: Role::Replaying, ..Settings::on_screen(name) };
-    let mut player = Player::new(film, settings);
+    let mut player = Player::new(recording, settings);
     match cli.from {
         None => {}
         Some(ReplayFrom::Time(at)) => player.seek(at),
@@ -42,11 +42,11 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
             let found = player.seek_phase(phase);
             anyhow::ensure!(
                 found,
-                "{}: has no phase {}; it has {}",
+                "{} has no phase {}; it has {}",
                 path.display(),
                 words::phase(phase),
                 player
-                    .film()
+                    .recording()
                     .phases
                     .iter()
                     .map(|(phase, _)| words::phase(*phase))
@@ -56,19 +56,19 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
         }
     }
     if let Some(damage) = damage {
-        player.model.warn(player.position(), format!("the log {damage}"));
+        player.model.warn(player.position(), format!("the log is damaged: {damage}"));
     }
     if interactive {
         watch(&mut player, config).await?;
     } else {
-        player.seek(player.film().length());
+        player.seek(player.recording().length());
         Lines::new().show(&player.model);
     }
     lines::closing(&player.model, interactive, Ok(&None));
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
 }
 
-/// Of a log that takes more than a moment says at every tenth how far its reading is.
+/// Reports every tenth of the progress while a large log is read.
 fn tell(path: &Path, Progress { read, total }: Progress, told: &mut u64) {
     const LARGE_BYTES: u64 = 32_000_000;
     const MEGABYTE: u64 = 1_000_000;
@@ -76,7 +76,7 @@ fn tell(path: &Path, Progress { read, total }: Progress, told: &mut u64) {
     if total > LARGE_BYTES && tenths > *told {
         *told = tenths;
         let (name, read, total) = (path.display(), read / MEGABYTE, total / MEGABYTE);
-        // Talk goes to standard error; nobody may be listening.
+        // Progress goes to standard error, which may be closed.
         let _ = writeln!(std::io::stderr(), "ground: reading {name}: {read} of {total} MB");
     }
 }
@@ -96,7 +96,7 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             msg = screen.input() => match msg {
                 Msg::Key(crate::key::Key::CtrlL) => screen.clear(),
                 Msg::Key(key) if player.on_key(key) => return Ok(()),
-                // Held or pasted: of such keys those count that move a list or the time.
+                // Held or pasted keys count only if they scroll or move the time.
                 Msg::Keys(keys) => {
                     for key in keys.into_iter().filter(|key| key.scrolls()) {
                         player.on_key(key);

@@ -1,4 +1,4 @@
-//! The full screen: the terminal's state, its keys, and when it is drawn.
+//! The full screen: prepares and restores the terminal, reads its keys, and draws it.
 
 use std::io;
 use std::mem::ManuallyDrop;
@@ -25,59 +25,60 @@ use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
 use super::pace::Pace;
-use super::paper::{self, Page, Paper};
-use crate::config::{Characters, Colour, Config};
+use super::terminal_writer::{self, FrameBuffer, TerminalWriter};
+use crate::cli::{Characters, Colour};
+use crate::config::Config;
 use crate::key::Key;
 use crate::model::Model;
 use crate::update::Msg;
 use crate::view::theme::Theme;
 use crate::view::view;
 
-/// Keys told at once, at most: a paste must not hold up link and clock. What is beyond comes together again.
+/// The most keys passed on at once, so that a paste does not delay link and clock.
 const TOGETHER_MAX: usize = 1_024;
-/// A paste is over when nothing has come for this long; a slow line may bring its pieces some way apart.
+/// A paste has ended when nothing has arrived for this long; on a slow line its parts arrive apart.
 const QUIET_FOR: Duration = Duration::from_millis(50);
-/// Nobody waits longer for a paste to end.
+/// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
 
-/// Why a screen ends without a signal.
+/// The reason when a screen ends without a signal.
 pub const GONE: &str = "the terminal is gone";
 
-/// Given back once, by whichever way the screen ends: leaving the alternate screen a second time puts the cursor back to
-/// where it was, and whatever is printed next over a panic's message.
+/// Whether the terminal is in full-screen mode. It is restored only once: leaving the alternate screen twice would
+/// move the cursor, and the next output would overwrite a panic message.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// What was pushed must be popped.
+/// Whether the keyboard flags were pushed and must be popped.
 static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
-/// The terminal in full-screen mode; restored when it goes out of scope or a panic passes.
+/// The terminal in full-screen mode; restored when it goes out of scope, also during a panic.
 pub struct Screen {
-    /// Never dropped: its own clean-up prints when the terminal is gone, and printing to a terminal that is
-    /// gone panics. [`restore`] does what it would do.
-    terminal: ManuallyDrop<Terminal<CrosstermBackend<Page>>>,
-    paper: Paper,
+    /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic. [`restore`] does the
+    /// clean-up.
+    terminal: ManuallyDrop<Terminal<CrosstermBackend<FrameBuffer>>>,
+    writer: TerminalWriter,
     events: EventStream,
     theme: Theme,
     bell: bool,
     pace: Pace,
-    /// The next frame is written whole.
+    /// Whether the next frame is written completely.
     whole: bool,
-    /// Came behind keys that are told first.
+    /// A message that arrived after the keys that are passed on first.
     waiting: Option<Msg>,
     input_ended: bool,
 }
 
 impl Screen {
-    /// Takes the terminal.
+    /// Puts the terminal into full-screen mode.
     ///
     /// # Errors
-    /// It is none, or refuses.
+    /// Standard output is no terminal, or it cannot be prepared.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         restore_before_panic_message();
-        let (terminal, paper) =
+        let (terminal, writer) =
             take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
         Ok(Self {
             terminal: ManuallyDrop::new(terminal),
-            paper,
+            writer,
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
@@ -88,12 +89,12 @@ impl Screen {
         })
     }
 
-    /// Something to see has changed, and a person waits for it.
+    /// Something visible has changed, and a person waits for it.
     pub fn mark_changed(&mut self) {
         self.pace.mark_changed();
     }
 
-    /// A message was taken into the model: how soon it must be seen.
+    /// A message was taken into the model; its kind decides how soon it must be drawn.
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
         self.pace.mark_message(msg, model);
     }
@@ -103,53 +104,53 @@ impl Screen {
         self.pace.redraw_at()
     }
 
-    /// Draws if a frame is due. Ages count to `model_now`, the same moment by the model's clock.
+    /// Draws if a frame is due. `model_now` is the same moment on the model's clock.
     ///
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
-        self.pace.look(model);
+        self.pace.check_urgent(model);
         if now < self.redraw_at() {
             return Ok(());
         }
-        if self.paper.is_busy()? {
-            self.pace.put_off(now);
+        if self.writer.is_busy()? {
+            self.pace.postpone(now);
             return Ok(());
         }
         if std::mem::take(&mut self.whole) {
-            // Not `Terminal::clear`: it asks the terminal where its cursor is and waits two seconds, link and all, for
-            // an answer that our own reader of keys takes away.
+            // `Terminal::clear` is not used: it asks for the cursor position and blocks for two seconds, because our
+            // own key reader takes the answer.
             let size = self.terminal.size()?;
             self.terminal.resize(size.into())?;
         }
         let drawn = self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
         let cells = drawn.area.area();
-        self.pace.drew(model, cells, self.paper.waiting(), now);
-        self.paper.send();
+        self.pace.drew(model, cells, self.writer.waiting(), now);
+        self.writer.send();
         Ok(())
     }
 
-    /// Forgets what the terminal shows, so that the next frame is written whole.
+    /// Forgets what the terminal shows, so that the next frame is written completely.
     pub fn clear(&mut self) {
         self.whole = true;
         self.mark_changed();
     }
 
-    /// Whether the terminal tells a held key's repeats from presses.
-    pub fn tells_repeats(&self) -> bool {
+    /// Whether the terminal distinguishes a held key's repeats from presses.
+    pub fn reports_repeats(&self) -> bool {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
     /// Rings the terminal's bell.
     pub fn bell(&mut self) {
         if self.bell {
-            // A page takes everything.
+            // Writing to a buffer in memory cannot fail.
             let _ = io::Write::write_all(self.terminal.backend_mut(), b"\x07");
-            self.paper.send();
+            self.writer.send();
         }
     }
 
-    /// The next thing done at the terminal: a key, or all the keys that came together.
+    /// The next input: a key, or all keys that arrived together.
     pub async fn input(&mut self) -> Msg {
         std::future::poll_fn(|context| self.poll_input(context)).await
     }
@@ -167,7 +168,8 @@ impl Screen {
                 Poll::Pending => break None,
                 Poll::Ready(Some(Ok(Event::Key(event)))) => keys.extend(Key::from_event(&event)),
                 Poll::Ready(Some(Ok(Event::Paste(_)))) => break Some(Msg::Pasted),
-                // Also when it is back at its old size before anything was drawn: the terminal has cut what it showed.
+                // Also needed if the size returns to the old one before the next frame: the terminal has cut its
+                // content.
                 Poll::Ready(Some(Ok(Event::Resize(..)))) => self.clear(),
                 Poll::Ready(Some(Ok(_))) => {}
                 Poll::Ready(Some(Err(_)) | None) => {
@@ -176,7 +178,7 @@ impl Screen {
                 }
             }
         };
-        // Keys first, as they came; what else came is told by the next call.
+        // Keys first, in their order; any other input is returned by the next call.
         let first = match &keys[..] {
             [] => return other.map_or(Poll::Pending, Poll::Ready),
             [key] => Msg::Key(*key),
@@ -193,7 +195,7 @@ impl Drop for Screen {
     }
 }
 
-/// What the settings say; else the environment.
+/// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
     let colour = match config.colour {
@@ -209,20 +211,19 @@ fn theme(config: &Config) -> Theme {
     Theme { colour, ascii }
 }
 
-fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<Page>>, Paper)> {
+fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<FrameBuffer>>, TerminalWriter)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
-    tell_repeats()?;
-    let (paper, page) = Paper::new()?;
-    Ok((Terminal::new(CrosstermBackend::new(page))?, paper))
+    request_repeat_reports()?;
+    let (writer, buffer) = TerminalWriter::new()?;
+    Ok((Terminal::new(CrosstermBackend::new(buffer))?, writer))
 }
 
-/// Asks the terminal to tell a held key's repeats from presses, where it can. Where it cannot say whether
-/// it can, it cannot.
-fn tell_repeats() -> io::Result<()> {
+/// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.
+fn request_repeat_reports() -> io::Result<()> {
     if supports_keyboard_enhancement().unwrap_or(false) {
-        // Event types are told in escape codes only; without the other flag Ctrl-X would stay one byte.
+        // Event types need escape codes; without the first flag Ctrl-X would stay a single byte.
         let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
             | KeyboardEnhancementFlags::REPORT_EVENT_TYPES;
         KEYBOARD_ENHANCED.store(true, Ordering::Relaxed);
@@ -231,21 +232,21 @@ fn tell_repeats() -> io::Result<()> {
     Ok(())
 }
 
-/// Gives the terminal back. It may be gone (a dropped session): then there is nothing to restore, and
-/// nobody to tell; printing about it would panic and cost the log its end.
+/// Restores the terminal. It may be gone (a dropped session); then errors are ignored, because printing them would
+/// panic and leave the log unfinished.
 fn restore() {
     if !TAKEN.swap(false, Ordering::Relaxed) {
         return;
     }
-    // Still in raw mode: line by line, as a shell reads, the rest of a paste would not be there to be taken away.
+    // Before raw mode ends: in line mode the rest of a paste could not be read and discarded.
     drain_input();
     let _ = disable_raw_mode();
-    // Half a frame before it would swallow what is said here; a terminal that takes nothing is not talked to.
-    if !paper::wait_for_end() {
+    // After half a frame the escape codes would not work; a blocked terminal is left alone.
+    if !terminal_writer::wait_for_end() {
         return;
     }
     let mut out = io::stdout();
-    // Before the alternate screen is left: each screen has its own.
+    // Before the alternate screen is left, because each screen has its own keyboard flags.
     if KEYBOARD_ENHANCED.swap(false, Ordering::Relaxed) {
         let _ = queue!(out, PopKeyboardEnhancementFlags);
     }
@@ -253,13 +254,13 @@ fn restore() {
     let _ = io::Write::flush(&mut out);
 }
 
-/// Throws away what was typed and not taken: the rest of a paste must not run on into the shell.
+/// Discards unread input, so that the rest of a paste does not reach the shell.
 fn drain_input() {
     let stdin = io::stdin();
     if !rustix::termios::isatty(&stdin) {
         return;
     }
-    // A terminal that is gone has nothing more to say.
+    // Fails only if the terminal is gone.
     let _ = rustix::termios::tcflush(&stdin, QueueSelector::IFlush);
     for _ in 0..QUIET_WITHIN.as_millis() / QUIET_FOR.as_millis() {
         std::thread::sleep(QUIET_FOR);
@@ -270,22 +271,23 @@ fn drain_input() {
     }
 }
 
-/// Puts a pipe that nothing comes out of where a terminal was that is gone; it stays one while the answer is held.
+/// Replaces standard input, whose terminal is gone, by a pipe that never delivers anything while the returned end is
+/// kept open.
 ///
-/// The thread that reads the terminal's events cannot be told to stop there: a terminal that is gone answers every
-/// read at once with nothing, and it would read for ever, on half a core.
+/// The thread that reads terminal events cannot be stopped. Reads from a terminal that is gone return at once, so the
+/// thread would loop and use half a core.
 pub fn quiet_input() -> Option<OwnedFd> {
     let (silent, held) = rustix::pipe::pipe().ok()?;
     rustix::stdio::dup2_stdin(&silent).ok()?;
     Some(held)
 }
 
-/// A panic's message belongs on the restored terminal, not on a screen that vanishes with it.
+/// Prints a panic message on the restored terminal, because the alternate screen disappears.
 fn restore_before_panic_message() {
     let print_message = std::panic::take_hook();
     let drawing = std::thread::current().id();
     std::panic::set_hook(Box::new(move |panic| {
-        // A panic of the simulator or the recorder does not end the screen.
+        // A panic in the simulator or recorder thread does not end the screen.
         if std::thread::current().id() == drawing {
             restore();
         }

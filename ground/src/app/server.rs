@@ -1,4 +1,4 @@
-//! The station's side of its screens: history for who comes, news for who is there, requests back.
+//! The station's side of the socket: sends history and news to attached screens and receives their requests.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -12,39 +12,39 @@ use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
 
-use crate::attach::codec::{Asked, Hello, Told, VERSION, decode_asked, encode_told, length};
-use crate::attach::place;
+use crate::attach::codec::{decode_to_station, encode_to_screen, length};
+use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
+use crate::attach::socket;
 use crate::model::Model;
 use crate::model::seat::Seat;
 use crate::update::Msg;
 
-/// History kept: some hours of a radio.
+/// The size of the kept history: some hours of telemetry.
 const HISTORY_BYTES_MAX: usize = 24 * 1024 * 1024;
-/// A screen that falls this many messages behind is let go; it attaches again.
+/// A screen that is this many messages behind is disconnected; it attaches again.
 const BEHIND_MAX: usize = 4_096;
-/// Requests waiting at most.
+/// How many requests may wait.
 const REQUESTS_MAX: usize = 64;
-/// Who connects says what it wants within this time.
+/// How long a new connection may take to send its first message.
 const SPEAKS_WITHIN: Duration = Duration::from_secs(5);
 
 type Bytes = Arc<[u8]>;
 
-/// What reaches a station over its socket.
+/// What a station receives over its socket.
 #[derive(Debug)]
-pub enum News {
-    /// A screen is there.
-    Came {
-        /// Its number and its operator.
+pub enum ServerEvent {
+    /// A screen has attached.
+    ScreenJoined {
+        /// Its number and operator.
         seat: Seat,
-        /// It commands nothing.
         watch: bool,
     },
-    /// The screen of this number is gone.
-    Left(u32),
+    /// The screen with this number is gone.
+    ScreenLeft(u32),
     /// A screen asks for something.
-    Asked(Seat, Asked),
-    /// Somebody without a screen asks, and waits for the answer.
-    Wants(Asked, oneshot::Sender<Told>),
+    FromScreen(Seat, ToStation),
+    /// A command without a screen asks and waits for the answer.
+    Question(ToStation, oneshot::Sender<ToScreen>),
 }
 
 struct History {
@@ -57,11 +57,11 @@ struct History {
 pub struct Server {
     paths: Vec<PathBuf>,
     shared: Arc<Shared>,
-    requests: mpsc::Receiver<News>,
+    requests: mpsc::Receiver<ServerEvent>,
     accepting: tokio::task::JoinHandle<()>,
 }
 
-/// What every screen's task needs.
+/// What the tasks of all screens share.
 struct Shared {
     history: Mutex<History>,
     news: broadcast::Sender<Bytes>,
@@ -69,17 +69,17 @@ struct Shared {
 }
 
 impl Server {
-    /// Listens at this place, or at the usual one. Screens are numbered from `first_screen` on.
+    /// Listens on this path, or on the usual one. Screens are numbered from `first_screen` on.
     ///
     /// # Errors
-    /// A station runs there already, or the place cannot be written.
+    /// A station already runs there, or the path cannot be written.
     pub async fn open(asked_for: Option<&Path>, hello: Hello, first_screen: u32) -> anyhow::Result<Self> {
-        let path = asked_for.map_or_else(place::own_path, Path::to_owned);
+        let path = asked_for.map_or_else(socket::own_path, Path::to_owned);
         let serving = || format!("serving screens on {}", path.display());
-        let listener = place::listen(&path).await.with_context(serving)?;
+        let listener = socket::listen(&path).await.with_context(serving)?;
         let mut paths = vec![path.clone()];
         if asked_for.is_some() {
-            paths.push(place::make_known(&path).with_context(serving)?);
+            paths.push(socket::link_from_directory(&path).with_context(serving)?);
         }
         let (news, _) = broadcast::channel(BEHIND_MAX);
         let (ask, requests) = mpsc::channel(REQUESTS_MAX);
@@ -89,11 +89,11 @@ impl Server {
         let accepting = tokio::spawn(async move {
             loop {
                 match listener.accept().await {
-                    Ok((stream, _)) if place::own(&stream).is_ok() => {
+                    Ok((stream, _)) if socket::check_peer(&stream).is_ok() => {
                         tokio::spawn(receive(stream, Arc::clone(&for_screens), ask.clone()));
                     }
                     Ok(_) => {}
-                    // Out of descriptors: others may be freed meanwhile.
+                    // Probably out of file descriptors; some may be free later.
                     Err(_) => tokio::time::sleep(Duration::from_millis(200)).await,
                 }
             }
@@ -101,9 +101,9 @@ impl Server {
         Ok(Self { paths, shared, requests, accepting })
     }
 
-    /// Hands a message to every screen, now and later.
+    /// Sends a message to every screen, and keeps it for later ones.
     pub fn publish(&mut self, msg: &Msg, now: Duration) {
-        let Some(bytes) = encode_told(&Told::Msg(msg.clone()), now).map(Bytes::from) else { return };
+        let Some(bytes) = encode_to_screen(&ToScreen::Msg(msg.clone()), now).map(Bytes::from) else { return };
         let Ok(mut history) = self.shared.history.lock() else { return };
         history.bytes += bytes.len();
         history.kept.push_back(Arc::clone(&bytes));
@@ -111,12 +111,12 @@ impl Server {
             let Some(oldest) = history.kept.pop_front() else { break };
             history.bytes -= oldest.len();
         }
-        // Nobody there is no failure.
+        // Fails only if no screen is attached.
         let _ = self.shared.news.send(bytes);
     }
 
-    /// What comes next.
-    pub async fn next(&mut self) -> News {
+    /// The next event.
+    pub async fn next(&mut self) -> ServerEvent {
         match self.requests.recv().await {
             Some(news) => news,
             None => std::future::pending().await,
@@ -128,13 +128,13 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.accepting.abort();
         for path in &self.paths {
-            // What stays behind is replaced by the next station there.
+            // A socket that stays behind is replaced by the next station.
             let _ = std::fs::remove_file(path);
         }
     }
 }
 
-/// What a station tells a screen first.
+/// The first message to a screen.
 pub(super) fn hello(model: &Model) -> Hello {
     let settings = &model.settings;
     Hello {
@@ -151,44 +151,44 @@ pub(super) fn hello(model: &Model) -> Hello {
 }
 
 impl Shared {
-    /// Everything so far, and what comes after it: nothing twice, nothing missing.
+    /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
-        let hello = Told::Hello(Hello { screen, ..history.hello.clone() });
-        let hello = encode_told(&hello, Duration::ZERO).map(Bytes::from);
+        let hello = ToScreen::Hello(Hello { screen, ..history.hello.clone() });
+        let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
         let past = hello.iter().chain(&history.kept).cloned().collect();
         (past, self.news.subscribe())
     }
 }
 
-/// Somebody has connected: a screen, or one question.
-async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<News>) {
+/// Serves a new connection: a screen, or a single question.
+async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<ServerEvent>) {
     let (mut read, mut write) = stream.into_split();
     let Ok(Some(first)) = tokio::time::timeout(SPEAKS_WITHIN, read_one(&mut read)).await else { return };
-    match decode_asked(&first) {
-        Ok(Asked::Hello { watch, operator }) => {
+    match decode_to_station(&first) {
+        Ok(ToStation::Hello { watch, operator }) => {
             let screen = shared.next_screen.fetch_add(1, Ordering::Relaxed);
             let seat = Seat::new(screen, operator);
-            if ask.send(News::Came { seat: seat.clone(), watch }).await.is_ok() {
+            if ask.send(ServerEvent::ScreenJoined { seat: seat.clone(), watch }).await.is_ok() {
                 serve(read, write, &shared, (seat, watch), ask.clone()).await;
-                // Only a station that ends hears it no more.
-                let _ = ask.send(News::Left(screen)).await;
+                // Fails only if the station is ending.
+                let _ = ask.send(ServerEvent::ScreenLeft(screen)).await;
             }
         }
-        Ok(question @ (Asked::Status | Asked::Stop { .. })) => {
+        Ok(question @ (ToStation::Status | ToStation::Stop { .. })) => {
             let (answer, answered) = oneshot::channel();
-            if ask.send(News::Wants(question, answer)).await.is_ok()
+            if ask.send(ServerEvent::Question(question, answer)).await.is_ok()
                 && let Ok(told) = answered.await
             {
-                // Who asked may be gone.
-                let _ = write.write_all(&encode_told(&told, Duration::ZERO).unwrap_or_default()).await;
+                // The asking process may be gone.
+                let _ = write.write_all(&encode_to_screen(&told, Duration::ZERO).unwrap_or_default()).await;
             }
         }
         Ok(_) => {}
-        // Perhaps a screen of another version: it is told ours.
+        // Perhaps a screen of another version, so send it our version.
         Err(_) => {
-            let ours = Told::Hello(Hello { version: VERSION, ..Hello::default() });
-            let _ = write.write_all(&encode_told(&ours, Duration::ZERO).unwrap_or_default()).await;
+            let ours = ToScreen::Hello(Hello { version: VERSION, ..Hello::default() });
+            let _ = write.write_all(&encode_to_screen(&ours, Duration::ZERO).unwrap_or_default()).await;
         }
     }
 }
@@ -198,7 +198,7 @@ async fn serve(
     mut write: OwnedWriteHalf,
     shared: &Shared,
     (seat, watch): (Seat, bool),
-    ask: mpsc::Sender<News>,
+    ask: mpsc::Sender<ServerEvent>,
 ) {
     let (past, mut live) = shared.snapshot(seat.screen);
     let mut listening = tokio::spawn(listen_to(read, seat, watch, ask));
@@ -212,13 +212,13 @@ async fn serve(
             out.clear();
         }
     }
-    out.extend(encode_told(&Told::Live, Duration::ZERO).unwrap_or_default());
+    out.extend(encode_to_screen(&ToScreen::Live, Duration::ZERO).unwrap_or_default());
     if write.write_all(&out).await.is_err() {
         return hear_out(write, listening).await;
     }
     loop {
         tokio::select! {
-            // Lagged behind, or gone: it sees its end and attaches again.
+            // Too far behind or gone; the screen sees the end and attaches again.
             news = live.recv() => match news {
                 Ok(bytes) if write.write_all(&bytes).await.is_ok() => {}
                 _ => break,
@@ -229,23 +229,23 @@ async fn serve(
     hear_out(write, listening).await;
 }
 
-/// A screen that nothing can be told any more may have asked for something with its last breath, for an abort perhaps.
+/// Reads the last requests of a screen that can no longer be written to; there may be an abort among them.
 async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<()>) {
-    // Its end of the news; it closes its own then.
+    // Closes our side; the screen then closes its own.
     drop(write);
     if tokio::time::timeout(SPEAKS_WITHIN, &mut listening).await.is_err() {
         listening.abort();
     }
 }
 
-/// Reads a screen's requests until it ends or says what no screen says.
-async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::Sender<News>) {
+/// Reads a screen's requests until it closes or sends something invalid.
+async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::Sender<ServerEvent>) {
     while let Some(bytes) = read_one(&mut read).await {
-        match decode_asked(&bytes) {
-            // A screen that only watches is not heard.
+        match decode_to_station(&bytes) {
+            // Requests of a screen that only watches are ignored.
             Ok(_) if watch => {}
             Ok(asked) => {
-                if ask.send(News::Asked(seat.clone(), asked)).await.is_err() {
+                if ask.send(ServerEvent::FromScreen(seat.clone(), asked)).await.is_err() {
                     return;
                 }
             }
@@ -254,7 +254,7 @@ async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::
     }
 }
 
-/// One message's bytes without their length; `None` at the end.
+/// The bytes of one message without its length; `None` at the end.
 pub async fn read_one(read: &mut OwnedReadHalf) -> Option<Vec<u8>> {
     let mut prefix = [0; 4];
     read.read_exact(&mut prefix).await.ok()?;

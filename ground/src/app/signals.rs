@@ -1,9 +1,9 @@
-//! The system's requests to end. None of them touches the vehicle.
+//! Waits for the signals that end the program. None of them affects the vehicle.
 
 use anyhow::Context as _;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
-/// The signals that end the program properly.
+/// The signals that end the program.
 pub struct Signals {
     interrupt: Signal,
     terminate: Signal,

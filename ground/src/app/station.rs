@@ -1,4 +1,4 @@
-//! The run loop of a station: link, log, clock, signals and whoever looks, around a pure model.
+//! The run loop of a station: link, log, clock, signals, screen and attached screens around the model.
 
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
@@ -12,36 +12,36 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::clock::{Clock, LogTime};
 use super::lines::Lines;
 use super::output::Output;
-use super::server::{News, Server, hello};
+use super::server::{Server, ServerEvent, hello};
 use super::signals::Signals;
 use super::wire::Wire;
-use super::{alarm_command, screen, status};
-use crate::attach::codec::{Asked, Told};
+use super::{alarm_command, screen, stations};
+use crate::attach::message::{ToScreen, ToStation};
 use crate::demo::Demo;
 use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model};
-use crate::update::{Action, Msg, update};
+use crate::update::{Action, Msg, Request, update};
 
 const TICK: Duration = Duration::from_millis(100);
-/// Rates and loss are taken over ten seconds: more often says nothing new.
+/// How often link rates are reported; they are means over ten seconds.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// What the run loop holds besides model and link.
+/// What the run loop holds besides the model and the links.
 pub(super) struct Station {
     pub(super) clock: Clock,
     pub(super) log_time: LogTime,
     pub(super) recorder: Option<Recorder>,
     pub(super) demo: Option<Demo>,
     pub(super) output: Output,
-    /// Where it was asked to serve screens.
+    /// The socket path that was given, if any.
     pub(super) socket: Option<PathBuf>,
     pub(super) server: Option<Server>,
-    /// The attached screens; whether each only watches.
+    /// The attached screens, and whether each only watches.
     pub(super) screens: Vec<(Seat, bool)>,
     pub(super) alarm_command: Option<String>,
-    /// What keeps the input quiet where a terminal was.
+    /// The open end of the pipe that replaces a lost terminal.
     pub(super) quiet_input: Option<OwnedFd>,
-    /// When the links' figures are told next.
+    /// When the links are reported next.
     pub(super) report_at: Duration,
 }
 
@@ -57,7 +57,7 @@ impl Station {
     /// Runs until something asks to quit.
     ///
     /// # Errors
-    /// The terminal failed, and nothing but it was to be run for.
+    /// The terminal failed, and the station does not outlive its screen.
     pub(super) async fn run(&mut self, model: &mut Model, wire: &mut Wire) -> anyhow::Result<()> {
         let mut signals = Signals::listen()?;
         let mut ticks = interval(TICK);
@@ -68,8 +68,8 @@ impl Station {
             let (demo, server) = (&mut self.demo, &mut self.server);
             let wakes_at = model.wakes_at();
             let msgs = tokio::select! {
-                // In this order. Keys before the clock: one that waits may show that Ctrl-X is held. The
-                // link last: it alone can be busy all the time, and it is read until nothing waits.
+                // The order matters. Keys come before the clock, because a waiting key may show that Ctrl-X is held.
+                // The link comes last, because it can be busy all the time.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 news = server_hears(server) => self.hear(news, model),
@@ -94,7 +94,7 @@ impl Station {
                 next = next.max(self.step(model, wire, msg));
             }
             if next == Next::LeaveScreen {
-                self.lose_screen(Lines::from_now_on(model), model).await;
+                self.lose_screen(Lines::new_events_only(model), model).await;
                 next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
@@ -112,7 +112,7 @@ impl Station {
         }
     }
 
-    /// Tells who can command, when that has changed.
+    /// Reports who can command, if that has changed.
     fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
         let own = matches!(self.output, Output::Screen(_)).then(|| model.settings.seat.clone());
         let attached = self.screens.iter().filter(|(_, watch)| !watch).map(|(seat, _)| seat.clone());
@@ -122,7 +122,7 @@ impl Station {
         }
     }
 
-    /// The links' figures are told with the clock, and at once when a link comes or goes.
+    /// Whether to report the links: periodically on a tick, and at once when a link goes up or down.
     fn is_report_due(&mut self, msgs: &[Msg]) -> bool {
         let now = self.clock.now();
         let due = msgs.iter().any(|msg| match msg {
@@ -136,55 +136,62 @@ impl Station {
         due
     }
 
-    /// A real vehicle's link and log go on without a screen; a demonstration is only looked at.
+    /// Whether the station keeps running without its screen: yes with a real vehicle, no for a demonstration on a
+    /// terminal.
     fn outlives_its_screen(&self) -> bool {
         self.demo.is_none() || (self.server.is_some() && matches!(self.output, Output::Lines(_)))
     }
 
-    /// Goes on without the full screen, and serves screens from now on.
+    /// Continues without the full screen, and serves attached screens from now on.
     async fn lose_screen(&mut self, lines: Lines, model: &Model) {
         self.output = Output::Lines(lines);
         if self.quiet_input.is_none() {
             self.quiet_input = screen::quiet_input();
         }
         if self.server.is_none() {
-            // Another station may serve there; then this one goes on alone.
+            // If another station uses the path, this one continues without a socket.
             self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
         }
     }
 
-    /// What comes over the socket.
-    fn hear(&mut self, news: News, model: &Model) -> Vec<Msg> {
+    /// Handles an event from the socket.
+    fn hear(&mut self, news: ServerEvent, model: &Model) -> Vec<Msg> {
         match news {
-            News::Came { seat, watch } => {
+            ServerEvent::ScreenJoined { seat, watch } => {
                 self.screens.push((seat, watch));
                 Vec::new()
             }
-            News::Left(number) => {
+            ServerEvent::ScreenLeft(number) => {
                 self.screens.retain(|(seat, _)| seat.screen != number);
                 Vec::new()
             }
-            News::Asked(by, Asked::Command(kind)) => vec![Msg::Requested { kind, by }],
-            News::Asked(_, Asked::Acknowledge(kind)) => vec![Msg::Acknowledged(kind)],
-            News::Asked(_, Asked::Parameters) => vec![Msg::ParametersWanted],
-            News::Asked(by, Asked::Key(name)) => {
+            ServerEvent::FromScreen(by, ToStation::Request(Request::Command(kind))) => {
+                vec![Msg::Requested { kind, by }]
+            }
+            ServerEvent::FromScreen(_, ToStation::Request(Request::Acknowledge(kind))) => {
+                vec![Msg::AlarmAcknowledged(kind)]
+            }
+            ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
+                vec![Msg::ParametersWanted]
+            }
+            ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", format!("{name}{}", by.in_brackets()));
                 Vec::new()
             }
-            News::Wants(Asked::Stop { force, operator }, answer) => {
-                let told = status::stopping(model, force);
-                let stops = matches!(told, Told::Stopping { stops: true, .. });
+            ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
+                let told = stations::stopping(model, force);
+                let stops = matches!(told, ToScreen::Stopping { stops: true, .. });
                 let ending = if stops { "ends" } else { "refused" };
                 self.record_operator("stop", format!("asked for by {operator}: {ending}"));
-                // Who asked may be gone; the station ends nevertheless.
+                // The asking process may be gone; the station ends in any case.
                 let _ = answer.send(told);
                 if stops { vec![Msg::Terminate("ground stop")] } else { Vec::new() }
             }
-            News::Wants(_, answer) => {
-                let _ = answer.send(Told::Status(status::of(model, &self.screens)));
+            ServerEvent::Question(_, answer) => {
+                let _ = answer.send(ToScreen::Status(stations::of(model, &self.screens)));
                 Vec::new()
             }
-            News::Asked(..) => Vec::new(),
+            ServerEvent::FromScreen(..) => Vec::new(),
         }
     }
 
@@ -199,7 +206,7 @@ impl Station {
     fn tell_alarm(&mut self, words: &str) {
         let Some(command) = &self.alarm_command else { return };
         if let Err(error) = alarm_command::run(command, words) {
-            // Said once: a command that cannot be started now cannot be later.
+            // Reported once, because it would fail again.
             let text = format!("the alarm command cannot be started: {error}");
             self.alarm_command = None;
             if let Some(recorder) = &self.recorder {
@@ -217,7 +224,7 @@ impl Station {
         if health == model.log { vec![Msg::Tick] } else { vec![Msg::Log(health), Msg::Tick] }
     }
 
-    /// One message through the model, and what it wants done.
+    /// Takes one message into the model and does the resulting actions.
     fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
         let now = self.clock.now();
         let mut next = Next::Go;
@@ -231,7 +238,7 @@ impl Station {
                     if let Some(server) = &mut self.server {
                         server.publish(&sent, now);
                     }
-                    // Only counts: it wants nothing done.
+                    // Only updates counters; it returns no actions.
                     update(model, sent, now);
                 }
                 Action::Record(record) => {
@@ -251,7 +258,7 @@ impl Station {
                 Action::Redraw => self.output.clear(),
                 Action::Bell => self.output.bell(),
                 Action::Alarm(words) => self.tell_alarm(&words),
-                // A station asks nobody.
+                // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(kind) => {
                     if let Some(server) = &mut self.server {
@@ -265,9 +272,9 @@ impl Station {
         next
     }
 
-    /// The terminal first: whatever comes after may take a while.
+    /// Restores the terminal first, because the rest may take a while.
     pub(super) async fn close(self, model: &Model) {
-        // Lets the last answers of the socket out.
+        // Lets the socket send its last answers.
         tokio::task::yield_now().await;
         match self.output {
             Output::Screen(screen) => drop(screen),
@@ -279,7 +286,7 @@ impl Station {
     }
 }
 
-/// What a record itself says about its time agrees with its stamp.
+/// Sets the time inside a record to its time stamp.
 fn timed(mut record: Record, at_ns: u64) -> Record {
     let at_s = at_ns as f64 * 1e-9;
     match &mut record {
@@ -290,7 +297,7 @@ fn timed(mut record: Record, at_ns: u64) -> Record {
     record
 }
 
-async fn server_hears(server: &mut Option<Server>) -> News {
+async fn server_hears(server: &mut Option<Server>) -> ServerEvent {
     match server {
         Some(server) => server.next().await,
         None => std::future::pending().await,

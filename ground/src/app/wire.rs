@@ -1,4 +1,4 @@
-//! The links: bytes to messages and back, every frame into the log.
+//! The open links: turns bytes into messages and back, and records every frame.
 
 use std::time::Duration;
 
@@ -11,15 +11,15 @@ use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::signing::{Signing, stamp_of};
-use protocol::transport::{Endpoint, Transport, TransportSender};
+use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::clock::{Clock, LogTime};
 use crate::model::link::LinkReport;
 use crate::update::Msg;
 
-/// Timestamps are remembered this often at least, in stamps (10 us).
-const REMEMBER_EVERY: u64 = 100_000;
-/// Things taken from one link before keys and clock have their turn again.
+/// How often signing timestamps are saved, in signing time units of 10 us.
+const SAVE_TIMESTAMPS_EVERY: u64 = 100_000;
+/// The most data taken from one link before keys and clock are served again.
 const MAX_AT_ONCE: usize = 1024;
 
 /// The open links to one vehicle.
@@ -27,9 +27,9 @@ pub struct Wire {
     open: Vec<OpenLink>,
     hub: Hub,
     key_file: Option<KeyFile>,
-    remembered_at: u64,
-    /// Said once, until it works again.
-    forgets_said: bool,
+    saved_at: u64,
+    /// Whether a failure to save timestamps was reported.
+    save_failure_reported: bool,
     encoder: Encoder,
     clock: Clock,
     recorder: Option<Recorder>,
@@ -43,7 +43,7 @@ struct OpenLink {
     ended: bool,
 }
 
-/// What was taken from the links in one go.
+/// What one pass takes from the links.
 #[derive(Default)]
 struct Taken {
     msgs: Vec<Msg>,
@@ -52,13 +52,13 @@ struct Taken {
 }
 
 impl Wire {
-    /// Opens the links, to speak as `us`.
+    /// Opens the links; `us` is our own address.
     ///
     /// # Errors
     /// An address cannot be bound or resolved.
     pub async fn open(
         us: Address,
-        endpoints: Vec<Endpoint>,
+        endpoints: Vec<LinkAddress>,
         key: Option<(KeyFile, Signing)>,
         clock: Clock,
         recorder: Option<Recorder>,
@@ -69,7 +69,7 @@ impl Wire {
             let transport = Transport::open(endpoint.clone())
                 .await
                 .with_context(|| format!("opening the link {endpoint}"))?;
-            let name = transport.endpoint().to_string();
+            let name = transport.address().to_string();
             open.push(OpenLink { sender: transport.sender(), transport, name, ended: false });
         }
         let (key_file, signing) = key.unzip();
@@ -77,8 +77,8 @@ impl Wire {
             hub: Hub::new(open.len(), signing),
             open,
             key_file,
-            remembered_at: 0,
-            forgets_said: false,
+            saved_at: 0,
+            save_failure_reported: false,
             encoder: Encoder::new(us),
             clock,
             recorder,
@@ -86,12 +86,12 @@ impl Wire {
         })
     }
 
-    /// Where they lead.
-    pub fn endpoints(&self) -> impl Iterator<Item = &Endpoint> {
-        self.open.iter().map(|link| link.transport.endpoint())
+    /// The addresses of the links.
+    pub fn endpoints(&self) -> impl Iterator<Item = &LinkAddress> {
+        self.open.iter().map(|link| link.transport.address())
     }
 
-    /// The next thing that a link brings, with the link's number.
+    /// The next data of any link, with the number of the link.
     pub async fn receive(&mut self) -> (usize, Received) {
         std::future::poll_fn(|context| {
             for (number, link) in self.open.iter_mut().enumerate().filter(|(_, link)| !link.ended) {
@@ -112,7 +112,7 @@ impl Wire {
         .await
     }
 
-    /// What was received, and whatever waits behind it on any link, as messages.
+    /// Turns received data, and everything else that waits on the links, into messages.
     pub fn take(&mut self, (number, first): (usize, Received)) -> Vec<Msg> {
         let mut taken = Taken::default();
         self.take_one(number, first, &mut taken);
@@ -124,9 +124,9 @@ impl Wire {
         }
         let Taken { mut msgs, bytes, believed } = taken;
         msgs.push(Msg::Received { bytes, framing: self.framing() });
-        // Before anything is made of it, so that a run that is killed leaves nothing to be replayed.
+        // Saved before the frames are used, so that nothing can be replayed after a crash.
         if believed {
-            msgs.splice(0..0, self.remember());
+            msgs.splice(0..0, self.save_timestamps());
         }
         msgs
     }
@@ -152,7 +152,7 @@ impl Wire {
                     self.open[number].sender.believe(origin);
                 }
                 News::Strangers(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
-                // Counted, and shown in the link's report.
+                // Counted and shown in the report of the link.
                 News::Rejected(..) => {}
                 News::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
                 News::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
@@ -163,7 +163,7 @@ impl Wire {
         }
     }
 
-    /// The words, with the link's name where there is more than one.
+    /// The text, with the name of the link if there are several.
     fn named(&self, name: &str, words: String) -> String {
         if self.open.len() > 1 { format!("{name}: {words}") } else { words }
     }
@@ -175,7 +175,7 @@ impl Wire {
         })
     }
 
-    /// Sends a message over every link; returns what is to be counted.
+    /// Sends a message over every link and returns the message that counts the bytes.
     pub fn send(&mut self, message: &MavMessage) -> Msg {
         let frame = self.encoder.encode(message);
         let (now, stamp) = (self.clock.now(), self.unix_stamp());
@@ -192,14 +192,14 @@ impl Wire {
         Msg::Sent { bytes: sent, drops: self.open.iter().map(|link| link.sender.dropped()).sum() }
     }
 
-    /// How each link does. Also remembers timestamps, now and then.
+    /// Reports the state of each link. Also saves signing timestamps now and then.
     pub fn report(&mut self) -> Vec<Msg> {
         let now = self.clock.now();
         let stamp = self.unix_stamp();
         let mut msgs = Vec::new();
-        if stamp.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
-            self.remembered_at = stamp;
-            msgs.extend(self.remember());
+        if stamp.saturating_sub(self.saved_at) >= SAVE_TIMESTAMPS_EVERY {
+            self.saved_at = stamp;
+            msgs.extend(self.save_timestamps());
         }
         let links = self.hub.links().iter().zip(&self.open);
         msgs.push(Msg::Links {
@@ -209,14 +209,16 @@ impl Wire {
         msgs
     }
 
-    /// Remembers timestamps for the next run; says so once if it cannot.
-    pub fn remember(&mut self) -> Option<Msg> {
+    /// Saves signing timestamps for the next run; reports a failure once.
+    pub fn save_timestamps(&mut self) -> Option<Msg> {
         let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory()) else { return None };
         let failed = file.remember(&memory).err();
-        let was_said = std::mem::replace(&mut self.forgets_said, failed.is_some());
-        failed
-            .filter(|_| !was_said)
-            .map(|why| Msg::LinkSays(format!("what was heard now could be replayed later: {why}")))
+        let was_said = std::mem::replace(&mut self.save_failure_reported, failed.is_some());
+        failed.filter(|_| !was_said).map(|why| {
+            Msg::LinkSays(format!(
+                "signing time stamps are not saved, so frames could be replayed later: {why}"
+            ))
+        })
     }
 
     fn unix_stamp(&self) -> u64 {
@@ -238,7 +240,7 @@ fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
         name: open.name.clone(),
         figures: link.stats().figures(now),
         sources: link.stats().sources(now),
-        capacity_bytes_s: open.transport.endpoint().capacity_bytes_s(),
+        capacity_bytes_s: open.transport.address().capacity_bytes_s(),
         copies: link.copies(),
         trouble: link.trouble().map(str::to_owned),
     }

@@ -1,9 +1,9 @@
-//! Screens apart from the station: what crosses the Unix socket between them.
+//! Attached screens: the messages between a station and screens in other processes, over a Unix socket.
 //!
-//! The station hands every message that it takes into its model to every screen, with its time; the screen
-//! takes the same messages into a model of its own and so shows the same. A screen sends back what the crew
-//! asks for; the station decides and acts. Killing a screen therefore loses nothing, and an abort that was
-//! asked for goes on being repeated by the station.
+//! The station sends every message that it takes into its model to every screen, with its time. The screen takes the
+//! same messages into its own model and so shows the same. A screen sends back what the crew asks for; the station
+//! decides and acts. Killing a screen therefore loses nothing, and the station keeps repeating an abort.
 
 pub mod codec;
-pub mod place;
+pub mod message;
+pub mod socket;

@@ -1,11 +1,11 @@
-//! The settings file, its example and the flags.
+//! Tests of the settings file, its example and the flags.
 
 use super::*;
 use clap::{CommandFactory as _, Parser as _};
 
-/// Every key of the example, uncommented, is understood; the example names every key.
+/// Every key of the example is valid without its comment mark, and the example names every key.
 #[test]
-fn the_example_holds_every_key() {
+fn the_example_contains_every_key() {
     let keys =
         EXAMPLE.lines().filter_map(|line| line.strip_prefix('#')).filter(|line| !line.starts_with(' '));
     let uncommented = keys.collect::<Vec<_>>().join("\n");
@@ -19,7 +19,7 @@ fn the_example_holds_every_key() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn an_error_names_the_wrong_key() {
     let wrong = |text: &str| Config::parse(text).unwrap_err();
     assert!(wrong("belll = true").contains("belll"));
     assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
@@ -30,12 +30,12 @@ fn what_is_wrong_is_named() {
     assert!(wrong("alarm_command = \" \"").contains("empty"));
 }
 
-/// Key, its text in a file, its flags, and whether settings and command line together then say what the flag says.
+/// A key, its value in a file, its flags, and a check that the value of the flag is used.
 type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
 
 const OVERRIDES: [Override; 11] = [
     ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
-        cli.connect == [Endpoint::UdpIn("0.0.0.0:2".to_owned())]
+        cli.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
     }),
     ("sysid", "3", &["--sysid", "4"], |cli, _| cli.us().system_id == 4),
     ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |cli, _| cli.vehicle().system_id == 4),
@@ -53,7 +53,7 @@ const OVERRIDES: [Override; 11] = [
     ("colour", "\"always\"", &["--colour", "never"], |_, config| config.colour == Colour::Never),
 ];
 
-/// The settings and the command line, as a run takes them.
+/// Combines settings and command line as a run does.
 fn together(file: &str, flags: &[&str]) -> (Cli, Config) {
     let config = Config::parse(file).unwrap();
     let mut cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
@@ -95,7 +95,7 @@ fn completions_and_manual_page_have_the_flag_of_every_key() {
     }
 }
 
-/// A link that was written into the settings long ago must not be armed by who wants to see the demonstration.
+/// A bare `ground` flies the demonstration; it must not command a real vehicle over a link in the settings.
 #[test]
 fn a_bare_ground_takes_no_link_from_the_settings() {
     for bare in [&[][..], &["--auto"], &["--headless"], &["--log", "none"]] {
@@ -104,7 +104,7 @@ fn a_bare_ground_takes_no_link_from_the_settings() {
 }
 
 #[test]
-fn what_stands_in_the_file_is_left_alone_unless_it_is_asked_away() {
+fn flags_for_the_demonstration_and_none_override_the_file() {
     let file = "connect = [\"udpin:0.0.0.0:14550\"]";
     for demonstration in [&["daemon", "--demo"][..], &["daemon", "--seed", "2"]] {
         assert_eq!(together(file, demonstration).0.connect, []);

@@ -1,4 +1,4 @@
-//! Alarms: raised by a condition, rung by the bell until a person has acknowledged them.
+//! Alarms: a condition raises them, and the bell rings until a person has acknowledged them.
 
 use std::time::Duration;
 
@@ -7,20 +7,18 @@ use super::command::CommandKind;
 /// An alarm that nobody has acknowledged rings again after this long.
 pub const RING_EVERY: Duration = Duration::from_secs(4);
 
-/// What an alarm is about; one of each at a time.
+/// What an alarm is about. There is at most one alarm of each kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AlarmKind {
-    /// The vehicle is not heard.
     LinkLost,
     /// The vehicle does not hear this station.
     UplinkLost,
     /// The transport does not work.
     LinkDown,
-    /// Acknowledged, and yet not observed.
+    /// The vehicle acknowledged the command, but its own state does not show the effect.
     Disagreement(CommandKind),
-    /// Sent again and again without an answer.
+    /// The command was sent repeatedly and not answered.
     Unanswered(CommandKind),
-    /// Refused by the vehicle.
     Refused(CommandKind),
     /// The vehicle has latched an abort.
     Aborted,
@@ -30,22 +28,20 @@ pub enum AlarmKind {
     Degraded,
     /// The controller did not answer in time.
     DeadlineMissed,
-    /// The present plan ends outside a limit, under thrust.
+    /// Under thrust, the current plan ends outside a limit.
     PlanOutside,
-    /// The verdict says: not landed.
+    /// The vehicle's verdict is that it has not landed.
     NotLanded,
-    /// The vehicle has begun anew.
+    /// The vehicle has rebooted.
     Rebooted,
-    /// Recording has failed, or loses records.
+    /// Recording has failed, or records are lost.
     Log,
     /// The motor may still light.
     LiveMotor,
-    /// The countdown was held.
     Held,
 }
 
 impl AlarmKind {
-    /// Every kind there is.
     pub fn all() -> impl Iterator<Item = Self> {
         let of_commands =
             [Self::Disagreement, Self::Unanswered, Self::Refused].into_iter().flat_map(|kind| {
@@ -69,31 +65,28 @@ impl AlarmKind {
         others.into_iter().chain(of_commands)
     }
 
-    /// Whether it is about one boot of the vehicle, and over with it.
+    /// Whether the alarm belongs to one boot of the vehicle and ends with it.
     fn ends_with_the_boot(self) -> bool {
         !matches!(self, Self::LinkLost | Self::UplinkLost | Self::LinkDown | Self::Rebooted | Self::Log)
     }
 }
 
-/// One alarm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Alarm {
-    /// What it is about.
     pub kind: AlarmKind,
-    /// For a person to read; fit for a terminal.
+    /// The text for a person; safe to print on a terminal.
     pub text: String,
-    /// When it was raised, the last time if it was raised anew; since the start of the run.
+    /// When it was last raised, since the start of the run.
     pub raised_at: Duration,
     /// When its condition ended; `None` while it holds.
     pub ended_at: Option<Duration>,
-    /// A person has seen it.
+    /// Whether a person has seen it.
     pub acknowledged: bool,
-    /// It was over before this screen was there: worth knowing, and nothing to ring for.
+    /// It ended before this screen was attached: it is listed, but the bell does not ring for it.
     pub past: bool,
 }
 
 impl Alarm {
-    /// Whether its condition holds.
     pub fn is_active(&self) -> bool {
         self.ended_at.is_none()
     }
@@ -108,12 +101,12 @@ pub struct Alarms {
 }
 
 impl Alarms {
-    /// Of a screen that is told first what happened before it was there: nothing rings until that is over.
+    /// For a screen that first receives the history: nothing rings until the history has been received.
     pub(crate) fn in_history() -> Self {
         Self { in_history: true, ..Self::default() }
     }
 
-    /// What comes from now on happens now. What is over by then is past; what still holds rings.
+    /// The history has been received. Alarms that ended in it are past; alarms that still hold ring.
     pub(crate) fn history_ends(&mut self) {
         if std::mem::take(&mut self.in_history) {
             for alarm in &mut self.list {
@@ -123,24 +116,23 @@ impl Alarms {
         }
     }
 
-    /// Oldest first.
     pub fn list(&self) -> &[Alarm] {
         &self.list
     }
 
-    /// The newest that nobody has acknowledged, those of the past last; else the newest that holds.
+    /// The newest alarm that nobody has acknowledged (past ones last); otherwise the newest that holds.
     pub fn foremost(&self) -> Option<&Alarm> {
         let newest = |past: bool| self.list.iter().rfind(|alarm| !alarm.acknowledged && alarm.past == past);
         newest(false).or_else(|| newest(true)).or_else(|| self.list.last())
     }
 
-    /// How many nobody has acknowledged.
+    /// How many alarms nobody has acknowledged.
     pub fn unacknowledged(&self) -> usize {
         self.list.iter().filter(|alarm| !alarm.acknowledged).count()
     }
 
-    /// Takes the conditions that hold now. Returns the alarms that were raised by them. A condition that comes back has
-    /// an age of its own, and must be seen anew.
+    /// Takes the conditions that hold now and returns the alarms that they raise. A condition that returns raises a
+    /// new alarm with a new age, which must be acknowledged again.
     pub(crate) fn watch(&mut self, now: Duration, conditions: Vec<(AlarmKind, String)>) -> Vec<Alarm> {
         for alarm in &mut self.list {
             if !conditions.iter().any(|(kind, _)| *kind == alarm.kind) {
@@ -173,15 +165,15 @@ impl Alarms {
         raised
     }
 
-    /// The vehicle is another from now on: what was about the one before has ended.
-    pub(crate) fn vehicle_is_another(&mut self, now: Duration) {
+    /// The vehicle has rebooted: alarms about the previous boot have ended.
+    pub(crate) fn vehicle_rebooted(&mut self, now: Duration) {
         for alarm in self.list.iter_mut().filter(|alarm| alarm.kind.ends_with_the_boot()) {
             alarm.ended_at.get_or_insert(now);
         }
         self.forget_seen();
     }
 
-    /// A person has seen this one. Returns its text, if it was new to them.
+    /// Marks an alarm as seen. Returns its text if it was not marked before.
     pub(crate) fn acknowledge(&mut self, kind: AlarmKind) -> Option<String> {
         let new = self.list.iter_mut().find(|alarm| alarm.kind == kind && !alarm.acknowledged)?;
         new.acknowledged = true;
@@ -197,7 +189,7 @@ impl Alarms {
         self.list.retain(|alarm| alarm.is_active() || !alarm.acknowledged);
     }
 
-    /// Whether the bell is due; then it counts as rung.
+    /// Whether to ring the bell now. Returning `true` counts as ringing it.
     pub(crate) fn rings(&mut self, now: Duration, raised: bool) -> bool {
         let again = self.rung_at.is_none_or(|at| now.saturating_sub(at) >= RING_EVERY);
         let open = self.list.iter().any(|alarm| !alarm.acknowledged && !alarm.past);
@@ -220,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alarm_outlives_its_condition_until_a_person_has_seen_it() {
+    fn an_alarm_stays_after_its_condition_ends_until_it_is_acknowledged() {
         let mut alarms = Alarms::default();
         assert_eq!(alarms.watch(S(1), lost()).len(), 1);
         assert!(alarms.watch(S(2), lost()).is_empty(), "raised once");
@@ -231,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acknowledged_alarm_stays_while_its_condition_holds_and_is_new_when_it_returns() {
+    fn an_acknowledged_alarm_stays_while_its_condition_holds_and_is_raised_again_later() {
         let mut alarms = Alarms::default();
         alarms.watch(S(1), lost());
         alarms.acknowledge(AlarmKind::LinkLost);
@@ -243,9 +235,9 @@ mod tests {
         assert_eq!(alarms.unacknowledged(), 1);
     }
 
-    /// A screen that comes late hears of what was, and rings for what is.
+    /// A screen that attaches late lists past alarms and rings only for those that still hold.
     #[test]
-    fn what_was_over_before_the_screen_came_does_not_ring() {
+    fn an_alarm_that_ended_before_the_screen_attached_does_not_ring() {
         let mut alarms = Alarms::in_history();
         let down = (AlarmKind::LinkDown, "LINK DOWN".to_owned());
         alarms.watch(S(1), [lost(), vec![down.clone()]].concat());
@@ -282,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn each_alarm_is_acknowledged_by_itself() {
+    fn alarms_are_acknowledged_one_by_one() {
         let mut alarms = Alarms::default();
         let down = (AlarmKind::LinkDown, "LINK DOWN".to_owned());
         alarms.watch(S(1), [lost(), vec![down]].concat());
@@ -292,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alarm_that_is_raised_anew_or_by_another_vehicle_has_an_age_of_its_own() {
+    fn an_alarm_that_is_raised_again_or_after_a_reboot_has_a_new_age() {
         let mut alarms = Alarms::default();
         alarms.watch(S(1), lost());
         alarms.watch(S(3), Vec::new());
@@ -304,7 +296,7 @@ mod tests {
         assert_eq!(alarms.list()[0].raised_at, S(20));
         let latched = || vec![(AlarmKind::Aborted, "ABORT LATCHED".to_owned())];
         alarms.watch(S(30), latched());
-        alarms.vehicle_is_another(S(40));
+        alarms.vehicle_rebooted(S(40));
         assert_eq!(alarms.watch(S(40), latched()).len(), 1);
         assert_eq!(alarms.list().last().map(|alarm| alarm.raised_at), Some(S(40)));
     }

@@ -1,88 +1,89 @@
-//! Which boot of the vehicle speaks, and whether it has always said of itself that it is a simulated one.
+//! Which boot of the vehicle a message comes from, and whether the vehicle has always reported to be simulated.
 
 use std::num::NonZeroU32;
 
 use protocol::dialect::{MavMessage, MavModeFlag, TD_FLIGHT_STATUS_DATA, TdVehicleFlag};
 
-/// Without a boot number: the vehicle's clock may jump back this far by a slow link beside a fast one; more is a reboot.
+/// A vehicle without a boot number: its clock may go back by this much when messages of a slow and a fast link mix; a
+/// larger step back is a reboot.
 const REORDERED_MS: u32 = 5_000;
-/// Former boots remembered. What is still on its way belongs to one of the last few.
+/// How many former boots are remembered. Messages still in transit belong to one of the last few.
 const FORMER_MAX: usize = 8;
 
-/// What a message says of the boot that it comes from.
+/// Which boot a message comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Spoken {
-    /// The present boot, as far as is known.
+pub enum MessageBoot {
+    /// The present boot, as far as the ground knows.
     Present,
-    /// A new boot: nothing that was known holds any more.
+    /// A new boot: everything known so far is void.
     New,
-    /// A boot that is over: the message was late.
+    /// A former boot: the message is late.
     Former,
 }
 
-/// One boot of the vehicle, as far as it has told about it.
+/// What is known about the present boot of the vehicle.
 #[derive(Debug, Clone, Default)]
 pub struct Boot {
     number: Option<NonZeroU32>,
     former: Vec<NonZeroU32>,
-    /// The vehicle's clock, ms since its boot: the greatest heard.
+    /// The latest time on the vehicle's clock, ms since its boot.
     clock_ms: Option<u32>,
-    /// HEARTBEAT's HIL flag, if any was heard: whether it was set in every one.
+    /// Whether every HEARTBEAT so far had the HIL flag set; `None` before the first.
     hil: Option<bool>,
-    /// The flag of `TD_FLIGHT_STATUS`, likewise.
+    /// The same for the simulated flag of `TD_FLIGHT_STATUS`.
     flagged: Option<bool>,
 }
 
 impl Boot {
-    /// The number; `None` for a vehicle that has told none.
+    /// The boot number; `None` if the vehicle has not reported one.
     pub fn number(&self) -> Option<u32> {
         self.number.map(NonZeroU32::get)
     }
 
-    /// Whether both of the vehicle's flags have said so ever since this boot's number was first heard. Absent or
-    /// contradictory means a real vehicle.
+    /// Whether both flags have been set in every message since this boot's number was first received. A missing or
+    /// contradictory flag means a real vehicle.
     pub fn is_simulated(&self) -> bool {
         self.number.is_some() && self.hil == Some(true) && self.flagged == Some(true)
     }
 
-    /// Whether it has told in both places, since its number was heard, whether it is a simulated one.
+    /// Whether both flags have been received since the boot number was.
     pub fn has_said_what_it_is(&self) -> bool {
         self.hil.is_some() && self.flagged.is_some()
     }
 
-    /// Takes a message of the vehicle.
-    pub fn hear(&mut self, message: &MavMessage) -> Spoken {
+    /// Takes a message of the vehicle and says which boot it comes from.
+    pub fn hear(&mut self, message: &MavMessage) -> MessageBoot {
         match message {
             MavMessage::HEARTBEAT(beat) => {
                 let set = beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
                 self.hil = Some(set && self.hil != Some(false));
-                Spoken::Present
+                MessageBoot::Present
             }
             MavMessage::TD_FLIGHT_STATUS(status) => self.hear_status(status),
-            _ => time_boot_ms(message).map_or(Spoken::Present, |at_ms| self.hear_clock(at_ms)),
+            _ => time_boot_ms(message).map_or(MessageBoot::Present, |at_ms| self.hear_clock(at_ms)),
         }
     }
 
-    fn hear_status(&mut self, status: &TD_FLIGHT_STATUS_DATA) -> Spoken {
+    fn hear_status(&mut self, status: &TD_FLIGHT_STATUS_DATA) -> MessageBoot {
         let Some(told) = NonZeroU32::new(status.boot_number) else {
             let spoken = self.hear_clock(status.time_boot_ms);
             self.note_flag(status);
             return spoken;
         };
         if self.former.contains(&told) {
-            return Spoken::Former;
+            return MessageBoot::Former;
         }
         let spoken = match self.number {
-            Some(known) if known == told => Spoken::Present,
-            Some(_) => Spoken::New,
-            // Nothing was told of numbers so far: the clock decides once more whether this is still the same boot.
+            Some(known) if known == told => MessageBoot::Present,
+            Some(_) => MessageBoot::New,
+            // The first boot number: the clock decides one last time whether this is still the same boot.
             None => {
                 let spoken = self.hear_clock(status.time_boot_ms);
                 (self.hil, self.flagged) = (None, None);
                 spoken
             }
         };
-        if spoken == Spoken::New {
+        if spoken == MessageBoot::New {
             self.begin_anew();
         }
         self.number = Some(told);
@@ -95,17 +96,17 @@ impl Boot {
         self.flagged = Some(set && self.flagged != Some(false));
     }
 
-    /// A boot that has a number is told from others by it alone.
-    fn hear_clock(&mut self, at_ms: u32) -> Spoken {
+    /// Detects a reboot by the clock, for a vehicle without a boot number.
+    fn hear_clock(&mut self, at_ms: u32) -> MessageBoot {
         if self.number.is_some() {
-            return Spoken::Present;
+            return MessageBoot::Present;
         }
         let fell = self.clock_ms.is_some_and(|last_ms| at_ms.saturating_add(REORDERED_MS) < last_ms);
         if fell {
             self.begin_anew();
         }
         self.clock_ms = Some(self.clock_ms.map_or(at_ms, |last_ms| last_ms.max(at_ms)));
-        if fell { Spoken::New } else { Spoken::Present }
+        if fell { MessageBoot::New } else { MessageBoot::Present }
     }
 
     fn begin_anew(&mut self) {
@@ -154,34 +155,34 @@ mod tests {
     }
 
     #[test]
-    fn another_number_is_another_boot_however_soon_it_comes() {
+    fn a_new_boot_number_is_a_reboot_even_soon_after_the_last() {
         let mut boot = Boot::default();
-        assert_eq!(boot.hear(&status(7, 4_000, false)), Spoken::Present);
-        assert_eq!(boot.hear(&status(7, 4_100, false)), Spoken::Present);
-        assert_eq!(boot.hear(&status(9, 100, false)), Spoken::New);
-        assert_eq!(boot.hear(&status(7, 4_200, false)), Spoken::Former, "it was late");
+        assert_eq!(boot.hear(&status(7, 4_000, false)), MessageBoot::Present);
+        assert_eq!(boot.hear(&status(7, 4_100, false)), MessageBoot::Present);
+        assert_eq!(boot.hear(&status(9, 100, false)), MessageBoot::New);
+        assert_eq!(boot.hear(&status(7, 4_200, false)), MessageBoot::Former, "it was late");
         assert_eq!(boot.number(), Some(9));
     }
 
     #[test]
-    fn a_number_counts_and_then_the_clock_does_not() {
+    fn with_a_boot_number_the_clock_is_ignored() {
         let mut boot = Boot::default();
         boot.hear(&status(7, 60_000, false));
-        assert_eq!(boot.hear(&at(10)), Spoken::Present);
-        assert_eq!(boot.hear(&status(7, 60_100, false)), Spoken::Present);
+        assert_eq!(boot.hear(&at(10)), MessageBoot::Present);
+        assert_eq!(boot.hear(&status(7, 60_100, false)), MessageBoot::Present);
     }
 
     #[test]
-    fn without_a_number_a_falling_clock_is_a_reboot_and_a_late_message_is_not() {
+    fn without_a_number_a_clock_that_goes_back_is_a_reboot_and_a_late_message_is_not() {
         let mut boot = Boot::default();
         boot.hear(&status(0, 60_000, false));
-        assert_eq!(boot.hear(&at(59_000)), Spoken::Present);
-        assert_eq!(boot.hear(&at(200)), Spoken::New);
-        assert_eq!(boot.hear(&at(300)), Spoken::Present);
+        assert_eq!(boot.hear(&at(59_000)), MessageBoot::Present);
+        assert_eq!(boot.hear(&at(200)), MessageBoot::New);
+        assert_eq!(boot.hear(&at(300)), MessageBoot::Present);
     }
 
     #[test]
-    fn simulated_is_what_both_flags_have_always_said() {
+    fn a_vehicle_is_simulated_only_if_both_flags_were_always_set() {
         let of = |heard: &[MavMessage]| {
             let mut boot = Boot::default();
             for message in heard {

@@ -1,34 +1,32 @@
-//! The abort chord: Ctrl-X, then Enter; or Ctrl-X twice, told apart from Ctrl-X held.
+//! The abort chord: Ctrl-X then Enter, or Ctrl-X twice, distinguished from a held Ctrl-X.
 //!
-//! Enter completes it at once, on every terminal: no keyboard repeats Ctrl-X as Enter. With Ctrl-X it is not so
-//! simple. Many terminals send a held key as the same bytes over and over: once at the press, again after the
-//! keyboard's delay (a quarter of a second and more), then every few hundredths of a second. The first
-//! repeat looks exactly like a second press; what follows it does not. So a second Ctrl-X counts only
-//! once nothing has followed it for [`REPEATS_WITHIN`], and a hold, however long, is one press. A terminal that
-//! tells repeats apart lets the second Ctrl-X count at once.
+//! Enter completes the chord at once on every terminal. A second Ctrl-X is harder to recognise. Many terminals send a
+//! held key as the same bytes over and over: once at the press, again after the keyboard's delay (250 ms or more),
+//! then every 20 to 100 ms. The first repeat looks like a second press; the repeats after it do not. So a second
+//! Ctrl-X counts only if no further one follows within [`REPEATS_WITHIN`], and a held key is one press. On a terminal
+//! that reports repeats, the second Ctrl-X counts at once.
 
 use std::time::Duration;
 
-/// Time for the second key, counted from the first or from the end of its hold.
+/// How long the second key may take, from the first press or from the end of its hold.
 pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
-/// Presses closer together than this are one key held: keyboards repeat every 20 to 100 ms, fingers
-/// press again later than that. Also how long a second press waits for its proof.
+/// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100 ms, fingers are
+/// slower. A second press also waits this long to show that it is no repeat.
 pub const REPEATS_WITHIN: Duration = Duration::from_millis(120);
 
-/// How far the chord is.
+/// The state of the chord.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum AbortChord {
-    /// Not begun.
     #[default]
     Open,
-    /// Pressed once, perhaps still held; when it was seen last.
+    /// Pressed once and perhaps still held; the time of the last Ctrl-X.
     Once(Duration),
-    /// Pressed again; when. It counts unless a repeat follows.
+    /// Pressed a second time, at this time. It counts unless a repeat follows.
     Twice(Duration),
 }
 
 impl AbortChord {
-    /// Whether the first press was seen and its time is not over.
+    /// Whether the first key was pressed and its time limit has not expired.
     pub fn is_begun(self, now: Duration) -> bool {
         match self {
             Self::Open => false,
@@ -45,21 +43,20 @@ impl AbortChord {
         }
     }
 
-    /// Ctrl-X was seen.
     pub fn press(&mut self, now: Duration) {
         *self = match *self {
             Self::Once(at) if now.saturating_sub(at) >= REPEATS_WITHIN && self.is_begun(now) => {
                 Self::Twice(now)
             }
-            // Not acted upon in time, because the ground was busy: nobody knows when this one was pressed.
+            // The ground was too busy to act in time, so nobody knows when this key was pressed.
             Self::Twice(at) if now.saturating_sub(at) >= REPEATS_WITHIN => Self::Twice(now),
-            // The first, or one more of a held key.
+            // The first press, or a repeat of a held key.
             Self::Open | Self::Once(_) | Self::Twice(_) => Self::Once(now),
         };
     }
 
-    /// A key was pressed that cannot be a repeat of the first: Enter, or Ctrl-X where repeats are told apart. Returns
-    /// whether it completes the chord, which is over then.
+    /// A key that cannot be a repeat of the first was pressed: Enter, or Ctrl-X on a terminal that reports repeats.
+    /// Returns whether it completes the chord, which then starts over.
     pub fn confirm(&mut self, now: Duration) -> bool {
         let complete = self.is_begun(now);
         if complete {
@@ -68,8 +65,8 @@ impl AbortChord {
         complete
     }
 
-    /// Another key was pressed: a key that is held no longer repeats then. Returns whether the chord is complete; then
-    /// it is over. What was only begun stands: nothing but time takes it back.
+    /// Another key was pressed, so Ctrl-X is no longer held. Returns whether the chord is complete; then it starts
+    /// over. A chord that has only begun stays begun until its time limit.
     pub fn end(&mut self) -> bool {
         let complete = matches!(self, Self::Twice(_));
         if complete {
@@ -78,7 +75,7 @@ impl AbortChord {
         complete
     }
 
-    /// Time passes. Returns whether the chord is complete; then it is over.
+    /// Lets time pass. Returns whether the chord is complete; then it starts over.
     pub fn pass(&mut self, now: Duration) -> bool {
         if self.acts_at().is_some_and(|at| now >= at) {
             return self.end();
@@ -95,7 +92,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Feeds presses at these times and lets time pass every 10 ms; how often the chord was complete.
+    /// Presses Ctrl-X at these times and lets time pass every 10 ms. Returns how often the chord was completed.
     fn aborts(presses_ms: &[u64]) -> usize {
         let mut chord = AbortChord::default();
         let end = presses_ms.last().copied().unwrap_or(0) + 3_000;
@@ -123,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn two_presses_abort_once_from_hurried_to_cold_fingers() {
+    fn two_presses_abort_once_whether_fast_or_slow() {
         for pause_ms in [120, 150, 200, 350, 600, 1_000, 1_500, 2_000] {
             assert_eq!(aborts(&[0, pause_ms]), 1, "{pause_ms} ms between");
         }
@@ -132,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_is_one_press_and_the_next_press_aborts() {
+    fn a_held_key_is_one_press_and_the_next_press_aborts() {
         let mut presses = held(500, 33, 30);
         let released = presses.last().copied().unwrap();
         presses.push(released + 400);
@@ -140,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn enter_completes_what_ctrl_x_began_and_nothing_else() {
+    fn enter_completes_the_chord_only_after_ctrl_x_and_in_time() {
         let at = Duration::from_millis;
         let mut chord = AbortChord::default();
         assert!(!chord.confirm(at(0)));
@@ -156,14 +153,14 @@ mod tests {
     }
 
     #[test]
-    fn hammering_aborts() {
+    fn many_quick_presses_abort() {
         assert!(aborts(&[0, 140, 280, 420, 560]) >= 1);
         assert!(aborts(&[0, 100, 200, 300, 600]) >= 1, "too fast to tell from a hold, until the last");
     }
 
     proptest! {
         #[test]
-        fn no_keyboard_held_aborts(
+        fn a_held_key_never_aborts_at_any_repeat_rate(
             delay_ms in 150_u64..1_900,
             gaps in prop::collection::vec(15_u64..119, 2..200),
         ) {

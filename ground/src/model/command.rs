@@ -1,4 +1,4 @@
-//! Commands: commanded, acknowledged and observed are three facts and stay apart.
+//! Commands and their three separate facts: commanded, acknowledged, observed.
 
 use std::time::Duration;
 
@@ -8,24 +8,21 @@ use protocol::dialect::{MavCmd, MavResult, TdInterlock, TdPhase};
 use super::seat::Seat;
 use super::vehicle::Vehicle;
 
-/// An accepted command should show in the vehicle's own state within this time: two heartbeats and a bit.
+/// The effect of an accepted command should show in the vehicle's state within this time: a little over two
+/// heartbeats.
 pub const OBSERVE_WITHIN: Duration = Duration::from_millis(2_500);
 
-/// What the crew can ask for.
+/// A command that the crew can give.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandKind {
-    /// Arm.
     Arm,
-    /// Disarm.
     Disarm,
-    /// Start the countdown.
     Start,
-    /// Abort.
     Abort,
 }
 
 impl CommandKind {
-    /// The name on screen and in the log.
+    /// The name on screens and in the log.
     pub fn name(self) -> &'static str {
         match self {
             Self::Arm => "ARM",
@@ -35,8 +32,8 @@ impl CommandKind {
         }
     }
 
-    /// The command's number and first parameter.
-    pub fn wire(self) -> (MavCmd, f32) {
+    /// The MAVLink command and its first parameter.
+    pub fn mav_command(self) -> (MavCmd, f32) {
         match self {
             Self::Arm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
             Self::Disarm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0),
@@ -45,7 +42,7 @@ impl CommandKind {
         }
     }
 
-    /// How often it is sent again. An arm never: a late duplicate could arm a vehicle believed safe.
+    /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe.
     pub fn resend(self) -> Resend {
         match self {
             Self::Arm => Resend::Never,
@@ -65,7 +62,7 @@ impl CommandKind {
                 let counting = status.value.countdown_ms != i32::MAX;
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
-            // The latch itself: a stabiliser that flies without an abort shows the same degradation.
+            // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
@@ -74,7 +71,7 @@ impl CommandKind {
         }
     }
 
-    /// Where the effect shows, for "observed".
+    /// What shows the effect, for the event "observed".
     pub fn observed_words(self) -> &'static str {
         match self {
             Self::Arm => "HEARTBEAT says armed",
@@ -90,53 +87,49 @@ pub fn is_aborted(interlocks: TdInterlock) -> bool {
     interlocks.intersects(TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_DEGRADED)
 }
 
-/// What came back.
+/// The vehicle's answer to a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Acknowledged {
-    /// Nothing yet.
+pub enum Acknowledgement {
     Waiting,
-    /// It is being done.
+    /// The vehicle is executing the command.
     InProgress,
     /// Answered with this `MAV_RESULT`.
     Answered(u8),
-    /// Given up.
-    Nothing,
+    /// No answer came, and none is expected any more.
+    GivenUp,
 }
 
-/// One command and its three facts.
+/// One command with its three facts.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Track {
-    /// What was asked.
+pub struct TrackedCommand {
     pub kind: CommandKind,
-    /// Who asked, and from which screen.
+    /// Who gave the command, and from which screen.
     pub by: Seat,
-    /// When it was asked.
+    /// When it was commanded.
     pub commanded_at: Duration,
-    /// How often it was sent.
+    /// How many times it was sent.
     pub attempts: u32,
-    /// What came back.
-    pub acknowledged: Acknowledged,
-    /// When that came.
+    /// The vehicle's answer to a command.
+    pub acknowledged: Acknowledgement,
     pub acknowledged_at: Option<Duration>,
-    /// When the vehicle's own state showed it.
+    /// When the vehicle's own state first showed the effect.
     pub observed_at: Option<Duration>,
     pub(crate) ticket: Ticket,
-    pub(crate) not_observed_said: bool,
+    pub(crate) not_observed_reported: bool,
 }
 
-impl Track {
-    /// Accepted by the vehicle.
+impl TrackedCommand {
     pub fn accepted(&self) -> bool {
-        self.acknowledged == Acknowledged::Answered(MavResult::MAV_RESULT_ACCEPTED as u8)
+        self.acknowledged == Acknowledgement::Answered(MavResult::MAV_RESULT_ACCEPTED as u8)
     }
 
-    /// Asked, and neither refused nor given up nor seen to be done.
+    /// Commanded, and neither refused nor given up nor observed.
     pub fn is_on_its_way(&self, now: Duration) -> bool {
-        let open = matches!(self.acknowledged, Acknowledged::Waiting | Acknowledged::InProgress);
+        let open = matches!(self.acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress);
         self.observed_at.is_none() && (open || (self.accepted() && !self.disagrees(now)))
     }
 
-    /// Accepted, and yet the vehicle's state does not show it.
+    /// Accepted, but the vehicle's state does not show the effect in time.
     pub fn disagrees(&self, now: Duration) -> bool {
         self.accepted()
             && self.observed_at.is_none()
@@ -144,31 +137,30 @@ impl Track {
     }
 }
 
-/// Every command of the run: the latest of each kind.
+/// The latest command of each kind.
 #[derive(Debug, Default)]
 pub struct Commands {
     pub(crate) sender: CommandSender,
-    /// The latest of each kind, in the order they were asked.
-    pub tracks: Vec<Track>,
+    /// In the order in which they were given.
+    pub tracks: Vec<TrackedCommand>,
 }
 
 impl Commands {
-    /// The latest command.
-    pub fn latest(&self) -> Option<&Track> {
+    pub fn latest(&self) -> Option<&TrackedCommand> {
         self.tracks.last()
     }
 
     /// The latest command of a kind.
-    pub fn of(&self, kind: CommandKind) -> Option<&Track> {
+    pub fn of(&self, kind: CommandKind) -> Option<&TrackedCommand> {
         self.tracks.iter().find(|track| track.kind == kind)
     }
 
     /// Whether an abort is still being sent.
     pub fn is_aborting(&self) -> bool {
-        self.sender.is_pending(CommandKind::Abort.wire().0)
+        self.sender.is_pending(CommandKind::Abort.mav_command().0)
     }
 
-    /// When something is to be sent next.
+    /// When the next command is to be sent or resent.
     pub(crate) fn due_at(&self) -> Option<Duration> {
         self.sender.due_at()
     }

@@ -1,25 +1,25 @@
-//! Who sits at the screens of this station that can command.
+//! The crew: who sits at the screens that can command.
 
 use std::time::Duration;
 
 use super::seat::Seat;
 
-/// A countdown goes on without a commanding screen for this long at most.
-pub const ALONE_MAX: Duration = Duration::from_secs(5);
+/// How long a countdown may continue without a commanding screen.
+pub const UNATTENDED_MAX: Duration = Duration::from_secs(5);
 
-/// The commanding screens: the station's own, and attached ones that do not only watch.
+/// The seats at commanding screens: the station's own screen and the attached ones without `--watch`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crew {
     seats: Vec<Seat>,
-    /// When the last one went.
+    /// When the last one left; `None` while somebody is there.
     gone_at: Option<Duration>,
-    /// When the hold is asked for next; `None` while it is not asked for.
+    /// When the next hold is to be sent; `None` while no hold is needed.
     pub(crate) hold_due: Option<Duration>,
 }
 
 impl Crew {
-    /// These are there now.
-    pub fn sit(&mut self, seats: Vec<Seat>, now: Duration) {
+    /// Sets who is there now.
+    pub fn set_seats(&mut self, seats: Vec<Seat>, now: Duration) {
         if !seats.is_empty() {
             self.gone_at = None;
         } else if !self.seats.is_empty() {
@@ -28,12 +28,11 @@ impl Crew {
         self.seats = seats;
     }
 
-    /// Who is there.
     pub fn seats(&self) -> &[Seat] {
         &self.seats
     }
 
-    /// Their names, short.
+    /// The first word of each operator's name, or the screen.
     pub fn names(&self) -> Vec<String> {
         let name = |seat: &Seat| match seat.operator.split_whitespace().next() {
             Some(name) => name.to_owned(),
@@ -42,12 +41,12 @@ impl Crew {
         self.seats.iter().map(name).collect()
     }
 
-    /// Whether the last one has been gone for too long.
+    /// Whether no commanding screen has been there for too long.
     pub fn is_gone(&self, now: Duration) -> bool {
-        self.gone_at.is_some_and(|at| now.saturating_sub(at) >= ALONE_MAX)
+        self.gone_at.is_some_and(|at| now.saturating_sub(at) >= UNATTENDED_MAX)
     }
 
-    /// Who commands, in words.
+    /// A sentence that says who can command.
     pub fn words(&self) -> String {
         if self.seats.is_empty() {
             return "nobody commands".to_owned();

@@ -1,73 +1,62 @@
-//! What the keyboard talks to.
+//! The dialog that takes the keys: typing the word that arms, starts or quits, or confirming a disarm.
 
 use std::time::Duration;
 
-/// Time to type the word after opening the arming dialog.
+/// How long the crew has to type the word that arms.
 pub const ARM_TIME_LIMIT: Duration = Duration::from_secs(10);
-/// The word that arms.
 pub const ARM_WORD: &str = "ARM";
-/// Time to type the word that starts.
+/// How long the crew has to type the word that starts.
 pub const START_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// The word that starts the countdown.
 pub const START_WORD: &str = "START";
-/// Time to confirm a disarming.
+/// How long the crew has to confirm a disarm.
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
-/// Time to type the word that quits.
+/// How long the crew has to type the word that quits.
 pub const QUIT_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// The word that quits while the vehicle is armed or in flight.
 pub const QUIT_WORD: &str = "QUIT";
 
-/// The open dialog, which takes the keys: the next letter of its word (in either case), or Enter behind the whole word.
-/// Any other key closes it. The abort chord works in every one of them.
+/// The open dialog. It accepts the next letter of its word (in either case), or Enter after the whole word. Any other
+/// key closes it. The abort chord works in every dialog.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Dialog {
-    /// None.
     Closed,
-    /// Second step of arming: the word is typed.
+    /// The second step of arming: the word is typed.
     Arm {
-        /// What was typed so far: the beginning of [`ARM_WORD`].
+        /// The beginning of [`ARM_WORD`] that has been typed.
         typed: String,
-        /// When the offer ends.
         until: Duration,
     },
     /// The word that starts the countdown is typed.
     Start {
-        /// What was typed so far: the beginning of [`START_WORD`].
+        /// The beginning of [`START_WORD`] that has been typed.
         typed: String,
-        /// When the offer ends.
         until: Duration,
     },
-    /// Enter disarms.
     Disarm {
-        /// When the offer ends.
         until: Duration,
     },
-    /// The word that quits although the vehicle is armed or flying is typed.
+    /// The word that quits is typed, because the vehicle is armed or in flight.
     Quit {
-        /// What was typed so far: the beginning of [`QUIT_WORD`].
+        /// The beginning of [`QUIT_WORD`] that has been typed.
         typed: String,
-        /// When the offer ends.
         until: Duration,
     },
 }
 
 impl Dialog {
-    /// Offers to arm.
     pub fn arm(now: Duration) -> Self {
         Self::Arm { typed: String::new(), until: now + ARM_TIME_LIMIT }
     }
 
-    /// Offers to start.
     pub fn start(now: Duration) -> Self {
         Self::Start { typed: String::new(), until: now + START_TIME_LIMIT }
     }
 
-    /// Offers to disarm.
     pub fn disarm(now: Duration) -> Self {
         Self::Disarm { until: now + CONFIRM_TIME_LIMIT }
     }
 
-    /// Offers to quit.
     pub fn quit(now: Duration) -> Self {
         Self::Quit { typed: String::new(), until: now + QUIT_TIME_LIMIT }
     }
@@ -83,7 +72,7 @@ impl Dialog {
         }
     }
 
-    /// What is offered, for the list of events.
+    /// The name for the list of events.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Closed => "nothing",
@@ -94,7 +83,7 @@ impl Dialog {
         }
     }
 
-    /// The word that is wanted; `None` where Enter alone does.
+    /// The word to type; `None` where Enter alone confirms.
     pub fn word(&self) -> Option<&'static str> {
         match self {
             Self::Closed | Self::Disarm { .. } => None,
@@ -104,7 +93,7 @@ impl Dialog {
         }
     }
 
-    /// Whether Enter does it now.
+    /// Whether Enter now confirms.
     pub fn is_complete(&self) -> bool {
         match self {
             Self::Closed => false,
@@ -115,7 +104,7 @@ impl Dialog {
         }
     }
 
-    /// Takes a letter. Returns whether it is the next one of the word.
+    /// Takes a letter. Returns whether it is the next letter of the word.
     pub fn take(&mut self, letter: char) -> bool {
         let Some(word) = self.word() else { return false };
         let (Self::Arm { typed, .. } | Self::Start { typed, .. } | Self::Quit { typed, .. }) = self else {

@@ -1,21 +1,21 @@
-//! What happened, for a person to read; bounded.
+//! The list of events for the crew; only the newest are kept.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use protocol::log::record::EventLevel;
 
-/// Events kept; older ones are in the log.
+/// How many events are kept; older ones are in the log.
 const KEPT: usize = 500;
-/// Characters of a text kept; the raw frames hold all of it.
+/// The longest text, in characters; the raw frames in the log hold all of it.
 const TEXT_LEN_MAX: usize = 400;
 
-/// Who says so.
+/// Who reports an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Speaker {
-    /// This program.
+    /// The ground station.
     Ground,
-    /// The vehicle, in its own words.
+    /// The vehicle, by its STATUSTEXT messages.
     Vehicle,
 }
 
@@ -29,21 +29,19 @@ impl Speaker {
     }
 }
 
-/// One event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Event {
     /// Since the start of the run.
     pub at: Duration,
-    /// Who says so.
+    /// Who reports an event.
     pub speaker: Speaker,
-    /// How grave.
     pub level: EventLevel,
-    /// What happened; fit for a terminal.
+    /// Safe to print on a terminal.
     pub text: String,
 }
 
 impl Event {
-    /// A mark that carries the gravity without colour.
+    /// A mark that shows the level without colour.
     pub fn mark(&self) -> &'static str {
         match self.level {
             EventLevel::Info => "  ",
@@ -61,7 +59,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// Adds an event; the oldest goes when there are too many.
+    /// Adds an event and drops the oldest if there are too many.
     pub fn push(&mut self, at: Duration, speaker: Speaker, level: EventLevel, mut text: String) {
         if let Some((cut, _)) = text.char_indices().nth(TEXT_LEN_MAX) {
             text.truncate(cut);
@@ -73,7 +71,7 @@ impl Events {
         self.total += 1;
     }
 
-    /// Events since the start, kept or not.
+    /// How many events there were since the start, including dropped ones.
     pub fn total(&self) -> u64 {
         self.total
     }
@@ -83,7 +81,7 @@ impl Events {
         self.kept.iter().skip(self.kept.len().saturating_sub(count))
     }
 
-    /// The events after the first `seen`, as far as they are kept.
+    /// The events after the first `seen`, as far as they are still kept.
     pub fn since(&self, seen: u64) -> impl Iterator<Item = &Event> {
         let new = usize::try_from(self.total.saturating_sub(seen)).unwrap_or(usize::MAX);
         self.newest(new)

@@ -1,4 +1,4 @@
-//! The flight as a review needs it: when each phase began, and the greatest values.
+//! The history of the flight for the review page: when each phase began, and the greatest values.
 
 use std::time::Duration;
 
@@ -6,13 +6,12 @@ use protocol::dialect::TdPhase;
 
 use super::vehicle::Vehicle;
 
-/// Phases kept; a vehicle that jumps to and fro cannot grow memory.
+/// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
 const TIMELINE_MAX: usize = 64;
 
-/// Greatest values since the vehicle left the pad; `None` for what was never received.
+/// The greatest values since the vehicle left the pad; `None` if a value was never received.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Maxima {
-    /// Altitude, m.
     pub altitude_m: Option<f64>,
     /// Descent speed, m/s, down.
     pub descent_m_s: Option<f64>,
@@ -20,24 +19,22 @@ pub struct Maxima {
     pub tilt_rad: Option<f64>,
     /// Distance from the pad over the ground, m.
     pub distance_m: Option<f64>,
-    /// How fast the nose turned, rad/s, whichever way.
+    /// How fast the nose turned, rad/s, in any direction.
     pub turn_rate_rad_s: Option<f64>,
-    /// Gimbal angle measured, rad, either way, of the axis that went further.
+    /// The larger measured gimbal angle of the two axes, rad, without its sign.
     pub gimbal_rad: Option<f64>,
-    /// Solve time, s.
     pub solve_time_s: Option<f64>,
-    /// Smallest margin to the deadline, s.
+    /// The smallest margin to the deadline, s.
     pub margin_min_s: Option<f64>,
     /// Time without a heartbeat, s.
     pub silence_s: Option<f64>,
 }
 
-/// What a review shows.
+/// What the review page shows.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Phase and when it was seen first, since the start of the run.
+    /// Each phase and when it was first received, since the start of the run.
     pub timeline: Vec<(TdPhase, Duration)>,
-    /// Greatest values.
     pub maxima: Maxima,
 }
 
@@ -48,7 +45,7 @@ impl History {
         }
     }
 
-    /// Takes what the vehicle says now, as far as it says it now.
+    /// Takes the current values, unless they are stale.
     pub(crate) fn note_values(&mut self, vehicle: &Vehicle, silence: Option<Duration>, now: Duration) {
         if !vehicle.in_flight() {
             return;

@@ -1,45 +1,44 @@
-//! The two verdicts that every landing gets, computed from the figures of its contact: by the landing paper's Table 2, and by
-//! what the legs take.
+//! Judges a landing by two standards, from its values at contact: Table 2 of the landing paper, and what the landing
+//! legs withstand.
 //!
-//! The vehicle judges by one of the two, or by limits of its own, and its verdict is the one that counts: it knows more
-//! than it sends. What is computed here stands beside it and is called so.
+//! The vehicle judges by one of the two or by limits of its own. Its verdict is the one that counts, because it knows
+//! more than it sends. The screens mark the verdicts of this module as computed.
 //!
-//! A vehicle in the plane reports its velocity along its axes, a vehicle in space over the ground (vertical,
-//! horizontal, whole rotation). From one to the other the direction of the lean is missing in space; a
-//! figure is then known only to lie between two values, and a verdict may not be known at all. That the vehicle stays
-//! upright on its legs cannot be seen from these figures.
+//! A planar vehicle reports its velocity along its body axes; a vehicle in space reports it over the ground
+//! (vertical, horizontal, total rotation rate). In space the direction of the lean is unknown, so a speed along the
+//! body axis is known only to lie between two bounds, and a verdict may be unknown. Whether the vehicle stays upright
+//! on its legs cannot be seen from these values.
 
 use std::f64::consts::FRAC_PI_2;
 
 use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 
-use crate::limits::Touchdown;
+use super::touchdown::Touchdown;
 
-/// Limits sent as `f32` are these if they are no further off than this share.
+/// Limits sent as `f32` match a standard within this relative error.
 const SAME_SHARE: f64 = 1e-5;
 
-/// What counts as a landing.
+/// The limits that a landing must keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standard {
-    /// For people.
     pub name: &'static str,
-    /// Greatest distance from the pad, m; `None` where it does not matter.
+    /// Greatest distance from the pad, m; `None` if any distance is accepted.
     pub distance_m: Option<f64>,
     /// Lowest and greatest altitude, m.
     pub altitude_m: (f64, f64),
     /// Greatest angle from upright, rad.
     pub tilt_rad: f64,
-    /// Greatest speed along, m/s: along the axis, or vertical.
+    /// Greatest axial speed, m/s; vertical speed if `by_axis` is false.
     pub along_m_s: f64,
-    /// Greatest speed across, m/s: across the axis, or horizontal.
+    /// Greatest lateral speed, m/s; horizontal speed if `by_axis` is false.
     pub across_m_s: f64,
-    /// Greatest rate, rad/s: of the axis, or whole.
+    /// Greatest rotation rate, rad/s: of the axis; of the whole vehicle if `by_axis` is false.
     pub rate_rad_s: f64,
-    /// The speeds are those along and across the body's axis.
+    /// Whether the speeds are along and across the body axis, not over the ground.
     by_axis: bool,
 }
 
-/// Table 2 of the landing paper: speeds by the body's axis.
+/// Table 2 of the landing paper; speeds along the body axis.
 pub const TABLE_2: Standard = Standard {
     name: "Table 2",
     distance_m: Some(20.0),
@@ -51,7 +50,7 @@ pub const TABLE_2: Standard = Standard {
     by_axis: true,
 };
 
-/// What the legs take, wherever they stand: speeds over the ground.
+/// What the landing legs withstand, at any distance from the pad; speeds over the ground.
 pub const LEGS: Standard = Standard {
     name: "legs",
     distance_m: None,
@@ -65,19 +64,17 @@ pub const LEGS: Standard = Standard {
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// What is known of a limit.
+/// Whether a limit is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Held {
-    /// Kept.
+pub enum Compliance {
     Kept,
-    /// Not kept.
     Broken,
-    /// The figures do not tell.
+    /// The reported values do not decide it.
     Unknown,
 }
 
 impl Standard {
-    /// The standard that a vehicle's limits are, if they are one of the two.
+    /// The standard that matches a vehicle's limits, if one does.
     pub fn of(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> Option<Self> {
         let same = |sent: f32, own: f64| (f64::from(sent) - own).abs() <= SAME_SHARE * own;
         [TABLE_2, LEGS].into_iter().find(|standard| {
@@ -88,7 +85,7 @@ impl Standard {
         })
     }
 
-    /// By what a vehicle of these limits judges, in words.
+    /// The name of what a vehicle with these limits judges by.
     pub fn whose(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> String {
         match limits.map(Self::of) {
             Some(Some(standard)) if standard == LEGS => "the legs".to_owned(),
@@ -98,19 +95,23 @@ impl Standard {
         }
     }
 
-    /// Limit by limit, in state order: distance, altitude, pitch, speed along, speed across, rate.
-    pub fn judge(&self, contact: &Touchdown, in_space: bool) -> [Held; 6] {
+    /// Judges each limit in the order of the state: distance, altitude, pitch, axial speed, lateral speed, rate.
+    pub fn judge(&self, contact: &Touchdown, in_space: bool) -> [Compliance; 6] {
         let (along, across) = self.speeds_m_s(contact, in_space);
         let rate = match (in_space, self.by_axis) {
-            // The rotation about the axis is part of what is reported, and how much of it is not said.
+            // The reported rate includes an unknown share of roll.
             (true, true) => Between { least: 0.0, most: contact.q_rad_s.abs() },
             _ => Between::just(contact.q_rad_s.abs()),
         };
         let (lowest_m, highest_m) = self.altitude_m;
-        let altitude =
-            if (lowest_m..=highest_m).contains(&contact.altitude_m) { Held::Kept } else { Held::Broken };
+        let altitude = if (lowest_m..=highest_m).contains(&contact.altitude_m) {
+            Compliance::Kept
+        } else {
+            Compliance::Broken
+        };
         [
-            self.distance_m.map_or(Held::Kept, |most_m| Between::just(contact.x_m.abs()).at_most(most_m)),
+            self.distance_m
+                .map_or(Compliance::Kept, |most_m| Between::just(contact.x_m.abs()).at_most(most_m)),
             altitude,
             Between::just((contact.pitch_rad - FRAC_PI_2).abs()).at_most(self.tilt_rad),
             along.at_most(self.along_m_s),
@@ -119,25 +120,23 @@ impl Standard {
         ]
     }
 
-    /// Sizes of the speeds along and across, as the standard has them.
+    /// The magnitudes of the two speeds that the standard limits.
     fn speeds_m_s(&self, contact: &Touchdown, in_space: bool) -> (Between, Between) {
         let (u, w) = (contact.u_m_s, contact.w_m_s);
         let (sin, cos) = libm::sincos(contact.pitch_rad);
         match (in_space, self.by_axis) {
             (true, false) | (false, true) => (Between::just(u.abs()), Between::just(w.abs())),
-            // In the plane the two are one rotation apart.
+            // In the plane the pitch alone converts between the two.
             (false, false) => {
                 (Between::just((u * sin - w * cos).abs()), Between::just((u * cos + w * sin).abs()))
             }
-            // In space it is not said which way the vehicle leans against the way it slides: any.
+            // In space the angle between lean and drift is not reported, so it can have any value.
             (true, true) => {
                 let (one, other) = ((u * sin + w * cos).abs(), (u * sin - w * cos).abs());
-                let crosses_nought = (u * sin).abs() <= (w * cos).abs();
-                let along = Between {
-                    least: if crosses_nought { 0.0 } else { one.min(other) },
-                    most: one.max(other),
-                };
-                // Rounded below nought it is nought; what is no number stays none.
+                let crosses_zero = (u * sin).abs() <= (w * cos).abs();
+                let along =
+                    Between { least: if crosses_zero { 0.0 } else { one.min(other) }, most: one.max(other) };
+                // Rounding may give a small negative number, which counts as zero; NaN stays NaN.
                 let rest = |along: f64| match u * u + w * w - along * along {
                     below if below < 0.0 => 0.0,
                     squared => squared.sqrt(),
@@ -148,18 +147,18 @@ impl Standard {
     }
 }
 
-/// All of them: broken if one is, kept if all are.
-pub fn together(held: &[Held]) -> Held {
-    if held.contains(&Held::Broken) {
-        Held::Broken
-    } else if held.contains(&Held::Unknown) {
-        Held::Unknown
+/// The verdict over several limits: broken if one is broken, kept if all are kept.
+pub fn overall(held: &[Compliance]) -> Compliance {
+    if held.contains(&Compliance::Broken) {
+        Compliance::Broken
+    } else if held.contains(&Compliance::Unknown) {
+        Compliance::Unknown
     } else {
-        Held::Kept
+        Compliance::Kept
     }
 }
 
-/// A size that lies somewhere between two.
+/// A magnitude that is known to lie between two values.
 #[derive(Debug, Clone, Copy)]
 struct Between {
     least: f64,
@@ -171,16 +170,16 @@ impl Between {
         Self { least: size, most: size }
     }
 
-    /// What is no number keeps no limit.
-    fn at_most(self, limit: f64) -> Held {
+    /// NaN keeps no limit.
+    fn at_most(self, limit: f64) -> Compliance {
         if self.most.is_nan() {
-            Held::Broken
+            Compliance::Broken
         } else if self.most <= limit {
-            Held::Kept
+            Compliance::Kept
         } else if self.least <= limit {
-            Held::Unknown
+            Compliance::Unknown
         } else {
-            Held::Broken
+            Compliance::Broken
         }
     }
 }
@@ -207,44 +206,58 @@ mod tests {
     #[test]
     fn val_landing_paper_tables_3_to_6_judged_by_table_2() {
         let rows = [
-            ([-0.27, 87.28, 0.11, 0.040, 0.80], Held::Kept),
-            ([-8.02, 90.47, -0.29, 0.011, 1.03], Held::Kept),
-            ([0.41, 89.65, 0.019, 0.0020, -0.039], Held::Kept),
-            ([-6.84, 88.18, 0.48, 0.010, 1.69], Held::Broken),
-            ([6.35, 91.50, 0.46, 0.0039, -1.86], Held::Broken),
-            ([-18.08, 93.96, -1.00, 0.083, -0.41], Held::Broken),
-            ([19.85, 82.50, -0.99, -0.069, 1.77], Held::Broken),
+            ([-0.27, 87.28, 0.11, 0.040, 0.80], Compliance::Kept),
+            ([-8.02, 90.47, -0.29, 0.011, 1.03], Compliance::Kept),
+            ([0.41, 89.65, 0.019, 0.0020, -0.039], Compliance::Kept),
+            ([-6.84, 88.18, 0.48, 0.010, 1.69], Compliance::Broken),
+            ([6.35, 91.50, 0.46, 0.0039, -1.86], Compliance::Broken),
+            ([-18.08, 93.96, -1.00, 0.083, -0.41], Compliance::Broken),
+            ([19.85, 82.50, -0.99, -0.069, 1.77], Compliance::Broken),
         ];
         for (figures, expected) in rows {
-            assert_eq!(together(&TABLE_2.judge(&contact(figures), false)), expected, "{figures:?}");
+            assert_eq!(overall(&TABLE_2.judge(&contact(figures), false)), expected, "{figures:?}");
         }
     }
 
     /// In the plane: 0.9 m/s along an axis that leans by 9 degrees is 0.14 m/s over the ground.
     #[test]
-    fn the_legs_are_asked_over_the_ground() {
+    fn the_legs_are_judged_by_speeds_over_the_ground() {
         let leaning = contact([0.0, 81.0, -0.9, 0.0, 3.0]);
-        assert_eq!(LEGS.judge(&leaning, false), [Held::Kept; 6]);
+        assert_eq!(LEGS.judge(&leaning, false), [Compliance::Kept; 6]);
         let sliding = contact([0.0, 81.0, -0.9, -0.6, 3.0]);
         // 0.9 cos 81 + 0.6 sin 81 = 0.73 m/s.
-        assert_eq!(LEGS.judge(&sliding, false)[4], Held::Broken);
-        assert_eq!(LEGS.judge(&sliding, true)[4], Held::Kept, "in space it is reported over the ground");
+        assert_eq!(LEGS.judge(&sliding, false)[4], Compliance::Broken);
+        assert_eq!(
+            LEGS.judge(&sliding, true)[4],
+            Compliance::Kept,
+            "in space it is reported over the ground"
+        );
     }
 
     #[test]
-    fn what_the_figures_do_not_tell_is_not_made_up() {
+    fn a_limit_that_the_values_do_not_decide_is_unknown() {
         // 0.35 m/s down, 0.05 m/s aside, 3 deg of lean, 5 deg/s of rotation of which some is roll.
         let held = TABLE_2.judge(&contact([5.0, 87.0, -0.35, 0.05, 5.0]), true);
-        assert_eq!(held, [Held::Kept, Held::Kept, Held::Kept, Held::Kept, Held::Kept, Held::Unknown]);
-        assert_eq!(together(&held), Held::Unknown);
-        assert_eq!(together(&[Held::Unknown, Held::Broken]), Held::Broken);
+        assert_eq!(
+            held,
+            [
+                Compliance::Kept,
+                Compliance::Kept,
+                Compliance::Kept,
+                Compliance::Kept,
+                Compliance::Kept,
+                Compliance::Unknown
+            ]
+        );
+        assert_eq!(overall(&held), Compliance::Unknown);
+        assert_eq!(overall(&[Compliance::Unknown, Compliance::Broken]), Compliance::Broken);
         let hard = TABLE_2.judge(&contact([5.0, 87.0, -0.8, 0.05, 5.0]), true);
-        assert_eq!((hard[3], together(&hard)), (Held::Broken, Held::Broken));
-        assert_eq!(TABLE_2.judge(&contact([f64::NAN; 5]), true)[2..], [Held::Broken; 4]);
+        assert_eq!((hard[3], overall(&hard)), (Compliance::Broken, Compliance::Broken));
+        assert_eq!(TABLE_2.judge(&contact([f64::NAN; 5]), true)[2..], [Compliance::Broken; 4]);
     }
 
     #[test]
-    fn a_vehicles_limits_are_known_by_their_numbers() {
+    fn a_standard_is_recognised_by_its_limits() {
         let sent = |standard: &Standard| TD_TOUCHDOWN_LIMITS_DATA {
             x_m: 120.0,
             altitude_max_m: 0.2,
@@ -261,9 +274,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whichever way the vehicle leans, its true speeds by the axis lie where they are said to lie.
+        /// Whichever way the vehicle leans, its true axial and lateral speeds lie between the computed bounds.
         #[test]
-        fn the_speeds_by_the_axis_lie_between_their_bounds(
+        fn the_true_axial_and_lateral_speeds_lie_between_their_bounds(
             vertical in -2.0..0.5_f64,
             aside in 0.0..1.0_f64,
             tilt_deg in 0.0..20.0_f64,

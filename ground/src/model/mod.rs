@@ -1,27 +1,33 @@
-//! Everything the ground knows, as plain data.
+//! Everything that the ground knows, as plain data.
+//!
+//! Every received value carries the time of its reception. The model decides nothing, and it imports neither `update`
+//! nor `view`.
 
+pub mod abort_too_late;
+pub mod action;
 pub mod alarm;
+mod auto_step;
 pub mod boot;
 pub mod chord;
 pub mod command;
-mod course;
 pub mod crew;
+pub mod dead_reckoning;
 pub mod dialog;
 pub mod events;
-pub mod flown;
-pub mod hand;
+pub mod flight_so_far;
+pub mod flown_path;
 pub mod history;
 pub mod judgement;
+pub mod key_timing;
 pub mod link;
+pub mod link_state;
 pub mod motion;
 pub mod motor;
-pub mod outcome;
 pub mod page;
 pub mod parameters;
-pub mod reckoning;
 pub mod seat;
 pub mod telemetry;
-pub mod too_late;
+pub mod touchdown;
 pub mod trend;
 pub mod uplink;
 pub mod vehicle;
@@ -30,58 +36,59 @@ pub mod words;
 use std::time::Duration;
 
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::log::record::EventLevel;
+use protocol::log::record::{EventLevel, Record};
+use protocol::log::v1::OperatorAction;
 use protocol::text::Reassembler;
 
-use crate::update::Action;
+use action::Action;
 use alarm::{Alarm, Alarms};
+pub(crate) use auto_step::AutoStep;
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
 use dialog::Dialog;
 use events::{Events, Speaker};
-use hand::Hand;
+use flight_so_far::FlightSoFar;
 use history::History;
+use key_timing::KeyTiming;
 use link::Link;
-use outcome::Outcome;
 use page::{Page, Pages};
 use parameters::Parameters;
 use seat::Seat;
 use vehicle::Vehicle;
 
-/// What the run was asked to be; never changes during it.
+/// The settings of a run, which do not change during it.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// The link's name, as in `udpin:0.0.0.0:14550`.
+    /// The name of the link, as in `udpin:0.0.0.0:14550`.
     pub link_name: String,
-    /// What the link can carry, bytes per second; `None` where nothing is known to bound it.
+    /// The capacity of the link, bytes per second; `None` if no bound is known.
     pub link_capacity_bytes_s: Option<u32>,
-    /// What flies, where that is known beforehand.
+    /// The name of the profile that flies, if it is known beforehand.
     pub vehicle_name: Option<String>,
-    /// The log's path; `None` without a log.
+    /// `None` without a log.
     pub log_path: Option<String>,
-    /// The telemetry log's path (`.tlog`); `None` without one.
+    /// The path of the `.tlog` file; `None` without one.
     pub tlog_path: Option<String>,
     /// The station's own MAVLink address.
     pub us: Address,
-    /// The vehicle's: nobody else on the link is shown or commanded.
+    /// The vehicle's MAVLink address. No other system on the link is shown or commanded.
     pub vehicle: Address,
-    /// What this screen may do.
     pub role: Role,
-    /// This screen and who sits at it.
+    /// This screen and its operator.
     pub seat: Seat,
-    /// The vehicle is simulated in the station's own process.
+    /// Whether the vehicle is simulated in the station's own process.
     pub demonstration: bool,
-    /// Arm and start without a hand.
+    /// Whether the automatic mode arms and starts.
     pub auto: bool,
-    /// Someone watches a screen: the end of a flight does not end the program.
+    /// Whether a person watches a screen; then the end of the flight does not end the program.
     pub interactive: bool,
-    /// Give up after this long without the end of a flight; without a screen only.
+    /// Without a screen: give up if the flight has not ended after this time.
     pub time_limit: Option<Duration>,
 }
 
 impl Settings {
-    /// A station with a person at its screen, and nothing else: no log, a link of unknown capacity, no time limit.
+    /// A station with a person at its screen, without a log or a time limit, on a link of unknown capacity.
     pub fn on_screen(link_name: impl Into<String>) -> Self {
         Self {
             link_name: link_name.into(),
@@ -101,22 +108,22 @@ impl Settings {
     }
 }
 
-/// What this screen may do.
+/// What a screen may do.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Role {
-    /// Holds the link: commands go out here.
+    /// Holds the link and sends the commands.
     #[default]
     Station,
-    /// Shows a station that runs elsewhere, and hands it the crew's commands.
+    /// Shows a station in another process and passes the crew's commands to it.
     Attached,
-    /// Shows a station that runs elsewhere; commands nothing.
+    /// Shows a station in another process and commands nothing.
     Watching,
-    /// Shows a recorded flight; there is nothing to command.
+    /// Shows a recorded flight.
     Replaying,
 }
 
 impl Role {
-    /// Why this screen commands nothing; `None` if it may.
+    /// Why this screen cannot command; `None` if it can.
     pub fn why_not_command(self) -> Option<&'static str> {
         match self {
             Self::Station | Self::Attached => None,
@@ -126,29 +133,27 @@ impl Role {
     }
 }
 
-/// Where a replay is.
+/// The position and speed of a replay.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Playing {
+pub struct Playback {
     /// Time since the first frame.
     pub position: Duration,
     /// Time of the last frame.
     pub length: Duration,
-    /// Flight time per real time.
+    /// Recorded time per real time.
     pub speed: f64,
-    /// Time stands still.
     pub paused: bool,
 }
 
-/// How the log does.
+/// The state of the log writer.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct LogHealth {
-    /// Records that found no room.
+    /// Records dropped because the queue was full.
     pub dropped: u64,
-    /// The writer has failed.
     pub failed: bool,
 }
 
-/// When what is repeated is due next.
+/// When each periodic action is next due.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) heartbeat: Duration,
@@ -156,73 +161,44 @@ pub(crate) struct Due {
     pub(crate) telemetry_record: Duration,
 }
 
-/// How far the automatic mode is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AutoStep {
-    /// Until the checks pass; after a refusal for now, not before some time.
-    WaitForReady {
-        not_before: Duration,
-    },
-    WaitForArmed,
-    Done,
-}
-
-impl Default for AutoStep {
-    fn default() -> Self {
-        Self::WaitForReady { not_before: Duration::ZERO }
-    }
-}
-
-/// Everything known.
+/// Everything that the ground knows.
 #[derive(Debug)]
 pub struct Model {
-    /// What the run was asked to be.
     pub settings: Settings,
-    /// The vehicle, by its telemetry.
+    /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
-    /// The link.
     pub link: Link,
-    /// Commands under way and done.
     pub commands: Commands,
-    /// The open dialog.
     pub dialog: Dialog,
-    /// How far the abort chord is.
     pub abort_chord: AbortChord,
-    /// How the keys come.
-    pub hand: Hand,
-    /// The commanding screens.
+    pub key_timing: KeyTiming,
+    /// Who can command, and from which screens.
     pub crew: Crew,
-    /// The terminal tells a held key's repeats from presses, so that none of them arrives here.
-    pub repeats_told: bool,
-    /// What happened.
+    /// Whether the terminal distinguishes a held key's repeats from presses, so that repeats never arrive here.
+    pub repeats_reported: bool,
     pub events: Events,
-    /// What became of the flight.
-    pub outcome: Outcome,
-    /// How the log does.
+    pub outcome: FlightSoFar,
+    /// The state of the log writer.
     pub log: LogHealth,
-    /// What must be seen, and whether it was.
     pub alarms: Alarms,
-    /// Which screen is shown.
     pub pages: Pages,
-    /// Timeline and greatest values.
     pub history: History,
-    /// The vehicle's parameters.
     pub parameters: Parameters,
-    /// Where a replay is; `None` for a live flight.
-    pub playing: Option<Playing>,
+    /// `None` for a live flight.
+    pub playing: Option<Playback>,
     pub(crate) rebooted_at: Option<Duration>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
-    /// A key to quit was pressed; it counts unless another key follows before this time.
+    /// A key to quit was pressed; the program quits at this time unless another key comes first.
     pub(crate) quit_at: Option<Duration>,
     pub(crate) outbox: Vec<Action>,
 }
 
 impl Model {
-    /// Nothing known yet.
+    /// A model that knows nothing yet.
     ///
-    /// A screen whose station runs elsewhere is told the past first, until [`Self::history_ends`].
+    /// A screen of a station in another process first receives the history, until [`Self::history_ends`].
     pub fn new(settings: Settings) -> Self {
         let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
         let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
@@ -233,11 +209,11 @@ impl Model {
             commands: Commands::default(),
             dialog: Dialog::Closed,
             abort_chord: AbortChord::default(),
-            hand: Hand::default(),
+            key_timing: KeyTiming::default(),
             crew: Crew::default(),
-            repeats_told: false,
+            repeats_reported: false,
             events: Events::default(),
-            outcome: Outcome::default(),
+            outcome: FlightSoFar::default(),
             log: LogHealth::default(),
             alarms,
             pages: Pages::default(),
@@ -253,29 +229,29 @@ impl Model {
         }
     }
 
-    /// Everything that was told so far was the past: what holds of it rings now, what is over does not.
+    /// The history has been received. Alarms that still hold ring from now on; ended ones do not.
     pub fn history_ends(&mut self) {
         self.alarms.history_ends();
     }
 
-    /// Armed, in flight, or being aborted: nobody may go away unawares.
+    /// Whether the vehicle is armed, in flight or being aborted, so that quitting must be confirmed.
     pub fn is_at_risk(&self) -> bool {
         let armed = self.vehicle.armed().is_some_and(|armed| armed.value);
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
     }
 
-    /// When time alone brings something to do before the next tick: the chord, or a command that is sent again.
+    /// When something is due before the next tick: the abort chord, or a command to resend.
     pub fn wakes_at(&self) -> Option<Duration> {
         let times = [self.abort_chord.acts_at(), self.commands.due_at()];
         times.into_iter().flatten().min()
     }
 
-    /// The screen to show.
+    /// The page to show.
     pub fn page(&self) -> Page {
         self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
     }
 
-    /// The alarm that is acknowledged next: the chosen one of the list, or the foremost.
+    /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the foremost.
     pub fn pointed_at(&self) -> Option<&Alarm> {
         let listed = self.page() == Page::Alarms;
         let chosen = self.pages.chosen.filter(|_| listed);
@@ -283,7 +259,7 @@ impl Model {
         chosen.or_else(|| self.alarms.foremost())
     }
 
-    /// Notes an event for the list, the lines and the log.
+    /// Adds an event to the list and to the log.
     pub(crate) fn say(
         &mut self,
         now: Duration,
@@ -294,6 +270,15 @@ impl Model {
         let text = text.into();
         self.outbox.push(Action::event(speaker, level, &text));
         self.events.push(now, speaker, level, text);
+    }
+
+    /// Records in the log what the crew did and what followed.
+    pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, detail: &str) {
+        self.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
+            time_s: now.as_secs_f64(),
+            kind: kind.to_owned(),
+            detail: detail.to_owned(),
+        })));
     }
 
     pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {

@@ -1,8 +1,7 @@
-//! Where the vehicle is, how it stands and how it moves: from north-east-down on the wire to north, east and up.
+//! Position, velocity and attitude of the vehicle: converted from north-east-down on the wire to north, east and up.
 //!
-//! A planar vehicle flies in the plane of north and up and has no east component at all; a vehicle in space has one in
-//! everything. Whether it [has left the plane](Motion::leaves_the_plane) decides how a screen names the numbers, never
-//! how they are computed.
+//! A planar vehicle flies in the plane of north and up and has no east component. Whether a vehicle [has left the
+//! plane](Motion::leaves_the_plane) decides how a screen labels the values, never how they are computed.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,20 +13,19 @@ pub const GRAVITY_M_S2: f64 = 9.806_65;
 /// A direction or a velocity: north, east, up.
 pub type NorthEastUp = [f64; 3];
 
-/// Attitude and rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
-    /// Pitch from the horizontal as it looks from the east; pi/2 is upright.
+    /// Pitch above the horizontal, seen from the east; pi/2 is upright.
     pub pitch_rad: f64,
     /// Angle between nose and vertical, 0 to pi.
     pub tilt_rad: f64,
-    /// Rotation about the body's y axis.
+    /// Rotation rate about the body y axis.
     pub pitch_rate_rad_s: f64,
-    /// Rotation about the body's z axis.
+    /// Rotation rate about the body z axis.
     pub yaw_rate_rad_s: f64,
-    /// The body's axes: x towards the nose, y, z.
+    /// The body axes: x towards the nose, y, z.
     pub axes: [NorthEastUp; 3],
-    /// It leans or turns out of the plane of north and up.
+    /// Whether it leans or turns out of the plane of north and up.
     leaves_the_plane: bool,
 }
 
@@ -53,14 +51,15 @@ pub struct Motion {
 pub struct BodySpeed {
     /// Axial, towards the nose.
     pub u_m_s: f64,
-    /// Lateral, body y axis; nil in the plane.
+    /// Lateral, along the body y axis; zero for a planar vehicle.
     pub v_m_s: f64,
-    /// Lateral, body z axis.
+    /// Lateral, along the body z axis.
     pub w_m_s: f64,
 }
 
 impl Attitude {
-    /// `None` if the quaternion is no rotation. The nose's direction has no singularity upright, where a rocket stands.
+    /// `None` if the quaternion is no rotation. Pitch and tilt come from the direction of the nose, which has no
+    /// singularity at upright.
     pub fn of(data: &ATTITUDE_QUATERNION_DATA) -> Option<Self> {
         let [w, x, y, z] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
         let norm_squared = w * w + x * x + y * y + z * z;
@@ -69,7 +68,7 @@ impl Attitude {
             return None;
         }
         let twice = 2.0 / norm_squared;
-        // Columns of the rotation into north-east-down, the last row turned up.
+        // The columns of the rotation to north-east-down, with the sign of the down row changed.
         let nose = [1.0 - twice * (y * y + z * z), twice * (x * y + w * z), -twice * (x * z - w * y)];
         let body_y = [twice * (x * y - w * z), 1.0 - twice * (x * x + z * z), -twice * (y * z + w * x)];
         let body_z = [twice * (x * z + w * y), twice * (y * z - w * x), twice * (x * x + y * y) - 1.0];
@@ -86,7 +85,7 @@ impl Attitude {
         })
     }
 
-    /// How fast the nose turns, whichever way, rad/s.
+    /// How fast the nose turns, in any direction, rad/s.
     pub fn turn_rate_rad_s(&self) -> f64 {
         libm::hypot(self.pitch_rate_rad_s, self.yaw_rate_rad_s)
     }
@@ -96,14 +95,13 @@ impl Attitude {
         FRAC_PI_2 - self.tilt_rad
     }
 
-    /// It leans or turns out of the plane of north and up.
+    /// Whether it leans or turns out of the plane of north and up.
     pub fn leaves_the_plane(&self) -> bool {
         self.leaves_the_plane
     }
 }
 
 impl Motion {
-    /// From the wire.
     pub fn of(data: &LOCAL_POSITION_NED_DATA) -> Self {
         Self {
             x_m: f64::from(data.x),
@@ -115,35 +113,34 @@ impl Motion {
         }
     }
 
-    /// Altitude and climb alone.
+    /// A motion of which only altitude and climb rate are known.
     pub fn vertical(altitude_m: f64, climb_m_s: f64) -> Self {
         let unknown = f64::NAN;
         Self { x_m: unknown, y_m: unknown, altitude_m, vx_m_s: unknown, vy_m_s: unknown, climb_m_s }
     }
 
-    /// Speed over the ground, whichever way, m/s.
+    /// Horizontal speed, m/s.
     pub fn horizontal_m_s(&self) -> f64 {
         libm::hypot(self.vx_m_s, self.vy_m_s)
     }
 
-    /// Distance from the pad over the ground, m.
+    /// Horizontal distance from the pad, m.
     pub fn distance_m(&self) -> f64 {
         libm::hypot(self.x_m, self.y_m)
     }
 
-    /// Speed, m/s.
     pub fn speed_m_s(&self) -> f64 {
         libm::hypot(self.horizontal_m_s(), self.climb_m_s)
     }
 
-    /// It is or moves beside the plane of north and up.
+    /// Whether it is outside the plane of north and up, or moves out of it.
     pub fn leaves_the_plane(&self) -> bool {
         self.y_m != 0.0 || self.vy_m_s != 0.0
     }
 }
 
 impl BodySpeed {
-    /// The velocity along the body's axes.
+    /// Converts the velocity to the body axes.
     pub fn of(attitude: &Attitude, motion: &Motion) -> Self {
         let along = |axis: &NorthEastUp| {
             axis[0] * motion.vx_m_s + axis[1] * motion.vy_m_s + axis[2] * motion.climb_m_s
@@ -152,7 +149,7 @@ impl BodySpeed {
         Self { u_m_s: along(x), v_m_s: along(y), w_m_s: along(z) }
     }
 
-    /// Speed across the axis, whichever way, m/s.
+    /// Speed across the body axis, m/s.
     pub fn lateral_m_s(&self) -> f64 {
         libm::hypot(self.v_m_s, self.w_m_s)
     }
@@ -172,8 +169,8 @@ mod tests {
         assert!((found - expected).abs() < 1e-5, "{found} is not {expected}");
     }
 
-    /// A rocket that leans 10 deg towards the east, which nothing in the plane of north and up shows: a turn about
-    /// north by 10 deg after one about east by 90 deg.
+    /// A rocket that leans 10 deg towards the east, which the plane of north and up does not show: a rotation about
+    /// east by 90 deg, then about north by 10 deg.
     #[test]
     fn a_lean_towards_the_east_is_a_tilt() {
         let (sin, cos) = libm::sincos(5.0_f64.to_radians());
@@ -195,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_towards_the_east_has_a_speed_and_a_distance() {
+    fn motion_towards_the_east_counts_in_speed_and_distance() {
         let wire = LOCAL_POSITION_NED_DATA {
             x: 3.0,
             y: -4.0,
@@ -214,9 +211,9 @@ mod tests {
     }
 
     proptest! {
-        /// A rotation changes no length: the body's axes share the speed out among themselves.
+        /// A rotation keeps the length: the components along the body axes make up the whole speed.
         #[test]
-        fn the_bodys_axes_share_the_whole_speed(
+        fn the_components_along_the_body_axes_make_up_the_whole_speed(
             q in prop::array::uniform4(-1.0..1.0_f64),
             v in prop::array::uniform3(-50.0..50.0_f64),
         ) {

@@ -1,38 +1,37 @@
-//! Whether anybody may walk up to the vehicle, by what it reports of its landing motor; and why its countdown was held.
+//! Whether people may approach the vehicle, from what it reports about its landing motor; and why its countdown was
+//! held.
 
 use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdHold, TdInterlock, TdMotor, TdPhase};
 
 use super::vehicle::{Vehicle, is_on_pad};
 
-/// Why nobody may come near, the worst first.
+/// Why nobody may approach, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Danger {
-    /// Not lit, and nothing but software keeps it from it.
+    /// The motor is not lit, and only software keeps it from lighting.
     Live,
-    /// The same, and the time for which nobody may come near has passed: whoever puts the pin in may.
+    /// The same after the waiting time: a person may approach to insert the pin.
     LiveWaited,
-    /// Commanded to light, or burning.
+    /// The motor burns or has been commanded to light.
     Burning,
-    /// After a flight nothing was reported of it.
+    /// After a flight the vehicle reports nothing about the motor.
     NotReported,
-    /// Burnt out, and hot.
+    /// The motor is burnt out and still hot.
     Hot,
-    /// After an abort on the pad.
+    /// The waiting time after an abort on the pad.
     Wait,
 }
 
-/// What keeps people away from the vehicle, and for how long.
+/// Why people must stay away from the vehicle, and for how long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KeepAway {
-    /// Why.
     pub danger: Danger,
-    /// For how long, s; `None` while that cannot be said.
+    /// For how long, s; `None` while it is unknown.
     pub wait_s: Option<u16>,
 }
 
 impl KeepAway {
-    /// What it says now. `None` where people are where they should be: beside a vehicle that is made ready, and
-    /// on the ground below one that flies as it should.
+    /// The present warning. `None` while a vehicle is being prepared, and while it flies as planned.
     pub fn of(vehicle: &Vehicle) -> Option<Self> {
         let status = &vehicle.status.as_ref()?.value;
         let approach_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
@@ -54,7 +53,7 @@ impl KeepAway {
         Some(Self { danger, wait_s })
     }
 
-    /// For the crew, with the time.
+    /// The warning in words, with the waiting time.
     pub fn words(&self) -> String {
         let until = match self.wait_s {
             Some(wait_s) if wait_s > 0 => format!(" for {wait_s} s"),
@@ -62,25 +61,26 @@ impl KeepAway {
         };
         match self.danger {
             Danger::Live => format!("LIVE MOTOR: do not approach{until}"),
-            Danger::LiveWaited => "LIVE MOTOR: do not approach, but to put the pin in".to_owned(),
+            Danger::LiveWaited => "LIVE MOTOR: approach only to put the pin in".to_owned(),
             Danger::Burning => "MOTOR BURNING: do not approach".to_owned(),
-            Danger::NotReported => "MOTOR NOT REPORTED: take it for live, do not approach".to_owned(),
+            Danger::NotReported => "MOTOR NOT REPORTED: treat as live, do not approach".to_owned(),
             Danger::Hot => format!("MOTOR HOT: burnt out, do not touch{until}"),
             Danger::Wait => format!("STAY OFF THE PAD{until}"),
         }
     }
 }
 
-/// Whether it matters to people on the ground: the flight is over, or goes otherwise than it should, or a wait runs.
+/// Whether the motor matters to people on the ground: the flight is over or does not go as planned, or a waiting time
+/// runs.
 fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     let amiss = TdInterlock::TD_INTERLOCK_ABORT_LATCHED
         | TdInterlock::TD_INTERLOCK_NO_LIGHT
         | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
     match status.phase {
         TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED | TdPhase::TD_PHASE_CHUTE => true,
-        // Whoever arms and starts it is told by other words.
+        // The arming ladder shows this state to the crew.
         TdPhase::TD_PHASE_PAD_ARMED => false,
-        // Before a flight the motor is inhibited as it should be.
+        // Before a flight the motor is inhibited as planned.
         phase if is_on_pad(phase) => {
             let latched = status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
             latched || status.approach_wait_s > 0 || status.pad_wait_s > 0
@@ -89,7 +89,7 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     }
 }
 
-/// Why the countdown was held and what follows from it; `None` while it is not held.
+/// Why the countdown was held and what happens next; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
     let whom = if armed_here { "this station" } else { "its station" };

@@ -1,10 +1,9 @@
-//! The screens a crew leafs through: the flight chooses one, a key holds another.
+//! The pages of the screen: the flight phase chooses one, unless the crew holds another by its key.
 
 use protocol::dialect::TdPhase;
 
 use super::alarm::AlarmKind;
 
-/// One screen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {
     /// Arming checks and the arming ladder.
@@ -13,24 +12,22 @@ pub enum Page {
     Descent,
     /// The burn: side view, controller, actuators.
     Landing,
-    /// The flight, judged.
+    /// The verdict, greatest values and timeline of the flight.
     Review,
     /// The link's figures and the age of every message.
     Link,
-    /// Everything that was said.
+    /// The event list.
     Messages,
-    /// The vehicle's parameters.
     Parameters,
-    /// The recording.
+    /// The state of the recording.
     Log,
     /// Every alarm, to be acknowledged one by one.
     Alarms,
-    /// The keys.
     Help,
 }
 
 impl Page {
-    /// Every screen that has a digit, in its order; help has `?`.
+    /// The pages with a digit, in that order; help has `?`.
     pub const ALL: [Self; 9] = [
         Self::Pad,
         Self::Descent,
@@ -43,19 +40,19 @@ impl Page {
         Self::Alarms,
     ];
 
-    /// The key that shows it.
+    /// The key that shows the page.
     pub fn key(self) -> char {
         let digit = Self::ALL.iter().position(|page| *page == self).map(|place| place as u32 + 1);
         digit.and_then(|digit| char::from_digit(digit, 10)).unwrap_or('?')
     }
 
-    /// The screen of a digit.
+    /// The page of a digit.
     pub fn from_digit(digit: char) -> Option<Self> {
         let number = usize::try_from(digit.to_digit(10)?).ok()?;
         Self::ALL.get(number.checked_sub(1)?).copied()
     }
 
-    /// The name on the screen.
+    /// The name shown at the bottom of the screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pad => "Pad",
@@ -71,7 +68,7 @@ impl Page {
         }
     }
 
-    /// The screen that belongs to a phase.
+    /// The page for a phase.
     pub fn of_phase(phase: TdPhase) -> Self {
         match phase {
             TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => Self::Pad,
@@ -87,24 +84,24 @@ impl Page {
     }
 }
 
-/// Which screen is shown, and how far its list is scrolled.
+/// Which page is shown, and how far its list is scrolled.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Pages {
-    /// The screen that the crew holds; `None` follows the flight.
+    /// The page that the crew holds; `None` follows the flight.
     pub held: Option<Page>,
-    /// Lines that a list is scrolled back from its newest, or down from its first.
+    /// How many lines a list is scrolled back from its newest line, or down from its first.
     pub scroll: usize,
-    /// The alarm that the list of alarms points at; `None` for the foremost.
+    /// The alarm chosen in the list of alarms; `None` for the foremost.
     pub chosen: Option<AlarmKind>,
 }
 
 impl Pages {
-    /// The screen to show in this phase.
+    /// The page to show in this phase.
     pub fn shown(self, phase: Option<TdPhase>) -> Page {
         self.held.unwrap_or_else(|| phase.map_or(Page::Pad, Page::of_phase))
     }
 
-    /// Holds a screen, or follows the flight again.
+    /// Holds a page; `None` follows the flight again.
     pub fn hold(&mut self, page: Option<Page>) {
         *self = Self { held: page, ..Self::default() };
     }
@@ -115,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_screen_has_its_digit() {
+    fn every_page_has_its_digit() {
         for page in Page::ALL {
             assert_eq!(Page::from_digit(page.key()), Some(page));
         }
@@ -126,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flight_chooses_unless_a_screen_is_held() {
+    fn the_phase_chooses_the_page_unless_one_is_held() {
         let mut pages = Pages::default();
         assert_eq!(pages.shown(None), Page::Pad);
         assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_AERO_DESCENT)), Page::Descent);

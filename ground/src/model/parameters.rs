@@ -1,13 +1,13 @@
-//! The vehicle's parameters, as it has told them.
+//! The vehicle's parameters, as received.
 
 use std::collections::BTreeMap;
 
 use protocol::dialect::PARAM_VALUE_DATA;
 
-/// Parameters kept; a vehicle that invents names cannot grow memory.
+/// How many parameters are kept, so that a vehicle that keeps sending new names cannot fill the memory.
 const KEPT_MAX: usize = 1_024;
 
-/// Name to value, and how many there are to be.
+/// The values by name, and how many the vehicle has.
 #[derive(Debug, Clone, Default)]
 pub struct Parameters {
     known: BTreeMap<String, f64>,
@@ -17,17 +17,14 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// By name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.known.iter().map(|(name, value)| (name.as_str(), *value))
     }
 
-    /// How many are known.
     pub fn len(&self) -> usize {
         self.known.len()
     }
 
-    /// None is known.
     pub fn is_empty(&self) -> bool {
         self.known.is_empty()
     }

@@ -1,28 +1,27 @@
-//! A screen, and who sits at it.
+//! A seat: a screen of the station and the operator who sits at it.
 
 use std::fmt;
 
-/// Who commands, and from which screen of a station. Screens are numbered by their station, from 1.
+/// An operator at a screen. The station numbers its screens from 1.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Seat {
     /// The screen's number; 0 for none.
     pub screen: u32,
-    /// Who sits there, as in `anna on pts/3`; empty where nobody said.
+    /// The operator, as in `anna on pts/3`; empty if unknown.
     pub operator: String,
 }
 
 impl Seat {
-    /// The station's own screen, or an attached one's.
     pub fn new(screen: u32, operator: impl Into<String>) -> Self {
         Self { screen, operator: operator.into() }
     }
 
-    /// No hand: the automatic mode.
+    /// The automatic mode, which has no screen.
     pub fn automatic() -> Self {
         Self::new(0, "automatic mode")
     }
 
-    /// Behind a command's words, as in ` (screen 2, anna on pts/3)`; nothing where nothing is known.
+    /// For the end of a text, as in ` (screen 2, anna on pts/3)`; empty if nothing is known.
     pub fn in_brackets(&self) -> String {
         let words = self.to_string();
         if words.is_empty() { words } else { format!(" ({words})") }

@@ -1,4 +1,4 @@
-//! Messages into the model: units, axes and ranges of the wire into those of the house.
+//! Takes MAVLink messages into the model and converts units, axes and ranges.
 
 use std::time::Duration;
 
@@ -7,21 +7,23 @@ use protocol::dialect::{
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
 };
 
-use super::boot::Spoken;
+use super::boot::MessageBoot;
 use super::motion::{Attitude, Motion};
+use super::touchdown::Touchdown;
 use super::vehicle::{
     Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
 };
-use crate::limits::Touchdown;
 
-/// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted, in which
-/// case everything it said before is forgotten first. What a boot that is over has said is not taken.
+/// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted; then everything received
+/// before is dropped first. Messages of a former boot are ignored.
 pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
     let spoken = vehicle.boot.hear(message);
     match spoken {
-        Spoken::Present => {}
-        Spoken::New => *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() },
-        Spoken::Former => return false,
+        MessageBoot::Present => {}
+        MessageBoot::New => {
+            *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() }
+        }
+        MessageBoot::Former => return false,
     }
     match message {
         MavMessage::HEARTBEAT(data) => {
@@ -86,7 +88,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
     } else if vehicle.phase().is_some_and(|phase| is_on_pad(phase.value)) {
         vehicle.left_pad_at = None;
     }
-    spoken == Spoken::New
+    spoken == MessageBoot::New
 }
 
 fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
@@ -97,7 +99,7 @@ fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
     }
 }
 
-/// The phase of a HEARTBEAT's `custom_mode`; `None` for a number the dialect does not have.
+/// The phase for the `custom_mode` of a HEARTBEAT; `None` for a number that is not in the dialect.
 pub fn phase_from_number(number: u32) -> Option<TdPhase> {
     use TdPhase as P;
     let phases = [
@@ -210,14 +212,14 @@ mod tests {
         let (u, w) = speeds(60.0, 0.0, 1.0);
         close(u, -0.866_025);
         close(w, 0.5);
-        // Leaning over the other way, past the vertical.
+        // Leaning to the other side of the vertical.
         let (u, w) = speeds(120.0, 0.0, 1.0);
         close(u, -0.866_025);
         close(w, -0.5);
     }
 
     #[test]
-    fn pitch_passes_the_vertical_without_a_jump_and_tilt_counts_from_it() {
+    fn pitch_has_no_jump_at_the_vertical_and_tilt_is_measured_from_it() {
         for pitch_deg in [10.0, 60.0, 89.0, 90.0, 91.0, 120.0] {
             let mut vehicle = Vehicle::default();
             apply(&mut vehicle, &at_pitch(pitch_deg), NOW);
@@ -228,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quaternion_that_is_no_rotation_is_not_taken() {
+    fn an_invalid_quaternion_is_ignored() {
         let mut vehicle = Vehicle::default();
         let zero = MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA::default());
         apply(&mut vehicle, &zero, NOW);
@@ -236,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_known_before_a_reboot_is_forgotten_and_what_the_boot_before_says_is_not_taken() {
+    fn a_reboot_drops_old_values_and_late_messages_of_the_former_boot_are_ignored() {
         let status = |boot_number| {
             MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA { boot_number, ..Default::default() })
         };
@@ -251,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn every_phase_number_has_its_name_and_others_have_none() {
+    fn every_phase_number_of_the_dialect_is_known_and_no_other() {
         for number in 0..=12 {
             assert_eq!(phase_from_number(number).map(|phase| phase as u32), Some(number));
         }

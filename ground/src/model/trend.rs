@@ -1,4 +1,4 @@
-//! How the velocity changed of late: the acceleration that telemetry shows, gravity included.
+//! The mean acceleration over the last second of telemetry, gravity included.
 
 use std::collections::VecDeque;
 
@@ -6,14 +6,15 @@ use protocol::dialect::TdPhase;
 
 use super::motion::{Motion, NorthEastUp};
 
-/// What is older than this is not of late.
+/// Older velocities are dropped.
 const SPAN_MS: u32 = 1_000;
-/// Over less than this a difference of speeds is noise.
+/// Over a shorter time the difference of two velocities is mostly noise.
 const SPAN_MIN_MS: u32 = 300;
-/// Samples kept; a vehicle that reports faster loses nothing by it.
+/// How many samples are kept at most.
 const KEPT: usize = 64;
 
-/// Velocities of the last second under the same forces, by the vehicle's own clock: a radio's hesitation is no acceleration.
+/// The velocities of the last second under the same forces, by the vehicle's clock, so that radio delays do not look
+/// like accelerations.
 #[derive(Debug, Clone, Default)]
 pub struct Trend {
     acting: Option<TdPhase>,
@@ -21,9 +22,9 @@ pub struct Trend {
 }
 
 impl Trend {
-    /// Takes what was reported. Where other forces act from a phase on, it begins anew.
+    /// Adds a velocity. When a phase with other forces begins, older velocities are dropped.
     pub(crate) fn note(&mut self, boot_ms: u32, motion: &Motion, phase: Option<TdPhase>) {
-        let acting = phase.map(as_forces_go);
+        let acting = phase.map(phase_by_forces);
         if acting != self.acting {
             *self = Self { acting, ..Self::default() };
         }
@@ -41,8 +42,8 @@ impl Trend {
         self.velocities.push_back((boot_ms, velocity));
     }
 
-    /// The change; `None` while too little was heard since other forces acted.
-    pub fn of_late(&self) -> Option<Change> {
+    /// The mean acceleration; `None` while too little has been received under the present forces.
+    pub fn mean_change(&self) -> Option<Change> {
         let ((from_ms, from), (to_ms, to)) = (self.velocities.front()?, self.velocities.back()?);
         let span_ms = to_ms - from_ms;
         let span_s = f64::from(span_ms) / 1_000.0;
@@ -53,17 +54,15 @@ impl Trend {
     }
 }
 
-/// A change of velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
-    /// How fast, m/s2.
     pub acceleration_m_s2: NorthEastUp,
-    /// At which velocity, m/s: half-way between before and after.
+    /// The mean velocity, m/s.
     pub velocity_m_s: NorthEastUp,
 }
 
-/// One phase for those in which the same forces act: an armed motor pulls no more than an unarmed one.
-fn as_forces_go(phase: TdPhase) -> TdPhase {
+/// Maps phases with the same forces to one phase: arming the motor changes no force.
+fn phase_by_forces(phase: TdPhase) -> TdPhase {
     match phase {
         TdPhase::TD_PHASE_LAND_ARMED | TdPhase::TD_PHASE_IGNITION => TdPhase::TD_PHASE_AERO_DESCENT,
         other => other,
@@ -87,18 +86,18 @@ mod tests {
     }
 
     fn acceleration(trend: &Trend) -> Option<NorthEastUp> {
-        trend.of_late().map(|change| change.acceleration_m_s2)
+        trend.mean_change().map(|change| change.acceleration_m_s2)
     }
 
     #[test]
     fn it_is_the_change_over_the_last_second() {
         let trend = noted(&[(0, 90.0), (1_000, 10.0), (1_500, 14.0), (2_000, 18.0)], TdPhase::TD_PHASE_COAST);
         assert_eq!(acceleration(&trend), Some([0.0, 0.0, -8.0]));
-        assert_eq!(trend.of_late().map(|change| change.velocity_m_s), Some([1.0, 0.0, -14.0]));
+        assert_eq!(trend.mean_change().map(|change| change.velocity_m_s), Some([1.0, 0.0, -14.0]));
     }
 
     #[test]
-    fn too_short_a_time_says_nothing_and_neither_do_other_forces() {
+    fn too_short_a_time_gives_nothing_and_other_forces_start_over() {
         let mut trend = noted(&[(1_000, 10.0), (1_200, 12.0)], TdPhase::TD_PHASE_COAST);
         assert_eq!(acceleration(&trend), None);
         trend.note(1_400, &falling(14.0), Some(TdPhase::TD_PHASE_COAST));
@@ -111,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_late_or_is_no_number_is_passed_over() {
+    fn late_and_non_finite_velocities_are_ignored() {
         let mut trend = noted(&[(1_000, 10.0), (1_500, 15.0), (1_400, 99.0)], TdPhase::TD_PHASE_COAST);
         trend.note(1_600, &falling(f64::NAN), Some(TdPhase::TD_PHASE_COAST));
         assert_eq!(acceleration(&trend), Some([0.0, 0.0, -10.0]));

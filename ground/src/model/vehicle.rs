@@ -1,4 +1,4 @@
-//! The vehicle as its telemetry shows it. Every value knows when it was received.
+//! The vehicle as its telemetry shows it. Every value carries the time at which it was received.
 
 use std::time::Duration;
 
@@ -8,10 +8,10 @@ use protocol::dialect::{
 };
 
 use super::boot::Boot;
-use super::flown::Flown;
+use super::flown_path::FlownPath;
 use super::motion::{Attitude, BodySpeed, Motion};
+use super::touchdown::Touchdown;
 use super::trend::Trend;
-use crate::limits::Touchdown;
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
@@ -19,19 +19,17 @@ pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
 /// A value and when it was received.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<T> {
-    /// The value.
     pub value: T,
-    /// Since the start of the run.
+    /// Time of reception, since the start of the run.
     pub received_at: Duration,
 }
 
 impl<T> Sample<T> {
-    /// A value received now.
     pub fn new(value: T, now: Duration) -> Self {
         Self { value, received_at: now }
     }
 
-    /// What is read from the value, as old as it.
+    /// Converts the value and keeps its time.
     pub fn map<U>(self, read: impl FnOnce(&T) -> U) -> Sample<U> {
         Sample { value: read(&self.value), received_at: self.received_at }
     }
@@ -41,18 +39,17 @@ impl<T> Sample<T> {
         now.saturating_sub(self.received_at)
     }
 
-    /// Whether it is too old to be taken for the present.
+    /// Whether it is too old to count as current.
     pub fn is_stale(&self, now: Duration) -> bool {
         self.age(now) > STALE_AFTER
     }
 }
 
-/// HEARTBEAT.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heartbeat {
-    /// What the vehicle itself says about being armed: the only truth about it.
+    /// Whether the vehicle says that it is armed: the only source for it.
     pub armed: bool,
-    /// Phase, unless its number is unknown.
+    /// The phase, unless its number is unknown.
     pub phase: Option<TdPhase>,
     /// `MAV_STATE_FLIGHT_TERMINATION`.
     pub terminated: bool,
@@ -61,88 +58,76 @@ pub struct Heartbeat {
 /// Commanded and measured angle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deflection {
-    /// What the controller asked for.
+    /// What the controller commanded.
     pub commanded_rad: f64,
-    /// Where it is.
+    /// What the sensor measured.
     pub measured_rad: f64,
 }
 
 /// Gimbal in both planes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gimbal {
-    /// Pitch plane.
     pub pitch: Deflection,
-    /// Yaw plane.
     pub yaw: Deflection,
 }
 
-/// The end of the controller's plan.
+/// The predicted end of the controller's plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
-    /// Time from then to the end.
+    /// Time from the report to the touchdown.
     pub time_to_go_s: f64,
-    /// The state there.
+    /// The predicted state at touchdown.
     pub touchdown: Touchdown,
 }
 
 /// The vehicle's own verdict on its landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// Inside every limit.
+    /// Whether it landed inside every limit.
     pub landed: bool,
     /// The state at contact.
     pub touchdown: Touchdown,
 }
 
-/// Everything the vehicle said last.
+/// The last value of everything that the vehicle reports.
 #[derive(Debug, Clone, Default)]
 pub struct Vehicle {
-    /// HEARTBEAT.
     pub heartbeat: Option<Sample<Heartbeat>>,
-    /// `TD_FLIGHT_STATUS`.
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
-    /// `ATTITUDE_QUATERNION`.
     pub attitude: Option<Sample<Attitude>>,
-    /// `LOCAL_POSITION_NED`.
     pub motion: Option<Sample<Motion>>,
     /// `VFR_HUD`: altitude and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
-    /// `TD_FINS`.
     pub fins: Option<Sample<[Deflection; 4]>>,
-    /// `TD_GIMBAL`.
     pub gimbal: Option<Sample<Gimbal>>,
-    /// `TD_DESCENT`.
     pub descent: Option<Sample<TD_DESCENT_DATA>>,
-    /// `TD_CONTROLLER`.
     pub controller: Option<Sample<TD_CONTROLLER_DATA>>,
-    /// `TD_TOUCHDOWN_PREDICTION`.
     pub prediction: Option<Sample<Prediction>>,
     /// `TD_PREDICTED_PATH`: x and altitude, m.
     pub path: Option<Sample<Vec<(f64, f64)>>>,
-    /// `TD_LANDING_VERDICT`.
     pub verdict: Option<Sample<Verdict>>,
     /// `TD_TOUCHDOWN_LIMITS`: what counts as a landing for this vehicle.
     pub limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
     /// `EXTENDED_SYS_STATE`: on the ground or not.
     pub on_ground: Option<Sample<bool>>,
-    /// `SYS_STATUS`: the vehicle's own arming checks pass.
+    /// `SYS_STATUS`: whether the vehicle's arming checks pass.
     pub ready_to_arm: Option<Sample<bool>>,
-    /// How its velocity changed of late.
+    /// The recent change of its velocity.
     pub trend: Trend,
-    /// Where it flew.
-    pub flown: Flown,
-    /// The part of it under the landing motor's thrust, from the command to light it on.
-    pub burn: Flown,
-    /// It has been seen beside the plane of north and up, or leaning out of it: a planar vehicle never is.
+    /// The path it flew.
+    pub flown: FlownPath,
+    /// The path since the landing motor was commanded to light.
+    pub burn: FlownPath,
+    /// Whether it has ever been outside the plane of north and up, or leaned out of it. A planar vehicle never does.
     pub in_space: bool,
-    /// When it was first heard to have left the pad.
+    /// When the ground first received a phase of flight.
     pub left_pad_at: Option<Duration>,
-    /// Which boot of it this is.
+    /// The present boot of the vehicle.
     pub boot: Boot,
 }
 
 impl Vehicle {
-    /// The phase, from whichever message said so last.
+    /// The phase, from the newer of its two sources.
     pub fn phase(&self) -> Option<Sample<TdPhase>> {
         let status = self.status.as_ref().map(|status| Sample::new(status.value.phase, status.received_at));
         let heartbeat = self.heartbeat.and_then(|heartbeat| {
@@ -155,22 +140,21 @@ impl Vehicle {
         }
     }
 
-    /// Armed by the vehicle's own heartbeat; `None` before the first.
+    /// Whether it is armed, from its heartbeat; `None` before the first.
     pub fn armed(&self) -> Option<Sample<bool>> {
         self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
     }
 
-    /// Whether it has always said of itself that nothing of it burns. Unknown counts as not.
+    /// Whether it has always reported to be simulated. Unknown counts as real.
     pub fn is_simulated(&self) -> bool {
         self.boot.is_simulated()
     }
 
-    /// The interlocks, if known.
     pub fn interlocks(&self) -> Option<TdInterlock> {
         self.status.as_ref().map(|status| status.value.interlocks)
     }
 
-    /// Whether the landing motor can still be lit: nothing latched forbids it. Unknown counts as not.
+    /// Whether the landing motor can still be lit: no latch forbids it. Unknown counts as no.
     pub fn may_light(&self) -> bool {
         let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
             | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
@@ -179,12 +163,12 @@ impl Vehicle {
         !chute && self.interlocks().is_some_and(|locks| !locks.intersects(never))
     }
 
-    /// Left the pad and not yet at rest.
+    /// Whether it has left the pad and is not yet at rest.
     pub fn in_flight(&self) -> bool {
         self.phase().is_some_and(|phase| is_flight(phase.value))
     }
 
-    /// Time to release, s (negative: since ignition), if a countdown is known.
+    /// Time to release, s (negative after ignition), if a countdown is known.
     pub fn countdown_s(&self) -> Option<Sample<f64>> {
         let status = self.status.as_ref()?;
         let known = status.value.countdown_ms != i32::MAX;
@@ -202,13 +186,13 @@ impl Vehicle {
         }
     }
 
-    /// Height above the pad, m: of position and velocity while they are heard, else as the descent is steered by it. Every
-    /// place on the screen shows this one.
+    /// Height above the pad, m: from the position while it is fresh, otherwise from `TD_DESCENT`. Every part of the
+    /// screen shows this value.
     pub fn height_m(&self) -> Option<Sample<f64>> {
         self.newer(|motion| motion.altitude_m, |descent| descent.height_m)
     }
 
-    /// Vertical speed, up, m/s; likewise.
+    /// Vertical speed, up, m/s; from the same source.
     pub fn vertical_m_s(&self) -> Option<Sample<f64>> {
         self.newer(|motion| motion.climb_m_s, |descent| descent.vertical_speed_m_s)
     }
@@ -235,50 +219,49 @@ impl Vehicle {
         }
     }
 
-    /// Time from now until the landing motor is to be lit, s, as old as what it was told by. It runs on between two messages.
-    /// `None` where it will not be lit, or is over.
+    /// Time from now until the landing motor is to be lit, s. It keeps counting between two messages. `None` if the
+    /// motor will not be lit, or the time has passed.
     pub fn ignition_in_s(&self, now: Duration) -> Option<Sample<f64>> {
         let descent = self.descent.as_ref().filter(|_| self.may_light())?;
         let told_s = f64::from(descent.value.time_to_ignition_s);
-        runs_on(Sample { value: told_s, received_at: descent.received_at }, now)
+        count_down(Sample { value: told_s, received_at: descent.received_at }, now)
     }
 
-    /// Time from now until the plan ends on the ground, s; likewise.
+    /// Time from now until the predicted touchdown, s; it also keeps counting.
     pub fn touchdown_in_s(&self, now: Duration) -> Option<Sample<f64>> {
-        runs_on(self.prediction?.map(|prediction| prediction.time_to_go_s), now)
+        count_down(self.prediction?.map(|prediction| prediction.time_to_go_s), now)
     }
 
-    /// Speeds along the body's axes, as old as the older of attitude and velocity.
+    /// Speeds along the body axes, with the age of the older of attitude and velocity.
     pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
         let (attitude, motion) = (self.attitude?, self.motion?);
         let speed = BodySpeed::of(&attitude.value, &motion.value);
         Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
     }
 
-    /// The plan's path where it is one of this moment: under thrust, and of the rehearsal on the pad.
+    /// The planned path while it is current: under thrust, and during the rehearsal on the pad.
     pub fn planned(&self) -> &[(f64, f64)] {
         let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
         self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
     }
 }
 
-fn runs_on(told_s: Sample<f64>, now: Duration) -> Option<Sample<f64>> {
+fn count_down(told_s: Sample<f64>, now: Duration) -> Option<Sample<f64>> {
     let left_s = told_s.value - told_s.age(now).as_secs_f64();
     (left_s.is_finite() && left_s >= 0.0).then_some(Sample { value: left_s, ..told_s })
 }
 
-/// Between leaving the pad and coming to rest.
+/// Whether a phase lies between leaving the pad and coming to rest.
 pub fn is_flight(phase: TdPhase) -> bool {
     (TdPhase::TD_PHASE_BOOST as u32..=TdPhase::TD_PHASE_POWERED as u32).contains(&(phase as u32))
         || phase == TdPhase::TD_PHASE_CHUTE
 }
 
-/// Whether the landing motor burns or is about to.
+/// Whether the landing motor burns or is being lit.
 pub fn is_burning(phase: TdPhase) -> bool {
     matches!(phase, TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED)
 }
 
-/// On the pad.
 pub fn is_on_pad(phase: TdPhase) -> bool {
     (phase as u32) <= TdPhase::TD_PHASE_PAD_ARMED as u32
 }

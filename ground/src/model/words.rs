@@ -1,4 +1,4 @@
-//! Numbers of the dialect in an operator's words.
+//! Turns values of the dialect into words for the crew.
 
 use std::fmt::Debug;
 
@@ -10,19 +10,19 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
-/// A boot's number, in the fewest characters.
+/// A boot number as eight hexadecimal digits.
 pub fn boot(number: u32) -> String {
     format!("{number:08X}")
 }
 
-/// The phase of a name, in any case.
+/// The phase with this name, in upper or lower case.
 pub fn phase_from_name(name: &str) -> Option<TdPhase> {
     (0..=u32::from(u8::MAX))
         .map_while(phase_from_number)
         .find(|known| phase(*known).eq_ignore_ascii_case(name))
 }
 
-/// A dialect's enum value as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not run`.
+/// An enum value of the dialect as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not run`.
 pub fn lower_case(value: &impl Debug, prefix: &str) -> String {
     without_prefix(value, prefix).to_lowercase().replace('_', " ")
 }
@@ -32,14 +32,14 @@ fn without_prefix(value: &impl Debug, prefix: &str) -> String {
     name.strip_prefix(prefix).unwrap_or(&name).to_owned()
 }
 
-/// What an abort would lead to now, the consequence first.
+/// What an abort would do now, the consequence first.
 pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
     let words = match status.abort_effect {
         TdAbortEffect::TD_ABORT_EFFECT_NONE => "nothing is left to abort",
         TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD => "disarm and inhibit on the pad",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "parachute at apogee, landing motor inhibited",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "parachute NOW, landing motor inhibited",
-        // Of older vehicles, which do not say which.
+        // Sent by older vehicles, which do not distinguish the two.
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
         TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
         TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE => "lands here, no cut-off exists",
@@ -49,13 +49,13 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
     words.to_owned()
 }
 
-/// A fall to the ground, with its speed there unless that is unknown.
+/// An impact, with its speed if known.
 fn impact(speed_m_s: u8) -> String {
     let speed = if speed_m_s == u8::MAX { String::new() } else { format!(" at about {speed_m_s} m/s") };
     format!("IMPACT{speed}, too low for a chute")
 }
 
-/// The failing checks' names.
+/// The names of the failing checks.
 pub fn failed_checks(checks: TdCheck) -> Vec<String> {
     let words = |name: &str| name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
     checks.iter_names().map(|(name, _)| words(name)).collect()
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_is_told_by_what_it_leads_to() {
+    fn an_abort_is_described_by_its_consequence() {
         let words = |effect, abort_impact_m_s| {
             let status = TD_FLIGHT_STATUS_DATA {
                 abort_effect: effect,

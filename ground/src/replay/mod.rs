@@ -1,8 +1,8 @@
-//! A recorded flight on the same screens.
+//! Plays a recorded flight on the same screens.
 //!
-//! [`film`] reads a log into frames with their times; [`player`] turns time into messages for the model:
-//! the same `update` that takes a radio's frames takes a log's. Nothing is sent, nothing is recorded.
+//! [`recording`] reads a log; [`player`] turns its events into messages for the same `update` that handles live
+//! frames. Nothing is sent or recorded.
 
-pub mod film;
-mod footage;
+mod log_events;
 pub mod player;
+pub mod recording;

@@ -1,49 +1,49 @@
-//! Time over a film: pause, speed, seek. Pure: it is told how much time has passed.
+//! Plays a recording: pause, speed, seek. It reads no clock; the caller passes the elapsed time.
 
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use super::film::{Film, Reel, Scene};
+use super::recording::{Reader, RecordedEvent, Recording};
 use crate::key::Key;
 use crate::model::page::Page;
-use crate::model::{Model, Playing, Settings};
+use crate::model::{Model, Playback, Settings};
 use crate::update::{Msg, update};
 
-/// The clock of a replay ticks as the run loop's does.
+/// The tick period, as in the live run loop.
 const TICK: Duration = Duration::from_millis(100);
-/// Left and Right.
+/// How far Left and Right seek.
 const SEEK: Duration = Duration::from_secs(5);
-/// Slowest and fastest, in powers of two.
+/// The range of speeds, as powers of two.
 const SPEED_EXPONENTS: std::ops::RangeInclusive<i32> = -3..=6;
 
-/// A film and where it is.
+/// A recording and the present position in it.
 pub struct Player {
-    film: Film,
+    recording: Recording,
     settings: Settings,
-    /// The state at the present position.
+    /// The model at the present position.
     pub model: Model,
     position: Duration,
     next_tick: Duration,
-    /// The rest of the film; `None` if its file could not be read any more.
-    reel: Option<Reel>,
-    next_scene: Option<(Duration, Scene)>,
+    /// The rest of the recording; `None` after a read error.
+    reader: Option<Reader>,
+    next_event: Option<(Duration, RecordedEvent)>,
     paused: bool,
     speed_exponent: i32,
 }
 
 impl Player {
-    /// At the start, running.
-    pub fn new(film: Film, settings: Settings) -> Self {
-        let settings = Settings { vehicle: film.vehicle.unwrap_or(settings.vehicle), ..settings };
+    /// Starts at the beginning, running.
+    pub fn new(recording: Recording, settings: Settings) -> Self {
+        let settings = Settings { vehicle: recording.vehicle.unwrap_or(settings.vehicle), ..settings };
         let mut player = Self {
             model: Model::new(settings.clone()),
-            film,
+            recording,
             settings,
             position: Duration::ZERO,
             next_tick: Duration::ZERO,
-            reel: None,
-            next_scene: None,
+            reader: None,
+            next_event: None,
             paused: false,
             speed_exponent: 0,
         };
@@ -52,32 +52,31 @@ impl Player {
         player
     }
 
-    /// Where it is.
+    /// The present position.
     pub fn position(&self) -> Duration {
         self.position
     }
 
-    /// Whether everything was shown.
+    /// Whether the end is reached.
     pub fn ended(&self) -> bool {
-        self.position >= self.film.length()
+        self.position >= self.recording.length()
     }
 
-    /// Times and phases of the film.
-    pub fn film(&self) -> &Film {
-        &self.film
+    pub fn recording(&self) -> &Recording {
+        &self.recording
     }
 
-    /// So much real time has passed.
+    /// Lets this much real time pass.
     pub fn pass(&mut self, elapsed: Duration) {
         if !self.paused {
             let target = self.position + elapsed.mul_f64(libm::exp2(f64::from(self.speed_exponent)));
-            self.advance_to(target.min(self.film.length()));
+            self.advance_to(target.min(self.recording.length()));
         }
     }
 
-    /// Goes to a time; back means: from the start again.
+    /// Goes to a time. To go back, the recording is played again from its start.
     pub fn seek(&mut self, to: Duration) {
-        let to = to.min(self.film.length());
+        let to = to.min(self.recording.length());
         if to < self.position {
             let pages = self.model.pages;
             self.model = Model::new(self.settings.clone());
@@ -88,16 +87,16 @@ impl Player {
         self.advance_to(to);
     }
 
-    /// Goes to the begin of a phase. Returns whether the film has it.
+    /// Goes to the start of a phase. Returns whether the recording has it.
     pub fn seek_phase(&mut self, phase: TdPhase) -> bool {
-        let begin = self.film.begin_of(phase);
+        let begin = self.recording.begin_of(phase);
         if let Some(at) = begin {
             self.seek(at);
         }
         begin.is_some()
     }
 
-    /// A key. Returns whether to quit.
+    /// Handles a key. Returns whether to quit.
     pub fn on_key(&mut self, key: Key) -> bool {
         match key {
             Key::Char('q' | 'Q') | Key::CtrlC => return true,
@@ -106,15 +105,15 @@ impl Player {
             Key::Char('-') => self.faster(-1),
             Key::Left => self.seek(self.position.saturating_sub(SEEK)),
             Key::Right => self.seek(self.position + SEEK),
-            Key::Char('[') => self.seek(self.phase_before()),
-            Key::Char(']') => self.seek(self.phase_behind()),
+            Key::Char('[') => self.seek(self.phase_start()),
+            Key::Char(']') => self.seek(self.next_phase_start()),
             Key::Char('g') => self.seek(Duration::ZERO),
-            Key::Char('G') => self.seek(self.film.length()),
+            Key::Char('G') => self.seek(self.recording.length()),
             Key::Char('r') if self.model.page() == Page::Parameters => {}
-            // Screens and scrolling. What commands a vehicle finds none here.
+            // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
             _ => drop(update(&mut self.model, Msg::Key(key), self.position)),
         }
-        self.tell();
+        self.update_playing();
         false
     }
 
@@ -123,51 +122,51 @@ impl Player {
         self.speed_exponent = (self.speed_exponent + doublings).clamp(least, most);
     }
 
-    /// The begin of this phase, or of the one before if this has just begun.
-    fn phase_before(&self) -> Duration {
+    /// The start of the present phase, or of the previous one if it has just begun.
+    fn phase_start(&self) -> Duration {
         let limit = self.position.saturating_sub(Duration::from_secs(1));
-        let mut begins = self.film.phases.iter().map(|(_, at)| *at);
+        let mut begins = self.recording.phases.iter().map(|(_, at)| *at);
         begins.rfind(|at| *at <= limit).unwrap_or(Duration::ZERO)
     }
 
-    fn phase_behind(&self) -> Duration {
-        let mut begins = self.film.phases.iter().map(|(_, at)| *at);
-        begins.find(|at| *at > self.position).unwrap_or_else(|| self.film.length())
+    fn next_phase_start(&self) -> Duration {
+        let mut begins = self.recording.phases.iter().map(|(_, at)| *at);
+        begins.find(|at| *at > self.position).unwrap_or_else(|| self.recording.length())
     }
 
     fn rewind(&mut self) {
-        match self.film.reel() {
-            Ok(reel) => self.reel = Some(reel),
-            Err(error) => self.break_off(&error),
+        match self.recording.reader() {
+            Ok(reader) => self.reader = Some(reader),
+            Err(error) => self.stop_reading(&error),
         }
-        self.next_scene = self.read_scene();
+        self.next_event = self.read_event();
     }
 
-    fn read_scene(&mut self) -> Option<(Duration, Scene)> {
-        match self.reel.as_mut()?.next_scene() {
-            Ok(scene) => scene,
+    fn read_event(&mut self) -> Option<(Duration, RecordedEvent)> {
+        match self.reader.as_mut()?.next_event() {
+            Ok(event) => event,
             Err(error) => {
-                self.break_off(&error);
+                self.stop_reading(&error);
                 None
             }
         }
     }
 
-    fn break_off(&mut self, error: &std::io::Error) {
-        self.reel = None;
-        self.model.warn(self.position, format!("the log cannot be read any more: {error}"));
+    fn stop_reading(&mut self, error: &std::io::Error) {
+        self.reader = None;
+        self.model.warn(self.position, format!("the log can no longer be read: {error}"));
     }
 
     fn advance_to(&mut self, to: Duration) {
         loop {
-            let scene_at = self.next_scene.as_ref().map(|(at, _)| *at).filter(|at| *at <= to);
+            let event_at = self.next_event.as_ref().map(|(at, _)| *at).filter(|at| *at <= to);
             let tick_at = Some(self.next_tick).filter(|at| *at <= to);
-            match (scene_at, tick_at) {
+            match (event_at, tick_at) {
                 (None, None) => break,
-                (Some(scene), tick) if tick.is_none_or(|tick| scene <= tick) => {
-                    let next = self.read_scene();
-                    if let Some((_, shown)) = std::mem::replace(&mut self.next_scene, next) {
-                        self.show(shown, scene);
+                (Some(event), tick) if tick.is_none_or(|tick| event <= tick) => {
+                    let next = self.read_event();
+                    if let Some((_, shown)) = std::mem::replace(&mut self.next_event, next) {
+                        self.show(shown, event);
                     }
                 }
                 (_, tick) => {
@@ -178,28 +177,28 @@ impl Player {
             }
         }
         self.position = to;
-        self.tell();
+        self.update_playing();
     }
 
-    fn show(&mut self, scene: Scene, at: Duration) {
-        let msgs = match scene {
-            Scene::Heard(frame) => {
+    fn show(&mut self, event: RecordedEvent, at: Duration) {
+        let msgs = match event {
+            RecordedEvent::Heard(frame) => {
                 let (bytes, framing) = (frame.as_bytes().len(), self.model.link.framing);
                 vec![Msg::Frame(frame), Msg::Received { bytes, framing }]
             }
-            Scene::Commanded(kind) => vec![Msg::Commanded(kind)],
-            Scene::Sent(bytes) => vec![Msg::Sent { bytes, drops: 0 }],
+            RecordedEvent::Commanded(kind) => vec![Msg::Commanded(kind)],
+            RecordedEvent::Sent(bytes) => vec![Msg::Sent { bytes, drops: 0 }],
         };
         for msg in msgs {
-            // What the ground did then is in the film; nothing is done again.
+            // The actions are dropped: what the ground did is part of the recording.
             drop(update(&mut self.model, msg, at));
         }
     }
 
-    fn tell(&mut self) {
-        self.model.playing = Some(Playing {
+    fn update_playing(&mut self) {
+        self.model.playing = Some(Playback {
             position: self.position,
-            length: self.film.length(),
+            length: self.recording.length(),
             speed: libm::exp2(f64::from(self.speed_exponent)),
             paused: self.paused,
         });

@@ -1,4 +1,4 @@
-//! Which conditions are alarms. Each has words of its own; colour only repeats them.
+//! Which conditions raise alarms, and with which text.
 
 use std::time::Duration;
 
@@ -8,20 +8,20 @@ use protocol::log::record::EventLevel;
 
 use super::Action;
 use crate::model::alarm::AlarmKind;
-use crate::model::command::{Acknowledged, CommandKind};
+use crate::model::command::{Acknowledgement, CommandKind};
 use crate::model::events::Speaker;
-use crate::model::link::{LinkState, RED_AFTER};
+use crate::model::link_state::{LinkState, RED_AFTER};
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::{Model, Role};
 
-/// An abort without an answer for this long is an alarm.
+/// An abort without an answer raises an alarm after this time.
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
-/// Under thrust, until the first plan acts: the stabiliser bridges that by design.
+/// How long the stabiliser may fly after ignition, until the first plan is used, without an alarm.
 const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
-/// A reboot is an alarm for this long, and until it is acknowledged.
+/// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
-/// Compares the conditions with the alarms; rings and tells what is new.
+/// Compares the present conditions with the alarms, rings the bell and reports new alarms.
 pub(super) fn watch(model: &mut Model, now: Duration) {
     let mut conditions = Vec::new();
     link_conditions(model, now, &mut conditions);
@@ -32,7 +32,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
         model.outbox.push(Action::Bell);
     }
     for alarm in raised {
-        // Said, too, where there is no screen; a lost link and a live motor have said so themselves.
+        // Also an event for runs without a screen; other alarms have an event of their own.
         if alarm.kind == AlarmKind::UplinkLost {
             model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
         }
@@ -63,15 +63,15 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     }
 }
 
-/// The vehicle is heard, and so it is known that it does not hear.
+/// Whether the vehicle is heard and is known not to hear this station.
 fn is_unheard(model: &Model, now: Duration) -> bool {
-    // What it told before a silence says nothing of now: it has this long to tell.
+    // A report from before a silence says nothing about the present: the vehicle has this long to report.
     let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
     let silent = match model.link.uplink.state(now) {
         LinkState::Lost(_) | LinkState::NeverHeard => heard_for > RED_AFTER,
         LinkState::Alive(_) | LinkState::Doubtful(_) => false,
     };
-    // While nothing comes down, nobody tells: what is known already stays.
+    // While nothing is received, an alarm that holds stays.
     let told = match model.link.state(now) {
         LinkState::Alive(_) => true,
         LinkState::Doubtful(_) => {
@@ -80,7 +80,7 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
         }
         LinkState::NeverHeard | LinkState::Lost(_) => false,
     };
-    // A flight that was recorded before vehicles told of it has no uplink to lose.
+    // Old recordings contain no uplink reports, so there is no uplink to lose.
     let recorded = model.settings.role == Role::Replaying && !model.link.uplink.is_told();
     silent && told && !recorded
 }
@@ -91,14 +91,14 @@ fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
         if track.disagrees(now) {
             found.push((AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED")));
         }
-        let waits = matches!(track.acknowledged, Acknowledged::Waiting | Acknowledged::Nothing);
+        let waits = matches!(track.acknowledged, Acknowledgement::Waiting | Acknowledgement::GivenUp);
         let waited = now.saturating_sub(track.commanded_at);
         if track.kind == CommandKind::Abort && waits && waited >= UNANSWERED_FOR {
             found.push((AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated")));
-        } else if track.acknowledged == Acknowledged::Nothing && !track.not_observed_said {
+        } else if track.acknowledged == Acknowledgement::GivenUp && !track.not_observed_reported {
             found.push((AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged")));
         }
-        if matches!(track.acknowledged, Acknowledged::Answered(_)) && !track.accepted() {
+        if matches!(track.acknowledged, Acknowledgement::Answered(_)) && !track.accepted() {
             found.push((AlarmKind::Refused(track.kind), format!("{name} REFUSED by the vehicle")));
         }
     }
@@ -112,7 +112,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(away) = KeepAway::of(vehicle).filter(|away| is_live(away.danger)) {
         found.push((AlarmKind::LiveMotor, away.words()));
     }
-    if let Some(words) = hold_words(vehicle, model.link.uplink.commands) {
+    if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
         found.push((AlarmKind::Held, words));
     }
     if let Some(locks) = vehicle.interlocks() {

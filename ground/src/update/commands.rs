@@ -1,4 +1,4 @@
-//! Commands on their way: sent, answered, given up, observed.
+//! Follows each command: sent, answered or given up, observed.
 
 use std::time::Duration;
 
@@ -6,63 +6,63 @@ use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
 use protocol::log::record::EventLevel;
 
-use super::{Action, auto, keys};
-use crate::model::command::{Acknowledged, CommandKind, Track};
+use super::Action;
+use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model};
 
-/// Of an abort's many attempts, the first is said and each of so many.
-const ABORT_SAID_EVERY: u32 = 20;
+/// Of the many attempts of an abort, only the first and every n-th become an event.
+const ABORT_REPORTED_EVERY: u32 = 20;
 
-/// Asks the vehicle, and begins to follow what becomes of it.
+/// Sends a command to the vehicle and starts to follow it.
 pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {
     let commands = &mut model.commands;
     let aborting = commands.is_aborting();
     if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
-        // An abort or a disarming ends whatever else is still being resent: a start that arrives
-        // after it would undo it. Nor will its effect be seen; nobody needs to be told.
+        // An abort or a disarm ends the resending of every other command: a start that arrives later would undo it.
+        // The effects of the others will not be observed, and that is no error.
         commands.sender.withdraw_all(now);
         for track in &mut commands.tracks {
-            track.not_observed_said = true;
+            track.not_observed_reported = true;
             if is_open(track.acknowledged) {
-                track.acknowledged = Acknowledged::Nothing;
+                track.acknowledged = Acknowledgement::GivenUp;
             }
         }
-        // The automatic mode yields to the hand.
+        // The automatic mode ends when a person acts.
         model.auto_step = AutoStep::Done;
     }
-    // Pressed again while it is under way, an abort is sent at once and its attempts go on counting.
+    // An abort that is commanded again while it is being sent is sent at once, and its attempts keep counting.
     let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).cloned();
     let ticket = send(model, kind, now);
     let commands = &mut model.commands;
     commands.tracks.retain(|track| track.kind != kind);
-    commands.tracks.push(Track {
+    commands.tracks.push(TrackedCommand {
         kind,
         by,
         commanded_at: earlier.as_ref().map_or(now, |track| track.commanded_at),
         attempts: earlier.map_or(0, |track| track.attempts),
-        acknowledged: Acknowledged::Waiting,
+        acknowledged: Acknowledgement::Waiting,
         acknowledged_at: None,
         observed_at: None,
         ticket,
-        not_observed_said: false,
+        not_observed_reported: false,
     });
     model.outcome.refusal = None;
     poll(model, now);
 }
 
 fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
-    let (command, param1) = kind.wire();
+    let (command, param1) = kind.mav_command();
     let params = [param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 
-fn is_open(acknowledged: Acknowledged) -> bool {
-    matches!(acknowledged, Acknowledged::Waiting | Acknowledged::InProgress)
+fn is_open(acknowledged: Acknowledgement) -> bool {
+    matches!(acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress)
 }
 
-/// Sends what is due and takes note of what happened.
+/// Sends the commands that are due and handles what happened to them.
 pub(super) fn poll(model: &mut Model, now: Duration) {
     let messages = model.commands.sender.poll(now);
     model.outbox.extend(messages.into_iter().map(Action::send));
@@ -74,9 +74,9 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
     let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
-        track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledged::Nothing);
+        track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledgement::GivenUp);
     if !awaited && given_up {
-        // Slow radio: the answer to a command that is waited for no longer is still a fact.
+        // The answer to a command that was given up is still recorded.
         let (command, result) = (answer.command, answer.result);
         on_event(model, CommandEvent::Answered { command, result }, now);
         return;
@@ -84,13 +84,13 @@ pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration)
     poll(model, now);
 }
 
-/// The latest command of this number: arming and disarming share one.
-fn track_of(model: &mut Model, command: u16) -> Option<&mut Track> {
-    model.commands.tracks.iter_mut().rfind(|track| track.kind.wire().0 as u16 == command)
+/// The latest command with this MAVLink number; arming and disarming share one.
+fn track_of(model: &mut Model, command: u16) -> Option<&mut TrackedCommand> {
+    model.commands.tracks.iter_mut().rfind(|track| track.kind.mav_command().0 as u16 == command)
 }
 
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
-    // Where there are several links, the operator is told which one carried the answer.
+    // With several links the event names the one that carried the answer.
     let over = model.link.heard_over().map_or_else(String::new, |link| format!(", over {link}"));
     let track = match event {
         CommandEvent::Sent { command, .. }
@@ -110,21 +110,21 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.attempts += 1;
             let attempt = track.attempts;
             if kind == CommandKind::Abort && attempt > 1 {
-                // Answered or not, it goes on; and so many lines would drown everything else.
-                if attempt % ABORT_SAID_EVERY != 0 {
+                // An abort is repeated whether answered or not; an event for each attempt would hide everything else.
+                if attempt % ABORT_REPORTED_EVERY != 0 {
                     return;
                 }
             } else {
-                track.acknowledged = Acknowledged::Waiting;
+                track.acknowledged = Acknowledgement::Waiting;
             }
             ("commanded", EventLevel::Info, format!("{name} commanded, attempt {attempt}{by}"))
         }
         CommandEvent::InProgress { .. } => {
-            track.acknowledged = Acknowledged::InProgress;
+            track.acknowledged = Acknowledgement::InProgress;
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
         CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => {
-            track.acknowledged = Acknowledged::Answered(result);
+            track.acknowledged = Acknowledgement::Answered(result);
             track.acknowledged_at = Some(now);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
@@ -135,7 +135,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             }
         }
         CommandEvent::TimedOut { attempts, .. } => {
-            track.acknowledged = Acknowledged::Nothing;
+            track.acknowledged = Acknowledgement::GivenUp;
             ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
         }
     };
@@ -144,7 +144,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
-    keys::record_operator(model, operator_kind, &told, now);
+    model.record_operator(now, operator_kind, &told);
     model.say(now, Speaker::Ground, level, text);
     if let Some(result) = answered {
         on_final_answer(model, kind, result, now);
@@ -155,28 +155,30 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
     let refused = result != MavResult::MAV_RESULT_ACCEPTED as u8;
     let for_now = result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
     match kind {
-        CommandKind::Arm if for_now && auto::ask_again(model, now) => {}
+        CommandKind::Arm if for_now && model.settings.auto && model.auto_step.retry_after_refusal(now) => {
+            model.info(now, "automatic mode: temporarily refused; arms again when the checks pass");
+        }
         CommandKind::Arm | CommandKind::Start if refused => {
             model.outcome.refusal = Some((format!("{} {}", kind.name(), result_words(result)), now));
         }
-        // "Not now" is no answer to an abort: it goes on.
+        // A temporary refusal does not end an abort.
         CommandKind::Abort if for_now => {
             if let Some(track) = model.commands.tracks.iter_mut().find(|track| track.kind == kind) {
-                track.acknowledged = Acknowledged::Waiting;
+                track.acknowledged = Acknowledgement::Waiting;
                 track.acknowledged_at = None;
             }
         }
-        // There is nothing to abort, or it will not be done: more of them change nothing.
+        // The refusal is permanent, so further attempts change nothing.
         CommandKind::Abort if refused => stop_aborting(model, now),
         CommandKind::Abort => stop_if_latched(model, now),
         _ => {}
     }
 }
 
-/// An abort is sent until both are there, the latch in the vehicle's own state and an answer.
+/// An abort is resent until it has been answered and the vehicle's own state shows the latch.
 fn stop_if_latched(model: &mut Model, now: Duration) {
     let done = model.commands.of(CommandKind::Abort).is_some_and(|track| {
-        let answered = matches!(track.acknowledged, Acknowledged::Answered(_));
+        let answered = matches!(track.acknowledged, Acknowledgement::Answered(_));
         answered && track.observed_at.is_some()
     });
     if done {
@@ -190,9 +192,9 @@ fn stop_aborting(model: &mut Model, now: Duration) {
     }
 }
 
-/// The vehicle has begun anew: an abort that was under way is meant for it still, and nothing else is. What was
-/// acknowledged and observed was so by a vehicle that is no more. Returns what is void.
-pub(super) fn begin_anew(model: &mut Model, now: Duration) -> Vec<&'static str> {
+/// The vehicle has rebooted. Its earlier acknowledgements are void; only an abort that is still being sent is sent
+/// again. Returns the names of the void commands.
+pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'static str> {
     let aborting = model.commands.is_aborting();
     let by = model.commands.of(CommandKind::Abort).map(|track| track.by.clone()).unwrap_or_default();
     model.commands.sender.withdraw_all(now);
@@ -204,7 +206,7 @@ pub(super) fn begin_anew(model: &mut Model, now: Duration) -> Vec<&'static str> 
     void
 }
 
-/// Compares the vehicle's own state with what was asked.
+/// Compares the vehicle's own state with the commands.
 pub(super) fn observe(model: &mut Model, now: Duration) {
     let mut seen = Vec::new();
     for track in &mut model.commands.tracks {
@@ -214,8 +216,8 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
                 EventLevel::Info,
                 format!("{} observed: {}", track.kind.name(), track.kind.observed_words()),
             ));
-        } else if track.disagrees(now) && !track.not_observed_said {
-            track.not_observed_said = true;
+        } else if track.disagrees(now) && !track.not_observed_reported {
+            track.not_observed_reported = true;
             let name = track.kind.name();
             seen.push((
                 EventLevel::Error,
@@ -224,7 +226,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         }
     }
     for (level, text) in seen {
-        keys::record_operator(model, "observed", &text, now);
+        model.record_operator(now, "observed", &text);
         model.say(now, Speaker::Ground, level, text);
     }
     stop_if_latched(model, now);

@@ -1,32 +1,32 @@
-//! Nobody at the controls: a countdown that this station's crew began does not go on without it.
+//! Holds a countdown that this station's crew started when no commanding screen is left.
 
 use std::time::Duration;
 
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TdPhase};
 use protocol::identity::Address;
 
-use super::{Action, keys};
+use super::Action;
 use crate::model::Model;
 use crate::model::command::CommandKind;
-use crate::model::crew::ALONE_MAX;
+use crate::model::crew::UNATTENDED_MAX;
 
-/// The hold is asked for this often: the vehicle need not answer, its countdown does.
+/// How often the hold is sent; the countdown itself shows whether it worked.
 const HOLD_EVERY: Duration = Duration::from_millis(100);
-/// The clock's ticks are this often, and not to the millisecond.
+/// Half of the tick period: ticks are not exact to the millisecond.
 const HALF_A_TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn step(model: &mut Model, now: Duration) {
     let alone = !model.settings.auto && model.crew.is_gone(now);
     if !(alone && counts_down(model) && armed_here(model)) {
         if model.crew.hold_due.take().is_some() {
-            let why = if alone { "the countdown is gone" } else { "a commanding screen is back" };
-            model.info(now, format!("the hold is not asked for any more: {why}"));
+            let why = if alone { "the countdown has ended" } else { "a commanding screen is back" };
+            model.info(now, format!("the hold is no longer sent: {why}"));
         }
         return;
     }
     if model.crew.hold_due.is_none() {
-        let text = format!("no commanding screen for {} s in the countdown: HOLD", ALONE_MAX.as_secs());
-        keys::record_operator(model, "hold", &text, now);
+        let text = format!("no commanding screen for {} s in the countdown: HOLD", UNATTENDED_MAX.as_secs());
+        model.record_operator(now, "hold", &text);
         model.warn(now, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
@@ -41,7 +41,7 @@ fn counts_down(model: &Model) -> bool {
     on_pad && model.vehicle.countdown_s().is_some()
 }
 
-/// Another station's countdown is another crew's.
+/// Whether this station armed the vehicle; a countdown of another station is not held.
 fn armed_here(model: &Model) -> bool {
     let arm = model.commands.of(CommandKind::Arm);
     arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())

@@ -1,4 +1,4 @@
-//! Frames from the link.
+//! Handles every frame from the link.
 
 use std::time::Duration;
 
@@ -9,15 +9,15 @@ use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
-use super::{Action, commands, observe};
+use super::{Action, commands, vehicle_changes};
 use crate::model::events::Speaker;
 use crate::model::{Model, telemetry};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
-/// A second ground with our own ids is named at most this often.
-const TWIN_SAID_EVERY: Duration = Duration::from_secs(10);
-/// Strangers remembered, so that each is named once.
+/// How often a second ground station with our ids is reported at most.
+const TWIN_REPORTED_EVERY: Duration = Duration::from_secs(10);
+/// How many other systems are remembered, so that each is reported once.
 const STRANGERS_MAX: usize = 8;
 
 pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
@@ -36,11 +36,11 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
 }
 
 fn note_twin(model: &mut Model, now: Duration) {
-    if model.link.twin_said_at.is_none_or(|at| now.saturating_sub(at) >= TWIN_SAID_EVERY) {
-        model.link.twin_said_at = Some(now);
+    if model.link.twin_reported_at.is_none_or(|at| now.saturating_sub(at) >= TWIN_REPORTED_EVERY) {
+        model.link.twin_reported_at = Some(now);
         let Address { system_id, component_id } = model.settings.us;
         let words = format!(
-            "another ground station uses our ids {system_id}/{component_id}: acknowledgements may be its own"
+            "another ground station uses our ids {system_id}/{component_id}: acknowledgements may belong to it"
         );
         model.warn(now, words);
     }
@@ -75,7 +75,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     match &message {
         MavMessage::STATUSTEXT(chunk) => {
             for text in model.texts.push(frame.source(), chunk, now) {
-                say_text(model, &text, now);
+                add_vehicle_text(model, &text, now);
             }
             return;
         }
@@ -84,23 +84,27 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
             model.link.first_heartbeat_at.get_or_insert(now);
-            if std::mem::take(&mut model.link.lost_said) {
+            if std::mem::take(&mut model.link.loss_reported) {
                 model.info(now, "link restored: the vehicle is heard again");
             }
         }
         _ => {}
     }
-    let before = observe::Facts::of(&model.vehicle);
+    let before = vehicle_changes::Announced::of(&model.vehicle);
     let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
     if rebooted {
-        observe::on_reboot(model, now);
+        vehicle_changes::on_reboot(model, now);
     }
-    observe::on_change(model, if rebooted { observe::Facts::default() } else { before }, now);
+    vehicle_changes::on_change(
+        model,
+        if rebooted { vehicle_changes::Announced::default() } else { before },
+        now,
+    );
     commands::observe(model, now);
 }
 
-/// PING with target 0 asks for itself back, addressed to the sender. With any other target it is an
-/// answer itself, to us or to another: answering that would go on for ever.
+/// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer itself; answering
+/// it would never end.
 #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
 fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
     let MavMessage::PING(data) = message else { return None };
@@ -113,7 +117,7 @@ fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
     Some(MavMessage::PING(answer))
 }
 
-pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
+pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
     // RFC 5424: 0 emergency to 7 debug.
     let level = match text.severity {
         0..=2 => EventLevel::Fatal,
@@ -124,7 +128,8 @@ pub(super) fn say_text(model: &mut Model, text: &Text, now: Duration) {
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }
 
-/// What the vehicle hears of a station. Addressed to nobody it is of everybody: nothing of any was accepted yet.
+/// A report of the vehicle about its uplink. Without a target it concerns every station: the vehicle has not accepted
+/// any frame yet.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     if model
         .settings
@@ -139,7 +144,7 @@ fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
 
 fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
     let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
-    // Another's question is its own to ask, and another's answer is measured by its clock.
+    // A question or answer for another station does not concern us.
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     if !model.settings.us.accepts(target) {
         return;
@@ -153,7 +158,7 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
         })));
     } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
         let round_trip = Duration::from_nanos(nanoseconds);
-        // Anything older answers a question that was given up.
+        // A longer time belongs to a request that was given up.
         if round_trip < Duration::from_secs(10) {
             model.link.round_trip = Some(round_trip);
             model.link.uplink.answered(now.saturating_sub(round_trip));

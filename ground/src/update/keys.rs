@@ -1,60 +1,57 @@
-//! The hand of the crew.
+//! What the keys of the crew do.
 //!
-//! Nothing dangerous on a single letter: arming, start and quitting in flight take a letter, a typed word and Enter,
-//! disarming a letter and Enter, an abort Ctrl-X and Enter (or Ctrl-X twice); each within its time. But for the abort,
-//! keys count only as a finger strikes them: neither pasted nor repeated by the keyboard.
+//! No single key is dangerous. Arming, starting, and quitting in flight take a letter, a typed word and Enter;
+//! disarming takes a letter and Enter; an abort takes Ctrl-X and Enter (or Ctrl-X twice); each within a time limit.
+//! Except for the abort, keys count only if they were typed by hand: neither pasted nor repeated by the keyboard.
 
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdPhase};
-use protocol::log::record::Record;
-use protocol::log::v1::OperatorAction;
 
-use super::{Action, commands};
-use crate::attach::codec::Asked;
+use super::{Action, Request, commands};
 use crate::key::Key;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
-use crate::model::hand::{FINGERS_APART, Touch};
+use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
 use crate::model::seat::Seat;
 use crate::model::vehicle::is_on_pad;
 use crate::model::words;
 use crate::model::{Model, Role};
 
-/// Lines that a page key scrolls.
+/// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
-/// No list is longer.
+/// The furthest scroll position; no list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
-/// Keys that came in one read of the terminal: one by a finger, many by a paste, a held key or a slow line.
+/// Keys from one read of the terminal: one if typed by hand, several from a paste, a held key or a slow line.
 pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
     for key in keys {
         let touch = match model.settings.role {
-            // There is nothing to command, and time stands still while it is paused.
-            Role::Replaying => Touch::Finger,
-            _ => model.hand.touch(*key, keys.len() > 1, now),
+            // A replay commands nothing, and its time stands still while it is paused.
+            Role::Replaying => KeyOrigin::Typed,
+            _ => model.key_timing.origin(*key, keys.len() > 1, now),
         };
         on_key(model, *key, touch, now);
     }
 }
 
-/// What is pasted is meant for another window.
+/// A paste is dropped: it was meant for another window.
 pub(super) fn on_paste(model: &mut Model, now: Duration) {
-    record_operator(model, "key", "a paste", now);
-    model.hand.pasted(now);
+    model.record_operator(now, "key", "a paste");
+    model.key_timing.pasted(now);
     model.quit_at = None;
     cancel(model, now);
     model.info(now, "a paste was dropped");
 }
 
-fn on_key(model: &mut Model, key: Key, touch: Touch, now: Duration) {
-    if touch != Touch::Hurried || matches!(key, Key::CtrlX | Key::Enter) {
-        record_operator(model, "key", &key.name(), now);
+fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
+    if touch != KeyOrigin::TooFast || matches!(key, Key::CtrlX | Key::Enter) {
+        model.record_operator(now, "key", &key.name());
     }
     expire(model, now);
-    if touch != Touch::Repeat {
+    if touch != KeyOrigin::Repeat {
         model.quit_at = None;
     }
     if on_abort_key(model, key, now) {
@@ -62,11 +59,11 @@ fn on_key(model: &mut Model, key: Key, touch: Touch, now: Duration) {
     }
     match touch {
         _ if key.scrolls() => {}
-        Touch::Finger => {}
-        Touch::Repeat => return,
-        Touch::Hurried => {
+        KeyOrigin::Typed => {}
+        KeyOrigin::Repeat => return,
+        KeyOrigin::TooFast => {
             cancel(model, now);
-            if model.hand.says(now) {
+            if model.key_timing.reports_drop(now) {
                 model.info(now, "keys faster than a hand types them were dropped: a paste?");
             }
             return;
@@ -77,41 +74,42 @@ fn on_key(model: &mut Model, key: Key, touch: Touch, now: Duration) {
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => on_free_key(model, key, now),
-        dialog => on_offer_key(model, dialog, key, now),
+        dialog => on_dialog_key(model, dialog, key, now),
     }
 }
 
-/// The abort, before everything else and whatever is thought of the keys: no paste, no speed, no dialog takes it away.
-/// Returns whether the key is done with.
+/// The abort chord comes first: no paste, no typing speed and no dialog blocks it. Returns whether the key has been
+/// used.
 fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     if key == Key::CtrlX {
         if let Some(why) = model.settings.role.why_not_command() {
             model.info(now, why);
             return true;
         }
-        // An Enter that comes too late for the abort must not start or arm what was offered before.
+        // An Enter that comes too late for the abort must not confirm a dialog that was open before.
         model.dialog = Dialog::Closed;
-        // Where the terminal tells repeats apart, a second Ctrl-X was pressed, however soon it came.
-        if model.repeats_told && model.abort_chord.confirm(now) {
+        // If the terminal reports repeats, a second Ctrl-X was really pressed, however soon it came.
+        if model.repeats_reported && model.abort_chord.confirm(now) {
             abort(model, now);
         } else {
             model.abort_chord.press(now);
         }
         return true;
     }
-    // Who has begun an abort means the abort; and twice Ctrl-X, once complete, nothing takes back.
+    // A complete double Ctrl-X cannot be taken back by the next key.
     let complete = if key == Key::Enter { model.abort_chord.confirm(now) } else { model.abort_chord.end() };
     if complete {
         abort(model, now);
     }
-    // While the abort is offered, another key neither takes it back nor does anything else.
+    // While the chord is begun, another key neither cancels it nor does anything else.
     complete || model.abort_chord.is_begun(now)
 }
 
-/// The next letter of the offer's word, Enter behind the whole word; every other key cancels the offer.
-fn on_offer_key(model: &mut Model, mut dialog: Dialog, key: Key, now: Duration) {
+/// A key while a dialog is open: the next letter of its word, or Enter after the whole word; every other key cancels
+/// it.
+fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, now: Duration) {
     match key {
-        Key::Enter if dialog.is_complete() => climbed(model, &dialog, now),
+        Key::Enter if dialog.is_complete() => confirmed(model, &dialog, now),
         Key::Char(letter) if dialog.take(letter) => model.dialog = dialog,
         _ => {
             let (name, word) = (dialog.name(), dialog.word());
@@ -122,14 +120,14 @@ fn on_offer_key(model: &mut Model, mut dialog: Dialog, key: Key, now: Duration) 
     }
 }
 
-/// The whole ladder of this offer.
-fn climbed(model: &mut Model, dialog: &Dialog, now: Duration) {
+/// The crew has completed every step of this dialog.
+fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
     match dialog {
         Dialog::Closed => {}
         Dialog::Arm { .. } => ask(model, CommandKind::Arm, now),
         Dialog::Start { .. } => ask(model, CommandKind::Start, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
-        // A live station must not end with its screen; a demonstration and a screen of another station may.
+        // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Dialog::Quit { .. } => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
             let leave = if stays && model.is_at_risk() { Action::LeaveScreen } else { Action::Quit };
@@ -138,7 +136,7 @@ fn climbed(model: &mut Model, dialog: &Dialog, now: Duration) {
     }
 }
 
-/// Closes an offer that something foreign came between.
+/// Closes the open dialog because something else came in between.
 fn cancel(model: &mut Model, now: Duration) {
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => {}
@@ -146,7 +144,7 @@ fn cancel(model: &mut Model, now: Duration) {
     }
 }
 
-/// Closes what has waited too long: an offer to arm does not stay open behind the crew's back.
+/// Closes a dialog whose time limit has passed.
 fn expire(model: &mut Model, now: Duration) {
     if model.dialog.until().is_some_and(|until| now > until) {
         let dialog = std::mem::replace(&mut model.dialog, Dialog::Closed);
@@ -154,27 +152,19 @@ fn expire(model: &mut Model, now: Duration) {
     }
 }
 
-/// Time passes for the hand: offers end, a chord or a key to quit turns out to be complete.
+/// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
     pass_abort_chord(model, now);
     pass_quit(model, now);
 }
 
-/// Quits, once no other key has followed the one that asked for it.
+/// Quits if no other key has followed the key to quit.
 fn pass_quit(model: &mut Model, now: Duration) {
     if model.quit_at.is_some_and(|at| now >= at) {
         model.quit_at = None;
         model.outbox.push(Action::Quit);
     }
-}
-
-pub(super) fn record_operator(model: &mut Model, kind: &str, detail: &str, now: Duration) {
-    model.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
-        time_s: now.as_secs_f64(),
-        kind: kind.to_owned(),
-        detail: detail.to_owned(),
-    })));
 }
 
 fn on_free_key(model: &mut Model, key: Key, now: Duration) {
@@ -197,7 +187,7 @@ fn on_free_key(model: &mut Model, key: Key, now: Duration) {
     }
 }
 
-/// Which screen, how far its list is scrolled, and that the alarms were seen.
+/// Keys that choose a page, scroll its list or acknowledge an alarm.
 fn on_page_key(model: &mut Model, key: Key, now: Duration) {
     let shown = model.page();
     match key {
@@ -227,8 +217,8 @@ fn on_page_key(model: &mut Model, key: Key, now: Duration) {
     }
 }
 
-/// Scrolls up by this many lines; down when negative. What happened is read from its newest line, a list of
-/// names or figures from its first.
+/// Scrolls up by this many lines; down if negative. Events are listed from the newest line, parameters and link
+/// values from the first.
 fn scroll(model: &mut Model, up: i32) {
     let away = if matches!(model.page(), Page::Parameters | Page::Link) { -up } else { up };
     let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
@@ -239,7 +229,7 @@ fn scroll(model: &mut Model, up: i32) {
 pub(super) fn ask_parameters(model: &mut Model) {
     model.parameters.asked = true;
     if model.settings.role == Role::Attached {
-        return model.outbox.push(Action::Request(Asked::Parameters));
+        return model.outbox.push(Action::Request(Request::Parameters));
     }
     model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: model.settings.vehicle.system_id,
@@ -247,10 +237,10 @@ pub(super) fn ask_parameters(model: &mut Model) {
     })));
 }
 
-/// The ladder is complete: commands here, or asks the station that this screen shows.
+/// Every step is complete: sends the command, or asks the station to send it.
 fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
     match model.settings.role {
-        Role::Attached => model.outbox.push(Action::Request(Asked::Command(kind))),
+        Role::Attached => model.outbox.push(Action::Request(Request::Command(kind))),
         Role::Station => {
             let by = model.settings.seat.clone();
             model.outbox.push(Action::Tell(kind));
@@ -260,34 +250,34 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
     }
 }
 
-/// Commands, unless the vehicle has changed since the ladder was begun, or another screen has asked for the same.
+/// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
 pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
     let why_not = match kind {
-        CommandKind::Arm => on_its_way(model, kind, now).or_else(|| why_not_arm(model, now)),
-        CommandKind::Start => on_its_way(model, kind, now).or_else(|| why_not_start(model, now)),
+        CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
+        CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
         CommandKind::Disarm | CommandKind::Abort => None,
     };
     match why_not {
         None => commands::submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
-            record_operator(model, "not sent", &text, now);
+            model.record_operator(now, "not sent", &text);
             model.warn(now, text);
         }
     }
 }
 
-/// Two hands that ask for one thing at one time ask for it once.
-fn on_its_way(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
+/// Why not to send a command that another screen has just sent.
+fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
     let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
-    Some(format!("{} is on its way already{}", kind.name(), track.by.in_brackets()))
+    Some(format!("{} is already on its way{}", kind.name(), track.by.in_brackets()))
 }
 
-/// The one alarm that the screen points at was seen: in the alarm line, or the chosen one of the list.
+/// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
     let Some(kind) = model.pointed_at().map(|alarm| alarm.kind) else { return };
     if model.settings.role == Role::Attached {
-        model.outbox.push(Action::Request(Asked::Acknowledge(kind)));
+        model.outbox.push(Action::Request(Request::Acknowledge(kind)));
     } else {
         acknowledge(model, kind, now);
     }
@@ -299,7 +289,7 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
     }
 }
 
-/// Points at the next alarm of the list, or the one before.
+/// Chooses the next or the previous alarm of the list.
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
     let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
@@ -311,7 +301,7 @@ fn choose_alarm(model: &mut Model, up: bool) {
     model.pages.chosen = Some(list[next].kind);
 }
 
-/// Why arming is not even asked for. The vehicle's own checks are the vehicle's to refuse, in its words.
+/// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
 fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
@@ -342,8 +332,7 @@ fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
 }
 
-/// Lets the abort chord's time pass. Only with the clock, never with a key: that key may be one more
-/// repeat of a Ctrl-X that is held.
+/// Lets time pass for the abort chord; only on ticks, because a key may be a further repeat of a held Ctrl-X.
 fn pass_abort_chord(model: &mut Model, now: Duration) {
     if model.abort_chord.pass(now) {
         abort(model, now);

@@ -1,6 +1,6 @@
-//! Every decision of the ground: a message and the time in, a changed model and the wanted actions out.
+//! Every decision of the ground: one pure function from a message and the time to a changed model and actions.
 //!
-//! Nothing here reads a clock, a socket or a file; whatever arrives in whatever order is data.
+//! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do: send, record, quit.
 
 pub mod alarms;
 pub mod auto;
@@ -8,17 +8,15 @@ pub mod commands;
 pub mod crew;
 pub mod frames;
 pub mod keys;
-pub mod observe;
 pub mod tick;
+pub mod vehicle_changes;
 
 use std::time::Duration;
 
-use protocol::dialect::MavMessage;
 use protocol::frame::{Frame, FramerCounters};
-use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
 
-use crate::attach::codec::Asked;
 use crate::key::Key;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
@@ -27,116 +25,76 @@ use crate::model::link::LinkReport;
 use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model, Role};
 
-/// Something that reached the ground.
+pub use crate::model::action::{Action, Request};
+
+/// A message for the model: an input of the crew, a frame, a state of the links, or a tick.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Msg {
-    /// A key was pressed.
     Key(Key),
-    /// Several keys came in one read of the terminal.
+    /// One read of the terminal brought several keys.
     Keys(Vec<Key>),
-    /// Something was pasted, as the terminal says.
+    /// The terminal reports that text was pasted.
     Pasted,
-    /// A frame arrived.
     Frame(Frame),
-    /// The crew commanded this then: in a replay.
+    /// In a replay: the crew gave this command at this time.
     Commanded(CommandKind),
-    /// The crew has climbed the whole ladder of this on a screen of the station.
+    /// The crew has completed every step of this command on a screen of the station.
     Requested {
-        /// What is asked for.
         kind: CommandKind,
-        /// Who asks, and from which screen.
+        /// The operator and the screen.
         by: Seat,
     },
-    /// These screens can command now.
+    /// The seats that can command have changed to these.
     Crew(Vec<Seat>),
-    /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station goes on.
+    /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station keeps
+    /// running.
     ScreenQuit,
-    /// The crew has seen this alarm, on a screen elsewhere.
-    Acknowledged(AlarmKind),
-    /// A screen elsewhere wants the parameters.
+    /// The crew has acknowledged this alarm on an attached screen.
+    AlarmAcknowledged(AlarmKind),
+    /// An attached screen asks for the parameters.
     ParametersWanted,
-    /// Time passes on a screen whose station runs elsewhere: its dialogs and chord expire.
+    /// Time passes on an attached screen: its dialogs and its abort chord may expire.
     ScreenTick,
-    /// The terminal is gone; the station goes on without it.
+    /// The terminal is gone; the station keeps running without it.
     ScreenGone,
-    /// The frame that follows came over this link; told where there are several.
+    /// The next frame came over this link; sent only if there are several links.
     HeardOver(usize),
-    /// How each link does, once a second and when one comes or goes.
+    /// The state of each link, once a second and whenever one goes up or down.
     Links {
         /// In the order of their numbers.
         links: Vec<LinkReport>,
-        /// What signatures let in and kept out; `None` without a key.
+        /// How many frames passed or failed the signature check; `None` without a key.
         signing: Option<SigningCounters>,
     },
-    /// Bytes arrived, whole frames or not.
+    /// Bytes arrived, whether or not they form whole frames.
     Received {
-        /// How many.
         bytes: usize,
-        /// The framer's counters after them.
+        /// The framer's counters after these bytes.
         framing: FramerCounters,
     },
-    /// Bytes were sent.
     Sent {
-        /// How many.
         bytes: usize,
-        /// Writes dropped since the start.
+        /// How many writes have been dropped since the start.
         drops: u64,
     },
-    /// The transport works; with whom.
+    /// The link works; the peer.
     LinkUp(String),
-    /// The transport does not work; why.
+    /// No link works; the reason.
     LinkDown(String),
-    /// One of several links does not work; why.
+    /// One of several links does not work; the reason.
     OneLinkDown(String),
-    /// Something about the links that the crew should know.
+    /// A warning about the links for the crew.
     LinkSays(String),
-    /// How the log does.
     Log(LogHealth),
-    /// The embedded simulator ended by itself; why, if it failed.
+    /// The embedded simulator has ended; the reason, if it failed.
     SimulatorEnded(Option<String>),
-    /// The system asks to end; by which signal.
+    /// The system asks the program to end; the name of the signal.
     Terminate(&'static str),
-    /// Time passes; several times a second.
+    /// Time passes; sent ten times a second.
     Tick,
 }
 
-/// Something that the run loop is to do.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Action {
-    /// Send a message to the vehicle.
-    Send(Box<MavMessage>),
-    /// Write a record into the log.
-    Record(Record),
-    /// Put the log on the disk now.
-    SyncLog,
-    /// Draw the whole screen again.
-    Redraw,
-    /// Ask the station that runs elsewhere.
-    Request(Asked),
-    /// The crew has asked for this at the station's own screen: the other screens are told.
-    Tell(CommandKind),
-    /// Give the terminal back and go on without a screen.
-    LeaveScreen,
-    /// Ring the terminal's bell.
-    Bell,
-    /// An alarm was raised: tell whoever is not at the screen.
-    Alarm(String),
-    /// End the program.
-    Quit,
-}
-
-impl Action {
-    pub(crate) fn send(message: MavMessage) -> Self {
-        Self::Send(Box::new(message))
-    }
-
-    pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
-        let event = Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
-        Self::Record(Record::Event(event))
-    }
-}
-
-/// Takes a message into the model.
+/// Takes a message into the model and returns what the run loop is to do.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
         Msg::Key(key) => keys::on_keys(model, &[key], now),
@@ -145,18 +103,18 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
         Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
         Msg::Crew(seats) => {
-            model.crew.sit(seats, now);
+            model.crew.set_seats(seats, now);
             model.info(now, model.crew.words());
         }
-        Msg::Acknowledged(kind) => keys::acknowledge(model, kind, now),
+        Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
-            let goes_on = "armed or in flight, so the station goes on";
+            let goes_on = "armed or in flight, so the station continues";
             model.warn(now, format!("the screen was quit; {goes_on}: `ground attach` shows it"));
         }
         Msg::ScreenGone => {
-            model.warn(now, "the terminal is gone: link and log go on; `ground attach` shows them");
+            model.warn(now, "the terminal is gone: link and log continue; `ground attach` shows them");
         }
         Msg::Frame(frame) => frames::on_frame(model, &frame, now),
         Msg::Received { bytes, framing } => {
@@ -191,10 +149,10 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::Terminate("SIGINT") if outlives_ctrl_c(model) => {
             let ends = "SIGTERM or `ground stop --force` ends it";
-            model.warn(now, format!("SIGINT: the station goes on while armed or in flight; {ends}"));
+            model.warn(now, format!("SIGINT: the station continues while armed or in flight; {ends}"));
         }
         Msg::Terminate(signal) => {
-            model.warn(now, format!("{signal}: ending; the vehicle is left as it is"));
+            model.warn(now, format!("{signal}: ending; the vehicle is not affected"));
             model.outbox.push(Action::Quit);
         }
         Msg::Tick => tick::on_tick(model, now),
@@ -203,7 +161,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     std::mem::take(&mut model.outbox)
 }
 
-/// Ctrl-C where a screen was, or where none ever was, is a hand's slip as well as its wish.
+/// Whether SIGINT is ignored: a Ctrl-C may be a mistake while a live vehicle is armed or in flight.
 fn outlives_ctrl_c(model: &Model) -> bool {
     model.settings.role == Role::Station && !model.settings.demonstration && model.is_at_risk()
 }

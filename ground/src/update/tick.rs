@@ -1,4 +1,4 @@
-//! What time alone brings: heartbeats, resends, expiries, the loss of the link, the end of the run.
+//! What happens on each tick: heartbeats, resends, time limits, the loss of the link, the end of a run.
 
 use std::time::Duration;
 
@@ -11,26 +11,25 @@ use protocol::log::v1::Telemetry;
 use super::{Action, auto, commands, crew, frames, keys};
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
-use crate::model::link::LinkState;
+use crate::model::link_state::LinkState;
 use crate::model::vehicle::{Deflection, is_on_pad};
 use crate::model::{Model, Role};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
-/// A vehicle that is armed holds its countdown when it hears nothing for 2 s: of twenty heartbeats that each have one
-/// chance in two, all are lost once in a million times.
-const HURRIED_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
+/// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
+/// all are lost once in a million times.
+const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
-/// While its answer alone shows that the vehicle hears this station.
+/// For a vehicle whose answers are the only proof that it hears this station.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
-/// Without a screen: how long after a flight its last words are waited for.
-const LAST_WORDS: Duration = Duration::from_secs(2);
-/// Without a screen: how long a lost link is waited for.
+/// Without a screen: how long the program waits for further messages after a flight.
+const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
+/// Without a screen: how long the program waits for a lost link to return.
 const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
-    // A screen of another process has a clock of its own for its own hand: what the station's clock does there, the
-    // station has done already.
+    // An attached screen has its own ticks for its keys; the ticks of the station are only repeated there.
     if matches!(model.settings.role, Role::Station | Role::Replaying) {
         keys::pass(model, now);
     }
@@ -47,7 +46,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         })));
     }
     for text in model.texts.expire(now) {
-        frames::say_text(model, &text, now);
+        frames::add_vehicle_text(model, &text, now);
     }
     note_loss(model, now);
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
@@ -68,7 +67,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
 }
 
-/// Counted from the time that it was due: a clock that looks late now and then makes nothing rarer.
+/// Counts from the time that was due, so that late ticks do not lower the rate.
 fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
     *due = (*due).min(now + every);
     if now < *due {
@@ -78,7 +77,7 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
     true
 }
 
-/// Whether the vehicle must hear this station all the time: it is armed on its pad, or is about to be.
+/// Whether the vehicle must hear this station frequently: it is armed on the pad, or is about to be.
 fn must_be_heard(model: &Model, now: Duration) -> bool {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
     let on_pad = model.vehicle.phase().is_some_and(|phase| is_on_pad(phase.value));
@@ -86,9 +85,9 @@ fn must_be_heard(model: &Model, now: Duration) -> bool {
     model.link.state(now).carries() && on_pad && (armed || arming)
 }
 
-/// Sent from the loop that it vouches for: a ground that hangs sends none.
+/// Heartbeats are sent from the run loop, so that a hanging ground station sends none.
 fn heartbeat(model: &mut Model, now: Duration) {
-    let every = if must_be_heard(model, now) { HURRIED_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
+    let every = if must_be_heard(model, now) { FAST_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
     if is_due(&mut model.due.heartbeat, every, now) {
         model.outbox.push(Action::send(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: 0,
@@ -105,21 +104,21 @@ fn note_loss(model: &mut Model, now: Duration) {
     let since = model.link.alive_since.unwrap_or(now);
     model.link.alive_since = model.link.state(now).carries().then_some(since);
     if let LinkState::Lost(age) = model.link.state(now)
-        && !model.link.lost_said
+        && !model.link.loss_reported
     {
-        model.link.lost_said = true;
+        model.link.loss_reported = true;
         let text = format!("LINK LOST: the vehicle is not heard for {:.1} s", age.as_secs_f64());
         model.say(now, Speaker::Ground, EventLevel::Error, text);
     }
 }
 
-/// Why a run without a screen ends now; `None` while it goes on.
+/// Why a run without a screen ends now; `None` while it continues.
 fn why_end(model: &Model, now: Duration) -> Option<String> {
     let outcome = &model.outcome;
-    let past = |at: Duration| now.saturating_sub(at) >= LAST_WORDS;
+    let past = |at: Duration| now.saturating_sub(at) >= WAIT_AFTER_FLIGHT;
     let on_ground = model.vehicle.phase().is_some_and(|phase| !crate::model::vehicle::is_flight(phase.value));
     if outcome.error.is_some() {
-        return Some("the run cannot go on".to_owned());
+        return Some("the run cannot continue".to_owned());
     }
     if outcome.verdict.is_some_and(|(_, at)| past(at)) || outcome.safed_at.is_some_and(past) {
         return Some("the flight has ended".to_owned());
@@ -136,12 +135,12 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
     match model.link.state(now) {
         LinkState::Lost(age) if age >= LOST_FOR_GOOD => return Some("the link is lost".to_owned()),
         LinkState::NeverHeard if model.settings.auto && now >= LOST_FOR_GOOD => {
-            return Some("nothing was heard of a vehicle".to_owned());
+            return Some("no vehicle was heard".to_owned());
         }
         _ => {}
     }
     let limit = model.settings.time_limit?;
-    (now >= limit).then(|| format!("time is up: no end of a flight within {:.0} s", limit.as_secs_f64()))
+    (now >= limit).then(|| format!("time limit: the flight did not end within {:.0} s", limit.as_secs_f64()))
 }
 
 fn telemetry_record(model: &Model, now: Duration) -> Telemetry {

@@ -1,11 +1,11 @@
-//! The same screen for a terminal without Unicode (`LANG=C`, a vt100): every cell one ASCII character.
+//! Converts a drawn screen to ASCII, cell by cell, for terminals without Unicode (`LANG=C`, a vt100).
 
 use ratatui::buffer::Buffer;
 
-/// First cell of the braille patterns; their low eight bits are the dots.
+/// The first braille pattern; the low eight bits of a pattern are its dots.
 const BRAILLE: u32 = 0x2800;
 
-/// Replaces what is not ASCII, cell by cell, so that nothing moves.
+/// Replaces every character that is not ASCII, cell by cell, so that nothing moves.
 pub fn flatten(buffer: &mut Buffer) {
     for cell in &mut buffer.content {
         if !cell.symbol().is_ascii() {

@@ -1,4 +1,4 @@
-//! The screen below 80x24, down to 20x5 and less: lines, the most important first.
+//! The layout for terminals smaller than 80x24: plain lines, the most important first.
 
 use std::time::Duration;
 
@@ -7,26 +7,30 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::theme::{Role, Theme};
-use super::{alarms, dialog, draw_lines, identity, next, pages, top};
+use super::theme::{TextRole, Theme};
+use super::{alarm_line, dialog, draw_lines, identity, next_event, pages, top_lines};
 use crate::model::Model;
 use crate::model::command::CommandKind;
 
-/// Below this many rows an open dialog takes the place of countdown and link.
+/// With fewer rows an open dialog replaces the line of countdown and link.
 const DIALOG_ROWS: u16 = 8;
-/// Rows from which the screen's name and number have a line of their own.
+/// From this many rows on, the page name has a line of its own.
 const NAMED_ROWS: u16 = 10;
 
-/// Draws everything that fits.
+/// Draws the lines that fit.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let mut lines = vec![
         identity::line(model, theme),
-        Line::from(vec![top::phase(model, theme, now), Span::raw(" "), top::armed(model, theme, now)]),
+        Line::from(vec![
+            top_lines::phase(model, theme, now),
+            Span::raw(" "),
+            top_lines::armed(model, theme, now),
+        ]),
     ];
     let open = dialog::lines(model, theme, now);
     if open.is_none() || area.height >= DIALOG_ROWS {
-        let mut line = vec![top::countdown(model, theme, now), Span::raw(" ")];
-        let link = top::link(model, theme, now);
+        let mut line = vec![top_lines::countdown(model, theme, now), Span::raw(" ")];
+        let link = top_lines::link(model, theme, now);
         line.extend(link.spans.into_iter().map(|span| span.patch_style(link.style)));
         lines.push(Line::from(line));
     }
@@ -38,11 +42,11 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), below);
         return;
     }
-    lines.extend(top::keep_away(model, theme, now));
-    lines.extend(next::line(model, theme, now));
-    lines.extend(model.playing.map(|playing| alarms::replay(playing, theme)));
+    lines.extend(top_lines::keep_away(model, theme, now));
+    lines.extend(next_event::line(model, theme, now));
+    lines.extend(model.playing.map(|playing| alarm_line::replay(playing, theme)));
     if model.playing.is_none() {
-        lines.extend(alarms::alarm(model, theme, now, usize::from(area.width)));
+        lines.extend(alarm_line::alarm(model, theme, now, usize::from(area.width)));
     }
     let page = model.page();
     let named = u16::from(area.height >= NAMED_ROWS);
@@ -56,20 +60,20 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         let held = if model.pages.held.is_some() { "HELD, 0 follows" } else { "auto" };
         let text = format!(" [{}{}] 1-9 {held}  ? help", page.key(), page.name());
         let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
-        frame.render_widget(Line::styled(text, theme.style(Role::Label)), last);
+        frame.render_widget(Line::styled(text, theme.style(TextRole::Label)), last);
     }
 }
 
 fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let line = top::abort(model, theme, now);
+    let line = top_lines::abort(model, theme, now);
     if model.abort_chord.is_begun(now) {
         return line;
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return top::facts_short(track, theme, now);
+        return top_lines::command_facts_short(track, theme, now);
     }
     let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
-    let mut spans = vec![Span::styled(key, theme.style(Role::Key))];
+    let mut spans = vec![Span::styled(key, theme.style(TextRole::Key))];
     spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
     Line::from(spans)
 }

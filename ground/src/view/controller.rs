@@ -1,4 +1,4 @@
-//! What the landing controller does.
+//! The panel of the landing controller (NMPC).
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use protocol::dialect::{TdControlLevel, TdSolverStatus};
 use ratatui::text::{Line, Span};
 
 use super::number::{age_mark, row};
-use super::theme::{Role, Theme};
+use super::theme::{TextRole, Theme};
 use crate::model::Model;
 use crate::model::vehicle::Sample;
 use crate::model::words;
@@ -20,11 +20,11 @@ pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             .map(|(value, received_at)| Sample { value, received_at })
     };
     let data = controller.map(|controller| &controller.value);
-    let (mark, age_role) = controller.map_or((" ", Role::Label), |controller| age_mark(controller, now));
-    let wide_text = |label: &str, text: String, role: Role| {
-        let role = if age_role == Role::Stale { age_role } else { role };
+    let (mark, age_role) = controller.map_or((" ", TextRole::Label), |controller| age_mark(controller, now));
+    let wide_text = |label: &str, text: String, role: TextRole| {
+        let role = if age_role == TextRole::Stale { age_role } else { role };
         Line::from(vec![
-            Span::styled(format!(" {label:<6}"), theme.style(Role::Label)),
+            Span::styled(format!(" {label:<6}"), theme.style(TextRole::Label)),
             Span::styled(format!("{mark}{text:>17.17}"), theme.style(role)),
         ])
     };
@@ -36,32 +36,32 @@ pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let missed = data.is_some_and(|d| d.deadline_margin_us < 0);
     let margin = number(data.map(|d| f64::from(d.deadline_margin_us) / 1_000.0));
     vec![
-        wide_text("level", level, data.map_or(Role::Label, |d| level_role(d.level))),
-        wide_text("solver", status, data.map_or(Role::Label, |d| status_role(d.solver_status))),
+        wide_text("level", level, data.map_or(TextRole::Label, |d| level_role(d.level))),
+        wide_text("solver", status, data.map_or(TextRole::Label, |d| status_role(d.solver_status))),
         row(theme, "iterations", number(data.map(|d| f64::from(d.iterations))), 0, "", now),
         row(theme, "solve time", number(data.map(|d| f64::from(d.solve_time_us) / 1_000.0)), 2, "ms", now),
         row(theme, if missed { "MISSED BY" } else { "margin" }, margin, 2, "ms", now),
         row(theme, "cost", number(data.map(|d| f64::from(d.cost))), 1, "", now),
-        wide_text("KKT", kkt, Role::Plain),
+        wide_text("KKT", kkt, TextRole::Plain),
         row(theme, "thrust x", number(data.map(|d| f64::from(d.thrust_scale))), 3, "", now),
     ]
 }
 
-fn level_role(level: TdControlLevel) -> Role {
+fn level_role(level: TdControlLevel) -> TextRole {
     match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => Role::Good,
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => TextRole::Good,
         TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE | TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => {
-            Role::Caution
+            TextRole::Caution
         }
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => Role::Alarm,
-        _ => Role::Plain,
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => TextRole::Alarm,
+        _ => TextRole::Plain,
     }
 }
 
-fn status_role(status: TdSolverStatus) -> Role {
+fn status_role(status: TdSolverStatus) -> TextRole {
     match status {
-        TdSolverStatus::TD_SOLVER_STATUS_CONVERGED => Role::Good,
-        TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN => Role::Plain,
-        _ => Role::Caution,
+        TdSolverStatus::TD_SOLVER_STATUS_CONVERGED => TextRole::Good,
+        TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN => TextRole::Plain,
+        _ => TextRole::Caution,
     }
 }

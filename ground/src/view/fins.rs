@@ -1,5 +1,5 @@
-//! The four fins from above, north up: where each stands, how far it is open, measured, and where that is not what was
-//! commanded; and where the pad lies.
+//! The picture of the four fins from above, north up: the measured opening of each fin, a mark for fins that are not
+//! where they were commanded, and the direction to the pad.
 
 use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
@@ -13,29 +13,29 @@ use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
 use super::draw_lines;
 use super::number::{STALE_MARK, age_mark, fixed};
-use super::theme::{Role, Theme};
+use super::theme::{TextRole, Theme};
 use crate::model::Model;
 use crate::model::motion::{Attitude, Motion};
 use crate::model::vehicle::Deflection;
 
-/// Rows and columns of the picture: odd, so that its middle is one.
+/// Rows and columns of the picture; odd, so that its middle is a cell.
 pub const ROWS: u16 = 9;
 const COLUMNS: u16 = 25;
-/// A fin further from its command than this is marked.
+/// A fin that differs from its command by more than this is marked.
 const APART_DEG: f64 = 3.0;
-/// Headings of the fins 1 to 4 of a vehicle that stands unrolled: each 30 degrees off the east-west line (landing paper,
-/// Eq. 16 and 17: its moments go by sin 30 and cos 30 degrees).
-const STAND_DEG: [f64; 4] = [300.0, 240.0, 120.0, 60.0];
-/// The body's radius, how far out a fully open fin reaches, and where its label begins, rows.
+/// Headings of the fins 1 to 4 at zero roll: each is 30 degrees off the east-west line (landing paper, Eq. 16 and 17:
+/// the moments contain sin 30 and cos 30 degrees).
+const HEADING_DEG: [f64; 4] = [300.0, 240.0, 120.0, 60.0];
+/// The radius of the body, the reach of a fully open fin, and the start of its label, in rows.
 const BODY: f64 = 0.5;
 const REACH: f64 = 2.7;
 const LABEL: f64 = 3.1;
-/// Dots of the outline of an arm that is not open.
+/// How many dots mark the reach of a fin.
 const OUTLINE_DOTS: u32 = 5;
-/// Nearer than this the pad has no direction, m.
+/// Closer than this to the pad no direction is shown, m.
 const PAD_NEAR_M: f64 = 1.0;
 
-/// The title: what is up, and how far the pad is.
+/// The title, with the distance to the pad if it is known.
 pub fn title(model: &Model, now: Duration) -> String {
     match model.vehicle.motion.filter(|motion| motion.value.distance_m().is_finite()) {
         Some(motion) => {
@@ -46,10 +46,11 @@ pub fn title(model: &Model, now: Duration) -> String {
     }
 }
 
-/// Draws the picture. `!` marks a fin that is not where it was commanded; `P` on the border the way to the pad.
+/// Draws the picture. `!` marks a fin that is not where it was commanded; `P` on the border is the direction to the
+/// pad.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let Some(fins) = model.vehicle.fins else {
-        draw_lines(frame, area, &[TextLine::styled(" no data", theme.style(Role::Label))]);
+        draw_lines(frame, area, &[TextLine::styled(" no data", theme.style(TextRole::Label))]);
         return;
     };
     if area.width < COLUMNS || area.height < ROWS {
@@ -58,40 +59,40 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let area = Rect { x: area.x + (area.width - COLUMNS) / 2, width: COLUMNS, height: ROWS, ..area };
     let (mark, role) = age_mark(&fins, now);
     let roll_rad = model.vehicle.attitude.map_or(0.0, |attitude| roll_rad(&attitude.value));
-    // In rows; a column is half as wide.
+    // In rows; a column is half as wide as a row is high.
     let (across, up) = (f64::from(COLUMNS - 1) / 4.0, f64::from(ROWS - 1) / 2.0);
     let colour = |colour| if theme.colour { colour } else { Color::Reset };
-    let text = |words: String, role: Role| TextLine::styled(words, theme.style(role));
+    let text = |words: String, role: TextRole| TextLine::styled(words, theme.style(role));
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .x_bounds([-across, across])
         .y_bounds([-up, up])
         .paint(|context| {
             context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: colour(Color::Reset) });
-            for ((number, stand_deg), fin) in (1..).zip(STAND_DEG).zip(&fins.value) {
-                let (east, north) = libm::sincos(stand_deg.to_radians() + roll_rad);
+            for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
+                let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
                 arm(context, (east, north), fin, colour(Color::Cyan), colour(Color::DarkGray));
                 let apart = (fin.commanded_rad - fin.measured_rad).abs().to_degrees() > APART_DEG;
                 let degrees = fixed(fin.measured_rad.to_degrees(), 0);
                 let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
-                // A label leads outwards; a column is half a row.
+                // A label extends outwards.
                 let leads_left = if east < 0.0 { 0.5 * words.len() as f64 - 0.5 } else { 0.0 };
-                let role = if apart { Role::Caution } else { role };
+                let role = if apart { TextRole::Caution } else { role };
                 context.print(column(LABEL * east - leads_left), (LABEL * north).round(), text(words, role));
             }
             if model.vehicle.attitude.is_some() {
-                context.print(0.0, up, text("N".to_owned(), Role::Title));
+                context.print(0.0, up, text("N".to_owned(), TextRole::Title));
             }
             let motion = model.vehicle.motion;
             if let Some((east, north)) = motion.and_then(|motion| to_pad(&motion.value)) {
                 let (x, y) = on_border((east, north), (across, up));
-                context.print(column(x), y.round(), text("P".to_owned(), Role::Title));
+                context.print(column(x), y.round(), text("P".to_owned(), TextRole::Title));
             }
         });
     frame.render_widget(canvas, area);
 }
 
-/// Dots as far as it could open, a line as far as it is open.
+/// Draws a fin: dots as far as it can open, a line as far as it is open.
 fn arm(
     context: &mut Context,
     (east, north): (f64, f64),
@@ -111,19 +112,19 @@ fn arm(
     }
 }
 
-/// How far the vehicle has turned about its axis, rad, towards east: as its two cross axes have it together.
+/// The roll of the vehicle towards east, rad, from both cross axes.
 fn roll_rad(attitude: &Attitude) -> f64 {
     let [_, body_y, body_z] = &attitude.axes;
-    // Unrolled, y points east and z north.
+    // At zero roll, y points east and z north.
     libm::atan2(body_z[1] - body_y[0], body_z[0] + body_y[1])
 }
 
-/// East and north of the way to the pad; `None` over it, and where it is not known.
+/// The direction to the pad as east and north; `None` over the pad, and while it is unknown.
 fn to_pad(motion: &Motion) -> Option<(f64, f64)> {
     (motion.distance_m() >= PAD_NEAR_M).then_some((-motion.y_m, -motion.x_m))
 }
 
-/// Where the way in this direction leaves the picture; above the middle it steps aside for the north mark.
+/// Where a line in this direction leaves the picture; at the north mark it is moved aside.
 fn on_border((east, north): (f64, f64), (across, up): (f64, f64)) -> (f64, f64) {
     let scale = (across / east.abs()).min(up / north.abs());
     let (x, y) = (scale * east, scale * north);
@@ -131,7 +132,7 @@ fn on_border((east, north): (f64, f64), (across, up): (f64, f64)) -> (f64, f64) 
     (if on_north { libm::copysign(1.0, x) } else { x }, y)
 }
 
-/// The place of the nearest column: half a row wide.
+/// Rounds to the nearest column, which is half a row wide.
 fn column(x: f64) -> f64 {
     (2.0 * x).round() / 2.0
 }
@@ -141,11 +142,11 @@ mod tests {
     use super::*;
     use protocol::dialect::ATTITUDE_QUATERNION_DATA;
 
-    /// Upright, turned about its axis.
+    /// An upright attitude with this roll.
     fn rolled(degrees: f64) -> Attitude {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let (sin, cos) = libm::sincos(degrees.to_radians() / 2.0);
-        // A turn about down after a quarter turn about east.
+        // A rotation about down after a quarter turn about east.
         let [q1, q2, q3, q4] = [cos * half, -sin * half, cos * half, sin * half].map(|part| part as f32);
         Attitude::of(&ATTITUDE_QUATERNION_DATA { q1, q2, q3, q4, ..Default::default() }).unwrap()
     }
@@ -158,13 +159,14 @@ mod tests {
         }
     }
 
-    /// Where the moments of Eq. 16 and 17 have them: opening fin 1 pitches up and yaws right, so it stands north-west.
+    /// The positions follow from the moments of Eq. 16 and 17: opening fin 1 pitches up and yaws right, so it is in
+    /// the north-west.
     #[test]
-    fn val_landing_paper_eq_16_17_the_fins_stand_where_their_moments_come_from() {
+    fn val_landing_paper_eq_16_17_fin_positions_match_their_moments() {
         let pitch_signs = [1.0, -1.0, -1.0, 1.0];
         let yaw_signs = [1.0, 1.0, -1.0, -1.0];
-        for ((stand_deg, pitch), yaw) in STAND_DEG.into_iter().zip(pitch_signs).zip(yaw_signs) {
-            let (east, north) = libm::sincos(f64::to_radians(stand_deg));
+        for ((heading_deg, pitch), yaw) in HEADING_DEG.into_iter().zip(pitch_signs).zip(yaw_signs) {
+            let (east, north) = libm::sincos(f64::to_radians(heading_deg));
             let (sin_30, cos_30) = libm::sincos(30.0_f64.to_radians());
             assert!((north - pitch * sin_30).abs() < 1e-12 && (east + yaw * cos_30).abs() < 1e-12);
         }

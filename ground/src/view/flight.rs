@@ -1,4 +1,4 @@
-//! Altitude, speeds, attitude.
+//! The panel of altitude, speeds and attitude.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::theme::Theme;
 use crate::model::Model;
 use crate::model::motion::{Attitude, BodySpeed, Motion};
 
-/// The panel's rows: in the plane with their signs, in space as sizes, because nobody reads a sign of east.
+/// The rows: signed values for a planar vehicle, magnitudes for a vehicle in space.
 pub fn rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
     let (motion, attitude, body) = (vehicle.best_motion(), vehicle.attitude, vehicle.body_speed());

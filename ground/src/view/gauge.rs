@@ -1,41 +1,42 @@
-//! The height gauge: a scale from the pad up, the ignition band on it, the vehicle beside it.
+//! The height gauge: a scale from the pad upwards with the ignition band and the vehicle.
 
 use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
 use super::number::{age_mark, fixed};
-use super::theme::{Role, Theme};
+use super::theme::{TextRole, Theme};
 use crate::model::Model;
-use crate::model::reckoning::{is_unheard, reckon};
+use crate::model::dead_reckoning::{is_unheard, predict_position};
 
-/// The scale reaches at least this high, m.
+/// The least height of the scale, m.
 const TOP_MIN_M: f64 = 25.0;
-/// Steps to ten times the height (Renard's series of ten, ISO 3): a scale that changed with every frame could not be read.
+/// The steps of the scale within a decade (Renard series R10, ISO 3), so that the scale does not change with every
+/// frame.
 const STEPS: [f64; 10] = [1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0];
 
-/// One line a row, the greatest height first.
+/// One line per row, the greatest height first.
 pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
     if rows < 3 {
         return Vec::new();
     }
     let descent = model.vehicle.descent.as_ref();
-    // A motor that will not be lit has no band.
+    // If the motor will not be lit there is no ignition band.
     let to_light = descent.filter(|_| model.vehicle.may_light());
     let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
     let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
     let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
     let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
-    let lost = reckon(&model.vehicle, now);
+    let lost = predict_position(&model.vehicle, now);
     let (height, mark, role) = match (lost, model.vehicle.height_m()) {
-        (Some(at), _) => (finite(at.altitude_m), "pred ", Role::Stale),
+        (Some(at), _) => (finite(at.altitude_m), "pred ", TextRole::Stale),
         (None, Some(height)) if !is_unheard(&model.vehicle, now) => {
             let (mark, role) = age_mark(&height, now);
             (finite(height.value.max(0.0)), mark, role)
         }
-        // Nothing is known of where it can be.
-        (None, _) => (None, " ", Role::Label),
+        // The position is unknown.
+        (None, _) => (None, " ", TextRole::Label),
     };
     let marks = [height, band.map(|band| band.1), chosen, commit];
     let top = top_m(marks.into_iter().flatten().fold(0.0, f64::max));
@@ -47,18 +48,18 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
             let here = |height: Option<f64>| height.is_some_and(|height| (low..high).contains(&height));
             let inside = band.is_some_and(|(bottom, top)| bottom < high && top >= low);
             let mut spans = vec![
-                Span::styled(format!("{:>6} ", fixed(row as f64 * per_row, 0)), theme.style(Role::Label)),
-                Span::styled(if inside { "▐█▌" } else { " │ " }, theme.style(Role::Plain)),
+                Span::styled(format!("{:>6} ", fixed(row as f64 * per_row, 0)), theme.style(TextRole::Label)),
+                Span::styled(if inside { "▐█▌" } else { " │ " }, theme.style(TextRole::Plain)),
             ];
             if here(height) {
                 let text = height.map_or_else(String::new, |height| fixed(height, 1));
-                let role = if role == Role::Stale { role } else { Role::Title };
+                let role = if role == TextRole::Stale { role } else { TextRole::Title };
                 spans.push(Span::styled(format!("<{mark}{text} "), theme.style(role)));
             }
             for (at, name) in [(chosen, "IGNITE"), (commit, "commit")] {
                 if here(at) {
                     let text = at.map_or_else(String::new, |height| fixed(height, 0));
-                    spans.push(Span::styled(format!("-{name} {text} "), theme.style(Role::Caution)));
+                    spans.push(Span::styled(format!("-{name} {text} "), theme.style(TextRole::Caution)));
                 }
             }
             Line::from(spans)
@@ -66,7 +67,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         .collect()
 }
 
-/// The step of the scale above a height, m.
+/// The smallest step of the scale at or above a height, m.
 fn top_m(highest_m: f64) -> f64 {
     let highest_m = highest_m.clamp(TOP_MIN_M, 1e6);
     let decade = libm::exp10(libm::floor(libm::log10(highest_m)));
@@ -78,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_scale_goes_in_steps() {
+    fn the_scale_has_fixed_steps() {
         for (highest_m, top) in
             [(0.0, 25.0), (25.0, 25.0), (26.0, 31.5), (99.0, 100.0), (101.0, 125.0), (299.0, 315.0)]
         {

@@ -1,30 +1,32 @@
-//! The screen: one pure function from the model and the time to a frame.
+//! Draws the screen: one pure function from the model and the time to a frame.
 //!
-//! Who sits where ([`identity`]) is the first line. The top lines (phase, armed, countdown, link, abort key and what an abort would do) stand in the
-//! same place on every screen and under every dialog; so do the alarm line and the screens' names. One room
-//! a screen is in [`pages`]. From 80x24 on the panels are laid out side by side ([`wide`]); on anything
-//! smaller the same facts come as lines, the most important first ([`compact`]). A terminal without Unicode
-//! gets the same cells in ASCII ([`ascii`]).
+//! Every page has the same frame: [`identity`] is the first line, [`top_lines`] follow (phase, armed, countdown,
+//! link, what an abort would do), and [`alarm_line`] and the page names are at the bottom. [`pages`] has one module
+//! per page; the other modules are panels and helpers of the pages. From 80x24 on, [`wide`] lays the panels out side
+//! by side; on smaller terminals [`compact`] shows plain lines, the most important first. For terminals without
+//! Unicode, [`ascii`] converts the result.
 
 pub mod actuators;
-pub mod alarms;
+pub mod alarm_line;
 pub mod ascii;
-pub mod big;
+pub mod big_letters;
 pub mod compact;
 pub mod controller;
 pub mod dialog;
+pub mod event_list;
 pub mod fins;
 pub mod flight;
 pub mod gauge;
-pub mod happenings;
 pub mod identity;
-pub mod lost;
-pub mod next;
+pub mod limit_rows;
+pub mod link_line;
+pub mod lost_position;
+pub mod next_event;
 pub mod number;
 pub mod pages;
-pub mod side;
+pub mod side_view;
 pub mod theme;
-pub mod top;
+pub mod top_lines;
 pub mod touchdown;
 pub mod verdict;
 pub mod wide;
@@ -42,7 +44,6 @@ use theme::Theme;
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 24;
 
-/// Draws everything.
 pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     let area = frame.area();
     if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
@@ -55,7 +56,7 @@ pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     }
 }
 
-/// Draws lines from the top of an area; what does not fit is not drawn.
+/// Draws lines from the top of an area, as many as fit.
 fn draw_lines(frame: &mut Frame, area: Rect, lines: &[Line]) {
     let area = area.intersection(frame.area());
     for (line, y) in lines.iter().zip(area.y..area.bottom()) {

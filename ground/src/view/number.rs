@@ -1,26 +1,26 @@
-//! Numbers that keep their place: a fixed width whatever arrives over the radio.
+//! Formats numbers with a bounded width, whatever arrives over the radio.
 
 use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
-use super::theme::{Role, Theme};
+use super::theme::{TextRole, Theme};
 use crate::model::vehicle::Sample;
 
 /// The mark before a value that is too old.
 pub const STALE_MARK: &str = "~";
-/// Width of a row's value, its mark not counted.
+/// The width of a value in a row, without its mark.
 const VALUE_WIDTH: usize = 9;
 const LABEL_WIDTH: usize = 10;
 
-/// A number in a few characters; `--` for what is no number.
+/// A number with fixed decimals; `--` for NaN and infinity.
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         "--".to_owned()
     } else if value.abs() >= 1e6 {
         format!("{value:.1e}")
     } else {
-        // Rounds to zero without a minus sign.
+        // A value that rounds to zero has no minus sign.
         let text = format!("{value:.decimals$}");
         match text.strip_prefix('-') {
             Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
@@ -29,7 +29,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A setting without needless digits: `20`, `0.1`, `82.5`. Three decimals hide that it came as an `f32`.
+/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the error of an `f32`.
 pub fn shortest(value: f64) -> String {
     let text = fixed(value, 3);
     match text.split_once('.') {
@@ -40,12 +40,12 @@ pub fn shortest(value: f64) -> String {
     }
 }
 
-/// The mark and the role of a value of this age.
-pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, Role) {
-    if sample.is_stale(now) { (STALE_MARK, Role::Stale) } else { (" ", Role::Plain) }
+/// The mark and the role of a value by its age.
+pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole) {
+    if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) }
 }
 
-/// A labelled value with its unit; its age marked; `--` when it was never received.
+/// A row with label, value and unit. A stale value is marked; a missing one is `--`.
 pub fn row(
     theme: Theme,
     label: &str,
@@ -55,27 +55,27 @@ pub fn row(
     now: Duration,
 ) -> Line<'static> {
     let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
-    let (mark, role) = value.map_or((" ", Role::Label), |sample| age_mark(&sample, now));
+    let (mark, role) = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now));
     text_row(theme, label, mark, &text, role, unit)
 }
 
-/// A labelled text, aligned like the numbers.
+/// A row with label and text, aligned like the numbers.
 pub fn text_row(
     theme: Theme,
     label: &str,
     mark: &'static str,
     text: &str,
-    role: Role,
+    role: TextRole,
     unit: &'static str,
 ) -> Line<'static> {
     Line::from(vec![
-        Span::styled(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}"), theme.style(Role::Label)),
+        Span::styled(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}"), theme.style(TextRole::Label)),
         Span::styled(format!("{mark}{text:>VALUE_WIDTH$}"), theme.style(role)),
-        Span::styled(format!(" {unit}"), theme.style(Role::Label)),
+        Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
     ])
 }
 
-/// A duration in seconds for people.
+/// A duration in seconds, as in `3.2 s`.
 pub fn seconds(duration: Duration) -> String {
     let seconds = duration.as_secs_f64();
     if seconds < 100.0 { format!("{seconds:.1} s") } else { format!("{seconds:.0} s") }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_have_no_needless_digits() {
+    fn numbers_have_no_unneeded_digits() {
         let cases = [(20.0, "20"), (f64::from(0.1_f32), "0.1"), (82.5, "82.5"), (0.0, "0"), (f64::NAN, "--")];
         for (value, expected) in cases {
             assert_eq!(shortest(value), expected);

@@ -1,29 +1,27 @@
-//! Roles to styles. Colour only repeats what a word or a glyph already says.
+//! Gives each role of a text a style. Colour only repeats what a word or a mark already says.
 
 use ratatui::style::{Color, Modifier, Style};
 
-/// What a piece of text means.
+/// The role of a piece of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum TextRole {
     /// A value or a sentence.
     Plain,
-    /// Names and units, less important than values.
+    /// A name or unit, less important than a value.
     Label,
     /// A value that is too old.
     Stale,
-    /// A panel's title.
     Title,
-    /// As it should be.
+    /// A state as it should be.
     Good,
-    /// Worth a look.
+    /// A state that needs attention.
     Caution,
-    /// Wrong, or dangerous.
+    /// A wrong or dangerous state.
     Alarm,
-    /// A key to press.
     Key,
 }
 
-/// How roles look on this terminal.
+/// What the terminal can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
     /// Whether colours may be used.
@@ -33,12 +31,12 @@ pub struct Theme {
 }
 
 impl Theme {
-    /// What the terminal can show, by what its environment says: `TERM`, `NO_COLOR`, and the first of
-    /// `LC_ALL`, `LC_CTYPE` and `LANG` that is set (POSIX.1-2017, 8.2).
+    /// Reads what the terminal can show from the environment: `TERM`, `NO_COLOR`, and the first of `LC_ALL`,
+    /// `LC_CTYPE` and `LANG` that is set (POSIX.1-2017, 8.2).
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
-        // Terminals of before colour, and of paper.
+        // Terminals without colour.
         let grey = ["vt1", "vt2", "vt3", "ansi-m", "linux-m", "xterm-mono"];
         let colour = set("NO_COLOR").is_none() && !grey.iter().any(|name| term.starts_with(name));
         let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default();
@@ -48,23 +46,23 @@ impl Theme {
         Self { colour, ascii: !unicode || old }
     }
 
-    /// A limit to either side, as this terminal can write it.
+    /// Replaces `±` on a terminal that shows only ASCII.
     pub fn either_side(self, text: &str) -> String {
         if self.ascii { text.replace('±', "+-") } else { text.to_owned() }
     }
 
-    /// The style of a role. Only the 16 basic colours, which the terminal's owner has chosen readable.
-    pub fn style(self, role: Role) -> Style {
+    /// The style of a role. Uses only the 16 basic colours, which users choose to be readable.
+    pub fn style(self, role: TextRole) -> Style {
         let plain = Style::new();
         let coloured = |colour| if self.colour { plain.fg(colour) } else { plain };
         match role {
-            Role::Plain => plain,
-            Role::Label => plain.add_modifier(Modifier::DIM),
-            Role::Stale => plain.add_modifier(Modifier::DIM | Modifier::ITALIC),
-            Role::Title | Role::Key => plain.add_modifier(Modifier::BOLD),
-            Role::Good => coloured(Color::Green),
-            Role::Caution => coloured(Color::Yellow).add_modifier(Modifier::BOLD),
-            Role::Alarm => coloured(Color::Red).add_modifier(Modifier::BOLD | Modifier::REVERSED),
+            TextRole::Plain => plain,
+            TextRole::Label => plain.add_modifier(Modifier::DIM),
+            TextRole::Stale => plain.add_modifier(Modifier::DIM | Modifier::ITALIC),
+            TextRole::Title | TextRole::Key => plain.add_modifier(Modifier::BOLD),
+            TextRole::Good => coloured(Color::Green),
+            TextRole::Caution => coloured(Color::Yellow).add_modifier(Modifier::BOLD),
+            TextRole::Alarm => coloured(Color::Red).add_modifier(Modifier::BOLD | Modifier::REVERSED),
         }
     }
 }

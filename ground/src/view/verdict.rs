@@ -1,58 +1,56 @@
-//! The landing against both standards: the vehicle's own verdict, and beside it what the ground computes from the figures
-//! that the vehicle sent.
+//! The verdict of the vehicle, beside the verdicts that the ground computes by the other standards.
 
-use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 use ratatui::text::{Line, Span};
 
-use super::number::{fixed, shortest};
-use super::theme::{Role, Theme};
-use super::touchdown::decimals;
-use crate::limits::{LimitRow, Touchdown};
+use super::limit_rows::{LimitRow, decimals, either_side, limit_rows, range};
+use super::number::fixed;
+use super::theme::{TextRole, Theme};
 use crate::model::Model;
-use crate::model::judgement::{Held, LEGS, Standard, TABLE_2, together};
+use crate::model::judgement::{Compliance, LEGS, Standard, TABLE_2, overall};
+use crate::model::touchdown::Touchdown;
 use crate::model::vehicle::Verdict;
 
-/// Columns of the figures, of their units, and of each verdict behind them.
+/// Columns of the values, of their units and of each verdict.
 const FIGURE_COLUMNS: usize = 14;
 const UNIT_COLUMNS: usize = 8;
 const VERDICT_COLUMNS: usize = 11;
-/// From here on the verdict has room for all its words.
+/// From this width on the verdict is written in full.
 const WORDS_COLUMNS: usize = 70;
-/// Marks what is computed here.
+/// Marks what the ground has computed.
 const COMPUTED: &str = "*";
 
-/// One standard's judgement, computed here.
+/// The judgement by one standard, computed by the ground.
 struct Beside {
     standard: Standard,
-    held: [Held; 6],
+    held: [Compliance; 6],
 }
 
-/// The verdicts in words, each with whose it is: the vehicle's, which decides, then what is computed by the other limits. Two
-/// verdicts stand side by side here, so none says "every limit".
+/// The verdicts in words: first the vehicle's own, which decides, then the computed ones.
 pub fn words(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> Line<'static> {
-    let (word, role) = if verdict.landed { ("LANDED", Role::Good) } else { ("NOT LANDED", Role::Alarm) };
+    let (word, role) =
+        if verdict.landed { ("LANDED", TextRole::Good) } else { ("NOT LANDED", TextRole::Alarm) };
     let whose = Standard::whose(model.vehicle.limits.as_ref());
     let says = if columns < WORDS_COLUMNS { "" } else { ", says the vehicle" };
     let mut spans = vec![
         Span::styled(format!(" {word}"), theme.style(role)),
-        Span::styled(format!(" by {whose}{says}"), theme.style(Role::Plain)),
+        Span::styled(format!(" by {whose}{says}"), theme.style(TextRole::Plain)),
     ];
     for beside in beside(model, verdict) {
-        let (word, role) = in_words(together(&beside.held));
+        let (word, role) = in_words(overall(&beside.held));
         let name = beside.standard.name;
-        spans.push(Span::styled(format!("; by {name}{COMPUTED} "), theme.style(Role::Label)));
+        spans.push(Span::styled(format!("; by {name}{COMPUTED} "), theme.style(TextRole::Label)));
         spans.push(Span::styled(word, theme.style(role)));
     }
     Line::from(spans)
 }
 
-/// Every limit a row: the figure, the vehicle's judgement, the computed ones.
+/// The table with a row per limit: the value, the vehicle's judgement and the computed ones.
 pub fn table(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let units = columns >= table_columns(model, verdict);
     let figure_columns = FIGURE_COLUMNS + if units { UNIT_COLUMNS } else { 1 };
     let limits = model.vehicle.limits.as_ref();
     let besides = beside(model, verdict);
-    let own = own(limits).map_or("vehicle", |standard| standard.name);
+    let own = limits.and_then(Standard::of).map_or("vehicle", |standard| standard.name);
     let mut heads = vec![format!("{own:<VERDICT_COLUMNS$}")];
     heads.extend(
         besides
@@ -61,11 +59,11 @@ pub fn table(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> 
     );
     let mut lines = vec![Line::styled(
         format!("{:<figure_columns$}{}", "Verdict", heads.concat()),
-        theme.style(Role::Title),
+        theme.style(TextRole::Title),
     )];
-    for (place, row) in verdict.touchdown.rows(limits).iter().enumerate() {
+    for (place, row) in limit_rows(&verdict.touchdown, limits).iter().enumerate() {
         let mut spans = figure(row, units, theme);
-        let kept = if row.kept { Held::Kept } else { Held::Broken };
+        let kept = if row.kept { Compliance::Kept } else { Compliance::Broken };
         spans.extend(judged(kept, &theme.either_side(&row.limit), theme));
         for beside in &besides {
             spans.extend(judged(
@@ -77,31 +75,26 @@ pub fn table(model: &Model, verdict: &Verdict, theme: Theme, columns: usize) -> 
         lines.push(Line::from(spans));
     }
     if !besides.is_empty() {
-        let doubt = besides.iter().any(|beside| beside.held.contains(&Held::Unknown));
+        let doubt = besides.iter().any(|beside| beside.held.contains(&Compliance::Unknown));
         let words = if doubt {
             "* computed here; ? these figures do not tell"
         } else {
             "* computed here from these figures"
         };
-        lines.push(Line::styled(words, theme.style(Role::Label)));
+        lines.push(Line::styled(words, theme.style(TextRole::Label)));
     }
     lines
 }
 
-/// Columns that [`table`] takes.
+/// How many columns [`table`] takes.
 pub fn table_columns(model: &Model, verdict: &Verdict) -> usize {
     FIGURE_COLUMNS + UNIT_COLUMNS + VERDICT_COLUMNS * (1 + beside(model, verdict).len())
 }
 
-/// The standard by which the vehicle judges, if it is one of the two.
-pub fn own(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> Option<Standard> {
-    limits.and_then(Standard::of)
-}
-
-/// What the vehicle does not judge by. Before it has said by what it judges, nothing is known to be missing.
+/// The standards that the vehicle does not judge by itself. Empty until the vehicle has reported its limits.
 fn beside(model: &Model, verdict: &Verdict) -> Vec<Beside> {
     let Some(limits) = model.vehicle.limits.as_ref() else { return Vec::new() };
-    let own = own(Some(limits));
+    let own = Standard::of(limits);
     let touchdown: &Touchdown = &verdict.touchdown;
     [TABLE_2, LEGS]
         .into_iter()
@@ -113,43 +106,42 @@ fn beside(model: &Model, verdict: &Verdict) -> Vec<Beside> {
 fn figure(row: &LimitRow, units: bool, theme: Theme) -> Vec<Span<'static>> {
     let unit = if units { format!(" {:<7}", row.unit) } else { " ".to_owned() };
     vec![
-        Span::styled(format!("{:<6}", row.name), theme.style(Role::Label)),
-        Span::styled(format!("{:>8}", fixed(row.value, decimals(row.value))), theme.style(Role::Plain)),
-        Span::styled(unit, theme.style(Role::Label)),
+        Span::styled(format!("{:<6}", row.name), theme.style(TextRole::Label)),
+        Span::styled(format!("{:>8}", fixed(row.value, decimals(row.value))), theme.style(TextRole::Plain)),
+        Span::styled(unit, theme.style(TextRole::Label)),
     ]
 }
 
-fn judged(held: Held, limit: &str, theme: Theme) -> Vec<Span<'static>> {
+fn judged(held: Compliance, limit: &str, theme: Theme) -> Vec<Span<'static>> {
     let (word, role) = match held {
-        Held::Kept => ("ok", Role::Good),
-        Held::Broken => ("NO", Role::Alarm),
-        Held::Unknown => ("? ", Role::Caution),
+        Compliance::Kept => ("ok", TextRole::Good),
+        Compliance::Broken => ("NO", TextRole::Alarm),
+        Compliance::Unknown => ("? ", TextRole::Caution),
     };
     let columns = VERDICT_COLUMNS - 3;
     vec![
         Span::styled(word, theme.style(role)),
-        Span::styled(format!(" {limit:<columns$}"), theme.style(Role::Label)),
+        Span::styled(format!(" {limit:<columns$}"), theme.style(TextRole::Label)),
     ]
 }
 
-fn in_words(held: Held) -> (&'static str, Role) {
+fn in_words(held: Compliance) -> (&'static str, TextRole) {
     match held {
-        Held::Kept => ("landed", Role::Good),
-        Held::Broken => ("not landed", Role::Caution),
-        Held::Unknown => ("not known", Role::Caution),
+        Compliance::Kept => ("landed", TextRole::Good),
+        Compliance::Broken => ("not landed", TextRole::Caution),
+        Compliance::Unknown => ("not known", TextRole::Caution),
     }
 }
 
-/// A limit for reading, in the units of the screen, in state order.
+/// The text of a limit by its place in the order of the state.
 fn limit_of(standard: &Standard, place: usize) -> String {
-    let either_side = |limit: f64| format!("±{}", shortest(limit));
     let upright_deg = 90.0;
     match place {
         0 => standard.distance_m.map_or_else(|| "any".to_owned(), either_side),
-        1 => format!("{}..{}", shortest(standard.altitude_m.0), shortest(standard.altitude_m.1)),
+        1 => range(standard.altitude_m.0, standard.altitude_m.1),
         2 => {
             let error_deg = standard.tilt_rad.to_degrees();
-            format!("{}..{}", shortest(upright_deg - error_deg), shortest(upright_deg + error_deg))
+            range(upright_deg - error_deg, upright_deg + error_deg)
         }
         3 => either_side(standard.along_m_s),
         4 => either_side(standard.across_m_s),

@@ -1,4 +1,4 @@
-//! The frame of every screen from 80x24 on: who sits where, the top lines, the screen itself, the alarm line, the names.
+//! The layout from 80x24 on: identity, top lines, the page, the alarm line, the page names.
 
 use std::time::Duration;
 
@@ -6,12 +6,11 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::theme::{Role, Theme};
-use super::{alarms, dialog, identity, pages, top};
+use super::theme::{TextRole, Theme};
+use super::{alarm_line, dialog, identity, pages, top_lines};
 use crate::model::Model;
 use crate::model::page::Page;
 
-/// Draws everything.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [identity, status, abort, command, body, alarm, names] = area.layout(&Layout::vertical([
         Constraint::Length(1),
@@ -24,10 +23,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     ]));
     identity::draw(model, theme, frame, identity);
     draw_status(model, theme, now, frame, status);
-    frame.render_widget(top::abort(model, theme, now), abort);
-    frame.render_widget(top::command(model, theme, now), command);
+    frame.render_widget(top_lines::abort(model, theme, now), abort);
+    frame.render_widget(top_lines::command(model, theme, now), command);
     pages::draw(model, theme, now, frame, body);
-    alarms::draw(model, theme, now, frame, alarm);
+    alarm_line::draw(model, theme, now, frame, alarm);
     frame.render_widget(names_line(model, theme), names);
     dialog::draw(model, theme, now, frame, body);
 }
@@ -40,23 +39,24 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
         Constraint::Fill(1),
         Constraint::Length(20),
     ]));
-    frame.render_widget(top::phase(model, theme, now), phase);
-    frame.render_widget(top::armed(model, theme, now), armed);
-    frame.render_widget(top::countdown(model, theme, now), countdown);
-    frame.render_widget(top::link(model, theme, now), link);
-    frame.render_widget(Line::styled(top::abort_key(model), theme.style(Role::Key)), abort);
+    frame.render_widget(top_lines::phase(model, theme, now), phase);
+    frame.render_widget(top_lines::armed(model, theme, now), armed);
+    frame.render_widget(top_lines::countdown(model, theme, now), countdown);
+    frame.render_widget(top_lines::link(model, theme, now), link);
+    frame.render_widget(Line::styled(top_lines::abort_key(model), theme.style(TextRole::Key)), abort);
 }
 
-/// The screens' digits and names, the shown one in brackets, and whether it is held.
+/// Digits and names of the pages, the shown one in brackets, and whether it is held.
 fn names_line(model: &Model, theme: Theme) -> Line<'static> {
     let shown = model.page();
     let mut spans = Vec::new();
     for page in Page::ALL.into_iter().chain([Page::Help]) {
-        let (left, right, role) = if page == shown { ("[", "]", Role::Key) } else { (" ", "", Role::Label) };
+        let (left, right, role) =
+            if page == shown { ("[", "]", TextRole::Key) } else { (" ", "", TextRole::Label) };
         spans.push(Span::styled(format!("{left}{}{}{right}", page.key(), page.name()), theme.style(role)));
     }
     let (word, role) =
-        if model.pages.held.is_some() { (" HELD 0", Role::Caution) } else { (" auto", Role::Good) };
+        if model.pages.held.is_some() { (" HELD 0", TextRole::Caution) } else { (" auto", TextRole::Good) };
     spans.push(Span::styled(word, theme.style(role)));
     Line::from(spans)
 }

@@ -1,6 +1,6 @@
 //! The automatic mode, on a simulated clock.
 
-use crate::bench::{Bench, is_arm, settings};
+use crate::rig::{Rig, is_arm, settings};
 use ground::exit::{Exit, decide};
 use ground::model::Settings;
 use protocol::dialect::{MavCmd, TdPhase};
@@ -11,128 +11,128 @@ const DENIED: u8 = 2;
 
 #[test]
 fn the_automatic_mode_arms_and_starts_once() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.run(2.0);
-    let commands = bench.take_commands();
+    let mut rig = Rig::new(settings(true, false));
+    rig.run(2.0);
+    let commands = rig.take_commands();
     assert!(commands.len() == 1 && is_arm(&commands[0]), "{commands:?}");
-    bench.answer(ARM, 0);
-    bench.armed = true;
-    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
-    bench.run(1.0);
-    bench.answer(MavCmd::MAV_CMD_MISSION_START, 0);
-    bench.countdown_ms = 5_000;
-    bench.run(5.0);
-    let commands = bench.take_commands();
+    rig.answer(ARM, 0);
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(1.0);
+    rig.answer(MavCmd::MAV_CMD_MISSION_START, 0);
+    rig.countdown_ms = 5_000;
+    rig.run(5.0);
+    let commands = rig.take_commands();
     assert_eq!(commands.len(), 1);
     assert_eq!(commands[0].command, MavCmd::MAV_CMD_MISSION_START);
 }
 
 #[test]
-fn a_vehicle_whose_checks_fail_is_never_asked_and_the_run_ends_with_the_reason() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.checks_failed = 0b10;
-    bench.run(10.5);
-    assert!(!bench.events().contains("gives up"), "ten seconds from the first heartbeat, at 1 s");
-    bench.run(4.0);
-    assert!(bench.commands().is_empty());
-    assert!(bench.events().contains("gives up 10 s after first contact: failing checks: "));
-    assert!(bench.wants_to_quit());
-    assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+fn failing_checks_prevent_arming_and_the_run_ends_with_the_reason() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.checks_failed = 0b10;
+    rig.run(10.5);
+    assert!(!rig.events().contains("gave up"), "ten seconds from the first heartbeat, at 1 s");
+    rig.run(4.0);
+    assert!(rig.commands().is_empty());
+    assert!(rig.events().contains("gave up 10 s after first contact: failing checks: "));
+    assert!(rig.wants_to_quit());
+    assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
 #[test]
-fn patience_begins_with_the_first_contact_and_checks_that_pass_in_time_are_enough() {
-    let mut bench = Bench::new(settings(true, true));
-    bench.speaks = false;
-    bench.run(30.0);
-    bench.speaks = true;
-    bench.checks_failed = 0b10;
-    bench.run(8.0);
-    assert!(bench.take_commands().is_empty());
-    bench.checks_failed = 0;
-    bench.run(0.2);
-    assert!(is_arm(&bench.take_commands()[0]));
+fn the_time_limit_starts_with_the_first_heartbeat() {
+    let mut rig = Rig::new(settings(true, true));
+    rig.speaks = false;
+    rig.run(30.0);
+    rig.speaks = true;
+    rig.checks_failed = 0b10;
+    rig.run(8.0);
+    assert!(rig.take_commands().is_empty());
+    rig.checks_failed = 0;
+    rig.run(0.2);
+    assert!(is_arm(&rig.take_commands()[0]));
 }
 
 #[test]
-fn nothing_is_armed_before_the_vehicle_has_said_that_its_checks_pass() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.speaks = false;
+fn nothing_is_armed_before_the_vehicle_has_reported_its_checks() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.speaks = false;
     for _ in 0..13 {
-        bench.run(1.0);
-        bench.heartbeat();
+        rig.run(1.0);
+        rig.heartbeat();
     }
-    assert!(bench.events().contains("gives up 10 s after first contact: the vehicle has not said"));
-    assert!(bench.commands().is_empty());
-    assert!(bench.wants_to_quit());
-    assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+    assert!(rig.events().contains("gave up 10 s after first contact: the vehicle has not reported"));
+    assert!(rig.commands().is_empty());
+    assert!(rig.wants_to_quit());
+    assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
 #[test]
-fn refused_for_now_is_asked_again_once_the_checks_pass() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.run(2.0);
-    assert!(is_arm(&bench.take_commands()[0]));
-    bench.checks_failed = 0b10;
-    bench.answer(ARM, TEMPORARILY_REJECTED);
-    bench.run(3.0);
-    assert!(bench.take_commands().is_empty(), "no timer sends it again");
-    bench.checks_failed = 0;
-    bench.run(0.2);
-    let again = bench.take_commands();
+fn a_temporary_refusal_is_commanded_again_once_the_checks_pass() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.run(2.0);
+    assert!(is_arm(&rig.take_commands()[0]));
+    rig.checks_failed = 0b10;
+    rig.answer(ARM, TEMPORARILY_REJECTED);
+    rig.run(3.0);
+    assert!(rig.take_commands().is_empty(), "no timer sends it again");
+    rig.checks_failed = 0;
+    rig.run(0.2);
+    let again = rig.take_commands();
     assert!(again.len() == 1 && is_arm(&again[0]) && again[0].confirmation == 0, "{again:?}");
-    assert_eq!(bench.events().matches("the checks pass; arming").count(), 2, "each submission is logged");
-    assert!(!bench.wants_to_quit());
+    assert_eq!(rig.events().matches("the checks pass; arming").count(), 2, "each submission is logged");
+    assert!(!rig.wants_to_quit());
 }
 
 #[test]
-fn refused_for_now_again_and_again_ends_with_patience() {
-    let mut bench = Bench::new(settings(true, false));
+fn repeated_temporary_refusals_end_with_the_time_limit() {
+    let mut rig = Rig::new(settings(true, false));
     let mut asked = 0;
     let mut quit = false;
     for _ in 0..200 {
-        bench.run(0.1);
-        quit |= bench.wants_to_quit();
-        for _ in bench.take_commands().into_iter().filter(is_arm) {
+        rig.run(0.1);
+        quit |= rig.wants_to_quit();
+        for _ in rig.take_commands().into_iter().filter(is_arm) {
             asked += 1;
-            bench.answer(ARM, TEMPORARILY_REJECTED);
+            rig.answer(ARM, TEMPORARILY_REJECTED);
         }
     }
     assert!((5..=12).contains(&asked), "asked {asked} times");
-    assert!(quit && bench.events().contains("gives up 10 s after first contact: refused for now"));
-    assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+    assert!(quit && rig.events().contains("gave up 10 s after first contact: temporarily refused"));
+    assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
 #[test]
-fn refused_for_good_ends_with_its_own_code() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.run(2.0);
-    assert!(is_arm(&bench.take_commands()[0]));
-    bench.answer(ARM, DENIED);
-    bench.run(3.0);
-    assert!(bench.commands().is_empty());
-    assert!(bench.wants_to_quit());
-    assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+fn a_final_refusal_ends_with_its_exit_code() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.run(2.0);
+    assert!(is_arm(&rig.take_commands()[0]));
+    rig.answer(ARM, DENIED);
+    rig.run(3.0);
+    assert!(rig.commands().is_empty());
+    assert!(rig.wants_to_quit());
+    assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
-/// A vehicle that does not say that it is simulated, or says so once only, is a real one.
+/// A vehicle that does not always report to be simulated counts as real.
 #[test]
 fn the_automatic_mode_is_refused_with_a_live_vehicle() {
     for interactive in [false, true] {
-        let mut bench = Bench::new(settings(true, interactive));
-        bench.simulated = false;
-        bench.run(2.0);
-        assert!(bench.take_commands().is_empty());
-        assert!(bench.events().contains("automatic mode refused: the vehicle is live"), "{}", bench.events());
-        bench.simulated = true;
-        bench.armed = true;
-        bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
-        bench.run(5.0);
-        assert_eq!(bench.wants_to_quit(), !interactive);
-        assert!(bench.take_commands().is_empty(), "refused is refused");
-        assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+        let mut rig = Rig::new(settings(true, interactive));
+        rig.simulated = false;
+        rig.run(2.0);
+        assert!(rig.take_commands().is_empty());
+        assert!(rig.events().contains("automatic mode refused: the vehicle is live"), "{}", rig.events());
+        rig.simulated = true;
+        rig.armed = true;
+        rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+        rig.run(5.0);
+        assert_eq!(rig.wants_to_quit(), !interactive);
+        assert!(rig.take_commands().is_empty(), "refused is refused");
+        assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
     }
-    let mut own = Bench::new(Settings { demonstration: true, ..settings(true, false) });
+    let mut own = Rig::new(Settings { demonstration: true, ..settings(true, false) });
     own.simulated = false;
     own.run(2.0);
     assert!(is_arm(&own.take_commands()[0]), "the vehicle of this very process");

@@ -1,4 +1,4 @@
-//! A station without a screen, and screens that come and go over its socket.
+//! A daemon, and screens that attach and detach over its socket.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
@@ -7,15 +7,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use ground::attach::codec::{Asked, Told, decode_told, encode_asked, length};
-use ground::model::command::{CommandKind, Track};
+use ground::attach::codec::{decode_to_screen, encode_to_station, length};
+use ground::attach::message::{ToScreen, ToStation};
+use ground::model::command::{CommandKind, TrackedCommand};
 use ground::model::seat::Seat;
 use ground::model::{Model, Role, Settings};
+use ground::update::Request;
 use ground::update::{Msg, update};
 use protocol::dialect::TdPhase;
 use protocol::log::reader::{LogItem, LogReader};
 
-use crate::bench::settings;
+use crate::rig::settings;
 
 /// The demonstration as a daemon; killed if a test fails.
 struct Daemon {
@@ -35,7 +37,7 @@ impl Daemon {
             .arg(&socket)
             .arg("--log")
             .arg(&log)
-            // Found by nobody else's test.
+            // A directory of its own, so that other tests do not find it.
             .env("XDG_RUNTIME_DIR", directory.path())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -45,7 +47,7 @@ impl Daemon {
     }
 
     fn signal(&self, name: &str) {
-        // The shell's own: not every machine has the program.
+        // The built-in of the shell, because not every machine has a `kill` program.
         let sent = Command::new("sh").args(["-c", &format!("kill -s {name} {}", self.child.id())]).status();
         assert!(sent.is_ok_and(|status| status.success()), "kill -s {name}");
     }
@@ -67,7 +69,7 @@ struct Screen {
 }
 
 impl Screen {
-    /// Waits for the daemon to listen, at most as long as a slow machine needs to start it.
+    /// Waits until the daemon listens, long enough for a slow machine.
     fn attach(socket: &Path, watch: bool) -> Self {
         let stream = (0..600).find_map(|attempt| {
             if attempt > 0 {
@@ -77,8 +79,8 @@ impl Screen {
         });
         let mut stream = stream.expect("the daemon listens");
         stream.set_read_timeout(Some(Duration::from_secs(30))).expect("a time limit");
-        let greeting = Asked::Hello { watch, operator: "anna".to_owned() };
-        stream.write_all(&encode_asked(&greeting)).expect("a greeting");
+        let greeting = ToStation::Hello { watch, operator: "anna".to_owned() };
+        stream.write_all(&encode_to_station(&greeting)).expect("a greeting");
         let role = if watch { Role::Watching } else { Role::Attached };
         let model = Model::new(Settings { role, ..settings(false, true) });
         let mut screen = Self { stream, model, now: Duration::ZERO, live: false };
@@ -86,8 +88,8 @@ impl Screen {
         screen
     }
 
-    fn ask(&mut self, asked: &Asked) {
-        self.stream.write_all(&encode_asked(asked)).expect("the daemon listens");
+    fn ask(&mut self, asked: &ToStation) {
+        self.stream.write_all(&encode_to_station(asked)).expect("the daemon listens");
     }
 
     fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
@@ -99,15 +101,15 @@ impl Screen {
             self.stream.read_exact(&mut prefix).unwrap_or_else(|error| panic!("{what}: {error}"));
             let mut bytes = vec![0; length(prefix).expect("a length")];
             self.stream.read_exact(&mut bytes).unwrap_or_else(|error| panic!("{what}: {error}"));
-            let (told, at) = decode_told(&bytes).expect("what a station tells");
+            let (told, at) = decode_to_screen(&bytes).expect("what a station tells");
             match told {
-                Told::Hello(hello) => assert!(hello.log_path.ends_with("flight.mcap")),
-                Told::Live => self.live = true,
-                Told::Msg(msg) => {
+                ToScreen::Hello(hello) => assert!(hello.log_path.ends_with("flight.mcap")),
+                ToScreen::Live => self.live = true,
+                ToScreen::Msg(msg) => {
                     self.now = at;
                     drop(update(&mut self.model, msg, at));
                 }
-                Told::Status(_) | Told::Stopping { .. } => panic!("nobody has asked"),
+                ToScreen::Status(_) | ToScreen::Stopping { .. } => panic!("nobody has asked"),
             }
         }
         panic!("{what} never came");
@@ -125,22 +127,22 @@ fn ready(screen: &Screen) -> bool {
 }
 
 #[test]
-fn screens_come_and_go_the_station_stays() {
+fn screens_attach_and_detach_and_the_station_keeps_running() {
     let mut daemon = Daemon::start();
     let mut watching = Screen::attach(&daemon.socket, true);
     assert_eq!(std::fs::metadata(&daemon.socket).unwrap().permissions().mode() & 0o777, 0o600);
     watching.until("ready", ready);
-    watching.ask(&Asked::Command(CommandKind::Arm));
+    watching.ask(&ToStation::Request(Request::Command(CommandKind::Arm)));
     let mut first = Screen::attach(&daemon.socket, false);
     first.until("ready", ready);
     let before = first.now;
     first.until("two seconds more", |screen| screen.now > before + Duration::from_secs(2));
     assert!(!first.armed() && first.model.commands.tracks.is_empty(), "who only watches arms nothing");
-    first.ask(&Asked::Key("A".to_owned()));
-    first.ask(&Asked::Command(CommandKind::Arm));
+    first.ask(&ToStation::Key("A".to_owned()));
+    first.ask(&ToStation::Request(Request::Command(CommandKind::Arm)));
     // Acknowledged and observed come in either order.
     first.until("armed", |screen| {
-        screen.armed() && screen.model.commands.of(CommandKind::Arm).is_some_and(Track::accepted)
+        screen.armed() && screen.model.commands.of(CommandKind::Arm).is_some_and(TrackedCommand::accepted)
     });
     let arm = first.model.commands.of(CommandKind::Arm).unwrap();
     assert!(arm.by == Seat::new(2, "anna"), "{arm:?}");
@@ -153,7 +155,7 @@ fn screens_come_and_go_the_station_stays() {
     assert!(second.model.history.timeline.len() >= 2);
     let reports = &second.model.link.reports;
     assert!(reports.len() == 1 && reports[0].figures.rx_frames_s > 1.0, "the link's figures: {reports:?}");
-    second.ask(&Asked::Command(CommandKind::Abort));
+    second.ask(&ToStation::Request(Request::Command(CommandKind::Abort)));
     drop(second);
     watching.until("aborted", |screen| screen.model.outcome.aborted_at.is_some());
     daemon.signal("TERM");
@@ -173,7 +175,7 @@ fn screens_come_and_go_the_station_stays() {
 }
 
 #[test]
-fn one_station_a_socket_and_no_garbage_ends_it() {
+fn a_socket_serves_one_station_and_garbage_does_not_end_it() {
     let daemon = Daemon::start();
     let mut screen = Screen::attach(&daemon.socket, false);
     let second = Command::new(env!("CARGO_BIN_EXE_ground"))
@@ -192,7 +194,7 @@ fn one_station_a_socket_and_no_garbage_ends_it() {
     screen.until("life goes on", |screen| screen.now > before + Duration::from_secs(1));
 }
 
-/// The vehicle may have changed since the ladder was climbed on a screen.
+/// The vehicle may have changed since the crew completed the steps on a screen.
 #[test]
 fn a_request_is_checked_again_by_the_station() {
     let request = |kind| Msg::Requested { kind, by: Seat::new(2, "anna") };

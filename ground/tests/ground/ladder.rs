@@ -1,35 +1,34 @@
-//! Properties of the keyboard: whatever comes from it, nothing but a complete ladder, struck by a hand, arms, starts,
-//! disarms, aborts or quits; and an abort always works.
+//! Properties of the keyboard: only a complete ladder that was typed by hand arms, starts, disarms or quits, and an
+//! abort always works.
 //!
-//! The ladders are written here once more, as a small oracle that reads a history of keys backwards and knows nothing of
-//! dialogs.
+//! The ladders are defined here a second time, as a small oracle that reads a history of keys backwards and does not
+//! use dialogs.
 
 use std::time::Duration;
 
-use ground::attach::codec::Asked;
 use ground::key::Key;
 use ground::model::Role;
 use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::command::CommandKind;
-use ground::update::{Action, Msg};
+use ground::update::{Action, Msg, Request};
 use proptest::prelude::*;
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
 
-use crate::bench::{Bench, is_abort, is_arm, typed};
-use crate::hand::{armed_on_pad, ladder, leaves, quit_ladder, start_ladder};
+use crate::keys::{armed_on_pad, ladder, leaves, quit_ladder, start_ladder};
+use crate::rig::{Rig, is_abort, is_arm, typed};
 
-/// What came from the terminal, and when.
+/// An input from the terminal, and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Came {
+struct Input {
     /// `None` is a paste with its marks.
     key: Option<Key>,
     at: Duration,
-    /// With others in one read.
+    /// Whether it came with others in one read.
     together: bool,
 }
 
-/// The history as a hand would tell it: without the repeats of held keys; `None` for what no finger struck.
-fn told_by_hand(history: &[Came]) -> Vec<(Option<Key>, Duration)> {
+/// The history without the repeats of held keys; `None` for keys that were not typed by hand.
+fn typed_by_hand(history: &[Input]) -> Vec<(Option<Key>, Duration)> {
     let mut told = Vec::new();
     for (k, came) in history.iter().enumerate() {
         let before = k.checked_sub(1).map(|before| history[before]);
@@ -44,9 +43,9 @@ fn told_by_hand(history: &[Came]) -> Vec<(Option<Key>, Duration)> {
     told
 }
 
-/// Whether the history ends in: one of these keys, the word (in either case), Enter; within the time.
-fn ends_in_ladder(history: &[Came], opens: &[Key], word: &str, within_s: u64) -> bool {
-    let told = told_by_hand(history);
+/// Whether the history ends in one of these keys, the word (in either case) and Enter, within the time.
+fn ends_in_ladder(history: &[Input], opens: &[Key], word: &str, within_s: u64) -> bool {
+    let told = typed_by_hand(history);
     let Some(begin) = told.len().checked_sub(word.len() + 2) else { return false };
     let rungs = &told[begin..];
     let letter = |(key, wanted): (Option<Key>, char)| matches!(key, Some(Key::Char(c)) if c.eq_ignore_ascii_case(&wanted));
@@ -56,9 +55,9 @@ fn ends_in_ladder(history: &[Came], opens: &[Key], word: &str, within_s: u64) ->
         && rungs[word.len() + 1].1.saturating_sub(rungs[0].1) <= Duration::from_secs(within_s)
 }
 
-/// Whether the history ends in an abort's chord: Ctrl-X and within 2 s Enter; or Ctrl-X twice, not as a held key does.
-/// However they came, and whatever else came in between.
-fn ends_in_chord(history: &[Came]) -> bool {
+/// Whether the history ends in an abort chord: Ctrl-X and Enter within 2 s, or Ctrl-X twice but not held. Other keys
+/// may come in between.
+fn ends_in_chord(history: &[Input]) -> bool {
     let presses: Vec<Duration> =
         history.iter().filter(|came| came.key == Some(Key::CtrlX)).map(|came| came.at).collect();
     let (Some(newest), Some(last)) = (presses.last(), history.last()) else { return false };
@@ -70,13 +69,13 @@ fn ends_in_chord(history: &[Came]) -> bool {
     entered || twice
 }
 
-/// Whether the last key quits where nothing is at risk: a key to quit, struck.
-fn ends_in_quit(history: &[Came]) -> bool {
-    let told = told_by_hand(history);
+/// Whether the last key quits while nothing is at risk.
+fn ends_in_quit(history: &[Input]) -> bool {
+    let told = typed_by_hand(history);
     matches!(told.last(), Some((Some(Key::Char('q' | 'Q') | Key::CtrlC), _)))
 }
 
-/// What a keyboard, a clipboard or noise on a line can bring.
+/// Input from a keyboard, a clipboard or a noisy line.
 #[derive(Debug, Clone)]
 enum Stream {
     ByHand(Vec<Key>),
@@ -86,15 +85,15 @@ enum Stream {
         period_ms: u64,
         repeats: usize,
     },
-    /// In one read.
+    /// Several keys in one read.
     Together(Vec<Key>),
-    /// One by one, so far apart.
-    Hurried(Vec<Key>, u64),
+    /// One by one, this many milliseconds apart.
+    TooFast(Vec<Key>, u64),
     Marked,
     Pause(u64),
 }
 
-/// As a terminal's bytes are read.
+/// The key for a byte of a terminal.
 fn key_of(byte: u8) -> Option<Key> {
     match byte {
         0x03 => Some(Key::CtrlC),
@@ -120,7 +119,7 @@ fn stream() -> impl Strategy<Value = Stream> {
         [typed("Thanks"), vec![Key::Enter]].concat(),
     ]);
     let keys = prop_oneof![2 => ladders.clone(), 1 => bytes, 2 => some_keys()];
-    // Also the end of a ladder alone, and its beginning.
+    // Also parts from the start or the end of a ladder.
     let part = (ladders, 0_usize..8, any::<bool>()).prop_map(|(keys, at, end)| {
         let at = at.min(keys.len());
         if end { keys[at..].to_vec() } else { keys[..at].to_vec() }
@@ -133,23 +132,23 @@ fn stream() -> impl Strategy<Value = Stream> {
         ),
         2 => keys.clone().prop_map(Stream::Together),
         1 => part.prop_map(Stream::Together),
-        2 => (keys, 0_u64..60).prop_map(|(keys, apart_ms)| Stream::Hurried(keys, apart_ms)),
+        2 => (keys, 0_u64..60).prop_map(|(keys, apart_ms)| Stream::TooFast(keys, apart_ms)),
         1 => Just(Stream::Marked),
         2 => (0_u64..3_000).prop_map(Stream::Pause),
     ]
 }
 
-/// A bench that is played streams, and checks everything that comes of them against the oracle.
+/// A rig that takes streams of input and compares every result with the oracle.
 struct Watched {
-    bench: Bench,
-    history: Vec<Came>,
+    rig: Rig,
+    history: Vec<Input>,
 }
 
 impl Watched {
     fn play(&mut self, stream: Stream) -> Result<(), TestCaseError> {
         match stream {
             Stream::ByHand(keys) => keys.into_iter().try_for_each(|key| self.key_after(130, key)),
-            Stream::Hurried(keys, apart_ms) => {
+            Stream::TooFast(keys, apart_ms) => {
                 keys.into_iter().try_for_each(|key| self.key_after(apart_ms, key))
             }
             Stream::Held { key, delay_ms, period_ms, repeats } => {
@@ -160,18 +159,18 @@ impl Watched {
             Stream::Together(keys) => {
                 self.pass(50)?;
                 let together = keys.len() > 1;
-                let at = self.bench.now;
-                self.history.extend(keys.iter().map(|key| Came { key: Some(*key), at, together }));
-                self.bench.msg(if let [key] = keys[..] { Msg::Key(key) } else { Msg::Keys(keys.clone()) });
-                // An abort's chord may stand anywhere among them; nothing else may.
+                let at = self.rig.now;
+                self.history.extend(keys.iter().map(|key| Input { key: Some(*key), at, together }));
+                self.rig.msg(if let [key] = keys[..] { Msg::Key(key) } else { Msg::Keys(keys.clone()) });
+                // Among keys of one read only an abort chord counts.
                 let begin = self.history.len() - keys.len();
                 let chord = (begin..=self.history.len()).any(|end| ends_in_chord(&self.history[..end]));
                 self.check(chord)
             }
             Stream::Marked => {
                 self.pass(50)?;
-                self.history.push(Came { key: None, at: self.bench.now, together: true });
-                self.bench.msg(Msg::Pasted);
+                self.history.push(Input { key: None, at: self.rig.now, together: true });
+                self.rig.msg(Msg::Pasted);
                 self.check(false)
             }
             Stream::Pause(ms) => self.pass(ms),
@@ -180,31 +179,31 @@ impl Watched {
 
     fn key_after(&mut self, ms: u64, key: Key) -> Result<(), TestCaseError> {
         self.pass(ms)?;
-        self.history.push(Came { key: Some(key), at: self.bench.now, together: false });
-        self.bench.press(key);
+        self.history.push(Input { key: Some(key), at: self.rig.now, together: false });
+        self.rig.press(key);
         self.check(false)
     }
 
-    /// Time passes, with the clock's ticks.
+    /// Lets time pass with ticks.
     fn pass(&mut self, ms: u64) -> Result<(), TestCaseError> {
         for _ in 0..ms / 10 {
-            self.bench.now += Duration::from_millis(10);
-            if self.bench.now.as_millis().is_multiple_of(500) {
-                self.bench.heartbeat();
-                self.bench.flight_status();
+            self.rig.now += Duration::from_millis(10);
+            if self.rig.now.as_millis().is_multiple_of(500) {
+                self.rig.heartbeat();
+                self.rig.flight_status();
             }
-            self.bench.msg(Msg::Tick);
+            self.rig.msg(Msg::Tick);
             self.check(false)?;
         }
-        self.bench.now += Duration::from_millis(ms % 10);
+        self.rig.now += Duration::from_millis(ms % 10);
         Ok(())
     }
 
     fn check(&mut self, chord_among: bool) -> Result<(), TestCaseError> {
-        let leaves = leaves(&self.bench);
+        let leaves = leaves(&self.rig);
         let history = &self.history;
         let is = |sent: &COMMAND_LONG_DATA, command| sent.command == command;
-        for sent in self.bench.take_commands() {
+        for sent in self.rig.take_commands() {
             let allowed = if is_abort(&sent) {
                 chord_among || ends_in_chord(history)
             } else if is_arm(&sent) {
@@ -214,16 +213,16 @@ impl Watched {
             } else {
                 ends_in_ladder(history, &[Key::Char('S')], "START", 10)
             };
-            // What is sent again by itself was allowed when it was asked for.
+            // A resent command was allowed when it was first sent.
             prop_assert!(allowed || sent.confirmation > 0, "{sent:?} by {history:?}");
         }
         let opens = [Key::Char('q'), Key::Char('Q'), Key::CtrlC];
-        let at_risk = self.bench.model.is_at_risk();
+        let at_risk = self.rig.model.is_at_risk();
         let quits = ends_in_ladder(history, &opens, "QUIT", 10) || (!at_risk && ends_in_quit(history));
         prop_assert!(!leaves || quits, "left by {history:?}");
         if chord_among || ends_in_chord(history) {
-            // What was sent is answered: a repeat of it is no new abort.
-            self.bench.model.commands = ground::model::command::Commands::default();
+            // The abort counts as answered, so that its resends do not look like new ones.
+            self.rig.model.commands = ground::model::command::Commands::default();
         }
         Ok(())
     }
@@ -256,7 +255,7 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
         Key::PageDown,
         Key::Home,
     ]);
-    // Pieces of the ladder, so that near misses are common.
+    // Parts of the ladder, so that near misses are common.
     prop_oneof![
         4 => single.prop_map(|key| vec![key]),
         1 => Just(typed("AARM")),
@@ -269,12 +268,13 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// Repeated keys, pastes, random bytes, near misses and whole ladders, in any order, on a vehicle that may be armed.
+    /// Held keys, pastes, random bytes, near misses and whole ladders, in any order, with an armed or disarmed
+    /// vehicle.
     #[test]
-    fn nothing_without_its_whole_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
-        let mut bench = if armed { armed_on_pad() } else { Bench::crewed() };
-        bench.take_commands();
-        let mut watched = Watched { bench, history: Vec::new() };
+    fn nothing_happens_without_its_whole_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
+        let mut rig = if armed { armed_on_pad() } else { Rig::crewed() };
+        rig.take_commands();
+        let mut watched = Watched { rig, history: Vec::new() };
         for stream in streams {
             watched.play(stream)?;
         }
@@ -282,61 +282,61 @@ proptest! {
     }
 
     #[test]
-    fn abort_works_after_any_keys(keys in prop::collection::vec(some_keys(), 0..12)) {
-        let mut bench = Bench::crewed();
-        bench.keys(&keys.concat());
-        // A half chord among the keys is over.
-        bench.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.2);
-        bench.take_commands();
-        bench.abort_chord();
-        prop_assert!(bench.take_commands().iter().any(is_abort));
+    fn ctrl_x_twice_aborts_after_any_keys(keys in prop::collection::vec(some_keys(), 0..12)) {
+        let mut rig = Rig::crewed();
+        rig.keys(&keys.concat());
+        // A chord that the keys have begun has expired.
+        rig.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.2);
+        rig.take_commands();
+        rig.abort_chord();
+        prop_assert!(rig.take_commands().iter().any(is_abort));
     }
 
-    /// Ctrl-X and then Enter, whatever was pressed before, sends an abort with that Enter.
+    /// Ctrl-X and Enter abort at once, whatever was pressed before.
     #[test]
     fn ctrl_x_and_enter_abort_at_once_after_any_keys(keys in prop::collection::vec(some_keys(), 0..12)) {
-        let mut bench = Bench::crewed();
-        bench.keys(&keys.concat());
-        bench.take_commands();
-        bench.abort();
-        prop_assert!(bench.take_commands().iter().any(is_abort));
+        let mut rig = Rig::crewed();
+        rig.keys(&keys.concat());
+        rig.take_commands();
+        rig.abort();
+        prop_assert!(rig.take_commands().iter().any(is_abort));
     }
 
-    /// The same ladder on a screen whose station runs elsewhere; it asks, and sends nothing itself.
+    /// The same ladder on an attached screen, which sends a request instead of a command.
     #[test]
-    fn an_attached_screen_asks_to_arm_by_the_complete_ladder_alone(
+    fn an_attached_screen_asks_to_arm_only_after_the_complete_ladder(
         steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
     ) {
-        let mut bench = Bench::crewed();
-        bench.model.settings.role = Role::Attached;
+        let mut rig = Rig::crewed();
+        rig.model.settings.role = Role::Attached;
         let mut history = Vec::new();
-        bench.take_commands();
+        rig.take_commands();
         for (keys, pause_ms) in steps {
-            bench.run((pause_ms / 100) as f64 / 10.0);
+            rig.run((pause_ms / 100) as f64 / 10.0);
             for key in keys {
-                bench.now += Duration::from_millis(130);
-                bench.press(key);
-                history.push(Came { key: Some(key), at: bench.now, together: false });
-                let asks = bench.actions.contains(&Action::Request(Asked::Command(CommandKind::Arm)));
+                rig.now += Duration::from_millis(130);
+                rig.press(key);
+                history.push(Input { key: Some(key), at: rig.now, together: false });
+                let asks = rig.actions.contains(&Action::Request(Request::Command(CommandKind::Arm)));
                 let complete = ends_in_ladder(&history, &[Key::Char('A')], "ARM", 10);
                 prop_assert!(!asks || complete, "{history:?}");
-                bench.actions.clear();
-                prop_assert!(bench.take_commands().is_empty());
+                rig.actions.clear();
+                prop_assert!(rig.take_commands().is_empty());
             }
         }
     }
 
     #[test]
-    fn a_screen_that_only_watches_asks_for_nothing(
+    fn a_screen_that_only_watches_sends_no_request(
         keys in prop::collection::vec(some_keys(), 0..40),
     ) {
-        let mut bench = Bench::crewed();
-        bench.model.settings.role = Role::Watching;
-        bench.take_commands();
-        bench.keys(&keys.concat());
-        bench.abort();
-        bench.abort_chord();
-        let asked = |action: &Action| matches!(action, Action::Request(Asked::Command(_)));
-        prop_assert!(!bench.actions.iter().any(asked) && bench.take_commands().is_empty());
+        let mut rig = Rig::crewed();
+        rig.model.settings.role = Role::Watching;
+        rig.take_commands();
+        rig.keys(&keys.concat());
+        rig.abort();
+        rig.abort_chord();
+        let asked = |action: &Action| matches!(action, Action::Request(Request::Command(_)));
+        prop_assert!(!rig.actions.iter().any(asked) && rig.take_commands().is_empty());
     }
 }

@@ -1,23 +1,23 @@
-//! The ground station from outside: its keys, its radio, its screens, the program itself.
+//! Tests of the ground station from outside: keys, radio, screens, and the program itself.
 
 mod alarms;
 mod auto;
-mod bad_air;
-mod bench;
 mod bytes;
 mod crew;
 mod daemon;
 mod disarm;
-mod flown;
-mod hand;
+mod flights;
+mod identity;
 mod in_space;
+mod keys;
 mod ladder;
 mod links;
+mod lossy_link;
 mod phases;
 mod program;
 mod radio;
 mod replay;
+mod rig;
 mod screens;
 mod terminal;
 mod uplink;
-mod whose;

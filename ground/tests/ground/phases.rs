@@ -1,10 +1,10 @@
-//! The screen in each phase of a flight: phase, what is next and what an abort would do, at a glance.
+//! Snapshots of the screen in each phase of a flight.
 
 use ground::key::Key;
 use protocol::dialect::{TdAbortEffect, TdChute, TdInterlock, TdLimit, TdPhase};
 
-use crate::bench::{Bench, settings, typed};
 use crate::in_space::burning_in_space;
+use crate::rig::{Rig, settings, typed};
 use crate::screens::{armed, counting, descending, on_the_pad, powered, snapshot};
 
 #[test]
@@ -14,12 +14,12 @@ fn regress_pad() {
 
 #[test]
 fn regress_pad_no_go() {
-    let mut bench = on_the_pad();
-    bench.checks_failed = 0b1010;
-    bench.run(0.1);
-    bench.key(Key::Char('A'));
-    bench.keys(&typed("AR"));
-    snapshot("pad_no_go_arming", &bench);
+    let mut rig = on_the_pad();
+    rig.checks_failed = 0b1010;
+    rig.run(0.1);
+    rig.key(Key::Char('A'));
+    rig.keys(&typed("AR"));
+    snapshot("pad_no_go_arming", &rig);
 }
 
 #[test]
@@ -34,37 +34,37 @@ fn regress_powered() {
 
 #[test]
 fn regress_landed() {
-    let mut bench = powered();
-    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
-    bench.verdict(true, TdLimit::empty());
-    bench.run(0.5);
-    snapshot("landed", &bench);
+    let mut rig = powered();
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.verdict(true, TdLimit::empty());
+    rig.run(0.5);
+    snapshot("landed", &rig);
 }
 
 #[test]
 fn regress_not_landed() {
-    let mut bench = powered();
-    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    bench.verdict(false, TdLimit::TD_LIMIT_AXIAL_SPEED | TdLimit::TD_LIMIT_PITCH);
-    bench.run(0.5);
-    snapshot("not_landed", &bench);
+    let mut rig = powered();
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.verdict(false, TdLimit::TD_LIMIT_AXIAL_SPEED | TdLimit::TD_LIMIT_PITCH);
+    rig.run(0.5);
+    snapshot("not_landed", &rig);
 }
 
 #[test]
 fn regress_link_lost() {
-    let mut bench = powered();
-    bench.speaks = false;
-    bench.run(6.0);
-    snapshot("link_lost", &bench);
+    let mut rig = powered();
+    rig.speaks = false;
+    rig.run(6.0);
+    snapshot("link_lost", &rig);
 }
 
 #[test]
 fn regress_nothing_heard() {
-    let mut bench = Bench::new(settings(false, true));
-    bench.speaks = false;
-    bench.run(1.0);
-    snapshot("nothing_heard", &bench);
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    rig.run(1.0);
+    snapshot("nothing_heard", &rig);
 }
 
 #[test]
@@ -72,33 +72,33 @@ fn regress_descent() {
     snapshot("descent", &descending());
 }
 
-/// In space, in a phase, with what an abort would do there.
+/// A vehicle in space, in this phase, with this abort effect.
 fn in_phase(
     phase: TdPhase,
     effect: TdAbortEffect,
     (height_m, climb_m_s): (f32, f32),
     lean: (f64, f64),
-) -> Bench {
-    let mut bench = armed();
-    bench.limits_of_legs();
-    bench.run(10.0);
-    bench.phase = phase;
-    bench.abort_effect = effect;
-    bench.state_in_space([12.0, -9.0, height_m + 6.0], [-1.5, 2.0, climb_m_s], lean);
-    bench.run(0.3);
-    bench.state_in_space([11.6, -8.4, height_m], [-1.5, 2.0, climb_m_s], lean);
-    bench.actuated_fins();
-    bench
+) -> Rig {
+    let mut rig = armed();
+    rig.limits_of_legs();
+    rig.run(10.0);
+    rig.phase = phase;
+    rig.abort_effect = effect;
+    rig.state_in_space([12.0, -9.0, height_m + 6.0], [-1.5, 2.0, climb_m_s], lean);
+    rig.run(0.3);
+    rig.state_in_space([11.6, -8.4, height_m], [-1.5, 2.0, climb_m_s], lean);
+    rig.actuated_fins();
+    rig
 }
 
 #[test]
 fn regress_safe() {
-    let mut bench = Bench::new(settings(false, true));
-    bench.phase = TdPhase::TD_PHASE_SAFE;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
-    bench.checks_failed = 0b1100;
-    bench.run(1.0);
-    snapshot("safe", &bench);
+    let mut rig = Rig::new(settings(false, true));
+    rig.phase = TdPhase::TD_PHASE_SAFE;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.checks_failed = 0b1100;
+    rig.run(1.0);
+    snapshot("safe", &rig);
 }
 
 #[test]
@@ -115,9 +115,9 @@ fn regress_boost() {
 #[test]
 fn regress_coast() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE;
-    let bench = in_phase(TdPhase::TD_PHASE_COAST, effect, (240.0, 31.0), (60.0, 4.0));
-    assert!(bench.screen(80, 24).contains(" next apogee in 3.2 s, then the fins open"));
-    snapshot("coast", &bench);
+    let rig = in_phase(TdPhase::TD_PHASE_COAST, effect, (240.0, 31.0), (60.0, 4.0));
+    assert!(rig.screen(80, 24).contains(" next apogee in 3.2 s, then the fins open"));
+    snapshot("coast", &rig);
 }
 
 #[test]
@@ -129,58 +129,58 @@ fn regress_deploy() {
 #[test]
 fn regress_land_armed() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_BURN;
-    let mut bench = in_phase(TdPhase::TD_PHASE_LAND_ARMED, effect, (90.0, -38.0), (200.0, 6.0));
-    bench.descent_with(90.0, -38.0, TdChute::TD_CHUTE_STOWED);
-    let screen = bench.screen(80, 24);
+    let mut rig = in_phase(TdPhase::TD_PHASE_LAND_ARMED, effect, (90.0, -38.0), (200.0, 6.0));
+    rig.descent_with(90.0, -38.0, TdChute::TD_CHUTE_STOWED);
+    let screen = rig.screen(80, 24);
     assert!(screen.contains(" next IGNITION in 0.8 s at 58 m, motor armed"), "{screen}");
-    assert!(bench.screen(20, 5).contains(" next IGNITION in 0."), "{}", bench.screen(20, 5));
-    snapshot("land_armed", &bench);
+    assert!(rig.screen(20, 5).contains(" next IGNITION in 0."), "{}", rig.screen(20, 5));
+    snapshot("land_armed", &rig);
 }
 
 #[test]
 fn regress_ignition() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
-    let mut bench = in_phase(TdPhase::TD_PHASE_IGNITION, effect, (57.0, -38.5), (200.0, 6.0));
-    bench.countdown_ms = -150;
-    bench.run(0.1);
-    snapshot("ignition", &bench);
+    let mut rig = in_phase(TdPhase::TD_PHASE_IGNITION, effect, (57.0, -38.5), (200.0, 6.0));
+    rig.countdown_ms = -150;
+    rig.run(0.1);
+    snapshot("ignition", &rig);
 }
 
 #[test]
 fn regress_safed() {
-    let mut bench = burning_in_space();
-    bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    bench.contact([6.2, 1.553, -0.17, 0.04, 0.02], true, TdLimit::empty());
-    bench.run(1.0);
-    bench.phase = TdPhase::TD_PHASE_SAFED;
-    bench.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
-    bench.armed = false;
-    bench.run(1.0);
-    snapshot("safed", &bench);
+    let mut rig = burning_in_space();
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.contact([6.2, 1.553, -0.17, 0.04, 0.02], true, TdLimit::empty());
+    rig.run(1.0);
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.armed = false;
+    rig.run(1.0);
+    snapshot("safed", &rig);
 }
 
-/// An abort in the descent: the parachute is fired, then carries.
+/// An abort in the descent: the parachute is fired, then opens.
 #[test]
 fn regress_chute() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
-    let mut bench = in_phase(TdPhase::TD_PHASE_CHUTE, effect, (150.0, -30.0), (200.0, 12.0));
-    bench.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
-    bench.approach_wait_s = u16::MAX;
-    bench.descent_with(150.0, -30.0, TdChute::TD_CHUTE_FIRED);
-    bench.run(0.1);
-    assert!(bench.screen(80, 24).contains(" next chute opens: fired, still falling fast"));
-    bench.state_in_space([9.0, -2.0, 122.0], [1.5, 2.0, -6.1], (200.0, 3.0));
-    bench.descent_with(122.0, -6.1, TdChute::TD_CHUTE_OPEN);
-    bench.run(0.1);
-    snapshot("chute", &bench);
+    let mut rig = in_phase(TdPhase::TD_PHASE_CHUTE, effect, (150.0, -30.0), (200.0, 12.0));
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    rig.approach_wait_s = u16::MAX;
+    rig.descent_with(150.0, -30.0, TdChute::TD_CHUTE_FIRED);
+    rig.run(0.1);
+    assert!(rig.screen(80, 24).contains(" next chute opens: fired, still falling fast"));
+    rig.state_in_space([9.0, -2.0, 122.0], [1.5, 2.0, -6.1], (200.0, 3.0));
+    rig.descent_with(122.0, -6.1, TdChute::TD_CHUTE_OPEN);
+    rig.run(0.1);
+    snapshot("chute", &rig);
 }
 
-/// The vehicle checks for arming on the pad only: in flight the pad's screen claims nothing.
+/// The vehicle checks for arming only on the pad, so in flight the pad page shows no check as passed.
 #[test]
 fn in_flight_no_arming_check_is_shown_as_passed() {
-    let mut bench = powered();
-    bench.key(Key::Char('1'));
-    let screen = bench.screen(80, 24);
+    let mut rig = powered();
+    rig.key(Key::Char('1'));
+    let screen = rig.screen(80, 24);
     assert!(screen.contains("off the pad nothing is checked for arming"), "{screen}");
     assert!(!screen.contains(" GO ") && screen.contains("[ ] every check passes"), "{screen}");
 }

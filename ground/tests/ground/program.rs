@@ -1,4 +1,4 @@
-//! The program itself: its exit codes, its lines and its log.
+//! The program: exit codes, printed lines and log.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -53,7 +53,7 @@ fn an_unknown_profile_and_an_existing_log_are_code_1_and_named() {
 }
 
 #[test]
-fn a_flag_that_means_nothing_to_a_screen_is_code_2_and_named() {
+fn a_flag_that_the_command_would_ignore_is_code_2_and_named() {
     let directory = tempfile::tempdir().unwrap();
     for (arguments, flag) in [
         (&["attach", "--connect", "udpin:127.0.0.1:0"][..], "--connect"),
@@ -66,7 +66,7 @@ fn a_flag_that_means_nothing_to_a_screen_is_code_2_and_named() {
     }
 }
 
-/// Nothing has begun that a log could tell of.
+/// A start that fails must not leave a log behind.
 #[test]
 fn a_start_that_fails_leaves_no_files() {
     let directory = tempfile::tempdir().unwrap();
@@ -130,7 +130,7 @@ fn the_papers_landing_ends_with_code_0_and_names_its_log() {
             _ => {}
         }
     }
-    // At four times the speed, two clocks would be seconds apart before the landing.
+    // At four times the speed, two separate clocks would differ by seconds before the landing.
     assert!(from_ground > 10 && apart_ns < 1_500_000_000, "{from_ground} records, {apart_ns} ns apart");
     assert_eq!(reader.damage(), None);
     let both_sides = |topic: &str| {
@@ -162,7 +162,7 @@ fn the_papers_landing_ends_with_code_0_and_names_its_log() {
 }
 
 #[test]
-fn settings_are_checked_and_what_is_wrong_is_named() {
+fn settings_are_checked_and_a_wrong_key_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let example = ground(directory.path(), &["config", "example"]);
     assert!(out(&example).contains("#alarm_command"));
@@ -172,14 +172,14 @@ fn settings_are_checked_and_what_is_wrong_is_named() {
     };
     let right = check("connect = [\"udpin:0.0.0.0:14550\"]\nbell = false\n");
     assert_eq!(right.status.code(), Some(0));
-    assert!(out(&right).contains("understood") && out(&right).contains("14550"));
+    assert!(out(&right).contains("valid") && out(&right).contains("14550"));
     let wrong = check("bel = false\n");
     assert_eq!(wrong.status.code(), Some(1));
     assert!(err(&wrong).contains("ground.toml") && err(&wrong).contains("bel"), "{}", err(&wrong));
 }
 
 #[test]
-fn completions_and_the_manual_come_from_the_command_line_itself() {
+fn completions_and_the_manual_name_the_commands() {
     let directory = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish"] {
         let script = ground(directory.path(), &["completions", shell]);
@@ -191,9 +191,9 @@ fn completions_and_the_manual_come_from_the_command_line_itself() {
     assert!(out(&manual).contains("Exit codes"));
 }
 
-/// A demonstration with its telemetry log: the same flight from both logs.
+/// The log and the telemetry log of a demonstration contain the same flight.
 #[test]
-fn the_telemetry_log_holds_the_same_flight() {
+fn the_telemetry_log_contains_the_same_flight() {
     let directory = tempfile::tempdir().unwrap();
     let output = ground(
         directory.path(),

@@ -1,9 +1,9 @@
-//! What arrives over the radio, well-meant or not.
+//! Frames that arrive over the radio, valid or hostile.
 
-use crate::bench::{Bench, settings, typed};
+use crate::rig::{Rig, settings, typed};
 use ground::exit::{Exit, decide};
 use ground::key::Key;
-use ground::model::link::LinkState;
+use ground::model::link_state::LinkState;
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 use protocol::dialect::{
@@ -15,16 +15,16 @@ use protocol::identity::{Address, GROUND};
 
 #[test]
 fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
-    let mut bench = Bench::crewed();
-    bench.speaks = false;
+    let mut rig = Rig::crewed();
+    rig.speaks = false;
     let radio = Address { system_id: 51, component_id: 68 };
     for _ in 0..40 {
-        bench.run(0.1);
-        bench.hear_from(radio, &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA::default()));
+        rig.run(0.1);
+        rig.hear_from(radio, &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA::default()));
     }
-    assert!(matches!(bench.model.link.state(bench.now), LinkState::Lost(_)));
-    assert!(bench.events().contains("LINK LOST"));
-    bench.hear_from(
+    assert!(matches!(rig.model.link.state(rig.now), LinkState::Lost(_)));
+    assert!(rig.events().contains("LINK LOST"));
+    rig.hear_from(
         radio,
         &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA {
             rssi: 190,
@@ -34,44 +34,44 @@ fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
             ..RADIO_STATUS_DATA::default()
         }),
     );
-    assert!(bench.screen(140, 40).contains("rssi 190/188 noise 45/--"), "{}", bench.screen(140, 40));
-    bench.run(5.0);
-    assert!(!bench.screen(140, 40).contains("rssi"), "no longer fresh");
-    bench.speaks = true;
-    bench.run(1.0);
-    assert!(bench.events().contains("link restored"));
+    assert!(rig.screen(140, 40).contains("rssi 190/188 noise 45/--"), "{}", rig.screen(140, 40));
+    rig.run(5.0);
+    assert!(!rig.screen(140, 40).contains("rssi"), "no longer fresh");
+    rig.speaks = true;
+    rig.run(1.0);
+    assert!(rig.events().contains("link restored"));
 }
 
 #[test]
-fn a_second_ground_station_with_our_ids_is_named_now_and_then() {
-    let mut bench = Bench::crewed();
+fn a_second_ground_station_with_our_ids_is_reported_rarely() {
+    let mut rig = Rig::crewed();
     for _ in 0..50 {
-        bench.run(0.1);
-        bench.hear_from(GROUND, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        rig.run(0.1);
+        rig.hear_from(GROUND, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     }
-    assert_eq!(bench.events().matches("another ground station").count(), 1);
+    assert_eq!(rig.events().matches("another ground station").count(), 1);
 }
 
 #[test]
 fn other_systems_change_nothing() {
-    let mut bench = Bench::crewed();
+    let mut rig = Rig::crewed();
     let other = Address { system_id: 2, component_id: 1 };
-    bench.hear_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 9, ..Default::default() }));
-    assert_eq!(bench.model.vehicle.phase().map(|phase| phase.value), Some(TdPhase::TD_PHASE_PAD_IDLE));
-    assert!(bench.events().contains("system 2 component 1"));
+    rig.hear_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 9, ..Default::default() }));
+    assert_eq!(rig.model.vehicle.phase().map(|phase| phase.value), Some(TdPhase::TD_PHASE_PAD_IDLE));
+    assert!(rig.events().contains("system 2 component 1"));
 }
 
 #[test]
-fn a_reboot_forgets_what_was_known() {
-    // Of a vehicle that tells no boot number.
-    let mut bench = Bench::new(settings(false, true));
-    bench.boot_number = 0;
-    bench.run(11.0);
-    bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
-    let mut rebooted = Bench::new(settings(false, true));
+fn a_reboot_drops_old_values() {
+    // A vehicle that reports no boot number.
+    let mut rig = Rig::new(settings(false, true));
+    rig.boot_number = 0;
+    rig.run(11.0);
+    rig.state(0.0, 15.0, 0.0, 0.0, 90.0);
+    let mut rebooted = Rig::new(settings(false, true));
     rebooted.boot_number = 0;
     rebooted.now = std::time::Duration::from_millis(500);
-    rebooted.model = bench.model;
+    rebooted.model = rig.model;
     rebooted.flight_status();
     assert!(rebooted.events().contains("rebooted"));
     assert!(rebooted.model.vehicle.attitude.is_none());
@@ -79,40 +79,40 @@ fn a_reboot_forgets_what_was_known() {
 
 #[test]
 fn an_escape_sequence_cannot_reach_the_terminal() {
-    let mut bench = Bench::crewed();
-    bench.text("\u{1b}[2Jgone\u{7}");
-    let screen = bench.screen(80, 24);
+    let mut rig = Rig::crewed();
+    rig.text("\u{1b}[2Jgone\u{7}");
+    let screen = rig.screen(80, 24);
     assert!(screen.contains("[2Jgone") && !screen.contains('\u{1b}') && !screen.contains('\u{7}'));
 }
 
 #[test]
-fn our_clock_question_is_answered_and_the_round_trip_is_shown() {
-    let mut bench = Bench::crewed();
-    bench.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 77, ..Default::default() }));
+fn timesync_is_answered_and_the_round_trip_is_shown() {
+    let mut rig = Rig::crewed();
+    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 77, ..Default::default() }));
     let answers = |message: &MavMessage| matches!(message, MavMessage::TIMESYNC(data) if data.ts1 == 77 && data.tc1 != 0);
     let answered =
-        bench.actions.iter().any(|action| matches!(action, Action::Send(message) if answers(message)));
+        rig.actions.iter().any(|action| matches!(action, Action::Send(message) if answers(message)));
     assert!(answered);
-    let asked_at = i64::try_from(bench.now.as_nanos()).unwrap();
-    bench.run(0.2);
-    bench.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: asked_at, ..Default::default() }));
-    bench.key(Key::Char('5'));
-    assert!(bench.screen(80, 24).contains("rtt 200 ms"));
+    let asked_at = i64::try_from(rig.now.as_nanos()).unwrap();
+    rig.run(0.2);
+    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: asked_at, ..Default::default() }));
+    rig.key(Key::Char('5'));
+    assert!(rig.screen(80, 24).contains("rtt 200 ms"));
 }
 
-fn answers(bench: &mut Bench) -> usize {
+fn answers(rig: &mut Rig) -> usize {
     let is_answer = |message: &MavMessage| matches!(message, MavMessage::TIMESYNC(data) if data.tc1 != 0);
     #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
     let is_ping = |message: &MavMessage| matches!(message, MavMessage::PING(_));
-    let sent = std::mem::take(&mut bench.actions);
+    let sent = std::mem::take(&mut rig.actions);
     let is_ours = |action: &&Action| matches!(action, Action::Send(m) if is_answer(m) || is_ping(m));
     sent.iter().filter(is_ours).count()
 }
 
 #[test]
 #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
-fn questions_to_others_and_answers_are_not_answered() {
-    let mut bench = Bench::crewed();
+fn only_questions_to_this_station_are_answered() {
+    let mut rig = Rig::crewed();
     let timesync = |target_system, target_component| {
         let data = TIMESYNC_DATA { tc1: 0, ts1: 77, target_system, target_component };
         MavMessage::TIMESYNC(data)
@@ -126,84 +126,84 @@ fn questions_to_others_and_answers_are_not_answered() {
         })
     };
     for asked in [timesync(0, 0), timesync(255, 190), ping(0, 0)] {
-        bench.hear(&asked);
-        assert_eq!(answers(&mut bench), 1, "{asked:?}");
+        rig.hear(&asked);
+        assert_eq!(answers(&mut rig), 1, "{asked:?}");
     }
     // A PING with a target is an answer already.
     for other in [timesync(254, 190), timesync(255, 1), ping(254, 190), ping(255, 1), ping(255, 190)] {
-        bench.hear(&other);
-        assert_eq!(answers(&mut bench), 0, "{other:?}");
+        rig.hear(&other);
+        assert_eq!(answers(&mut rig), 0, "{other:?}");
     }
     let another_grounds = TIMESYNC_DATA { tc1: 5, ts1: 1, target_system: 254, target_component: 190 };
-    bench.hear(&MavMessage::TIMESYNC(another_grounds));
-    assert_eq!(bench.model.link.round_trip, None);
+    rig.hear(&MavMessage::TIMESYNC(another_grounds));
+    assert_eq!(rig.model.link.round_trip, None);
 }
 
 #[test]
 fn stale_values_are_marked_without_colour() {
-    let mut bench = Bench::crewed();
-    bench.state(0.0, 12.0, 0.0, -4.0, 90.0);
-    assert!(bench.screen(80, 24).contains("     12.00 m"));
-    bench.run(2.0);
-    assert!(bench.screen(80, 24).contains("~    12.00 m"));
+    let mut rig = Rig::crewed();
+    rig.state(0.0, 12.0, 0.0, -4.0, 90.0);
+    assert!(rig.screen(80, 24).contains("     12.00 m"));
+    rig.run(2.0);
+    assert!(rig.screen(80, 24).contains("~    12.00 m"));
 }
 
 #[test]
-fn a_ground_that_only_watches_sends_no_command() {
-    let mut bench = Bench::new(settings(false, false));
-    bench.run(60.0);
-    assert!(bench.take_commands().is_empty());
+fn a_run_without_auto_sends_no_command() {
+    let mut rig = Rig::new(settings(false, false));
+    rig.run(60.0);
+    assert!(rig.take_commands().is_empty());
 }
 
 #[test]
-fn a_flight_without_a_screen_ends_by_its_verdict() {
+fn a_run_without_a_screen_ends_after_the_verdict() {
     for (landed, violated, expected) in
         [(true, TdLimit::empty(), Exit::Landed), (false, TdLimit::TD_LIMIT_AXIAL_SPEED, Exit::OutsideLimits)]
     {
-        let mut bench = Bench::new(settings(false, false));
-        bench.phase = TdPhase::TD_PHASE_POWERED;
-        bench.run(2.0);
-        bench.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-        bench.verdict(landed, violated);
-        bench.run(1.0);
-        assert!(!bench.wants_to_quit(), "the vehicle may have more to say");
-        bench.run(2.0);
-        assert!(bench.wants_to_quit());
-        assert_eq!(decide(&bench.model.outcome, false), expected);
+        let mut rig = Rig::new(settings(false, false));
+        rig.phase = TdPhase::TD_PHASE_POWERED;
+        rig.run(2.0);
+        rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+        rig.verdict(landed, violated);
+        rig.run(1.0);
+        assert!(!rig.wants_to_quit(), "the vehicle may have more to say");
+        rig.run(2.0);
+        assert!(rig.wants_to_quit());
+        assert_eq!(decide(&rig.model.outcome, false), expected);
     }
 }
 
 #[test]
-fn a_flight_without_a_screen_ends_when_the_link_is_gone_for_good() {
-    let mut bench = Bench::new(settings(true, false));
-    bench.speaks = false;
-    bench.run(11.0);
-    assert!(bench.wants_to_quit(), "nothing was ever heard");
-    let mut bench = Bench::new(settings(false, false));
-    bench.phase = TdPhase::TD_PHASE_POWERED;
-    bench.run(2.0);
-    bench.speaks = false;
-    bench.run(11.0);
-    assert!(bench.wants_to_quit());
-    assert_eq!(decide(&bench.model.outcome, false), Exit::NotSeen);
+fn a_run_without_a_screen_ends_when_the_link_stays_lost() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.speaks = false;
+    rig.run(11.0);
+    assert!(rig.wants_to_quit(), "nothing was ever heard");
+    let mut rig = Rig::new(settings(false, false));
+    rig.phase = TdPhase::TD_PHASE_POWERED;
+    rig.run(2.0);
+    rig.speaks = false;
+    rig.run(11.0);
+    assert!(rig.wants_to_quit());
+    assert_eq!(decide(&rig.model.outcome, false), Exit::NotSeen);
 }
 
 #[test]
 fn an_abort_under_thrust_is_an_aborted_flight_even_if_it_lands() {
-    let mut bench = Bench::new(settings(false, false));
-    bench.phase = TdPhase::TD_PHASE_POWERED;
-    bench.run(2.0);
-    bench.interlocks = TdInterlock::TD_INTERLOCK_ARMED | TdInterlock::TD_INTERLOCK_DEGRADED;
-    bench.run(3.0);
-    assert!(!bench.wants_to_quit(), "it still flies");
-    bench.phase = TdPhase::TD_PHASE_SAFED;
-    bench.verdict(true, TdLimit::empty());
-    bench.run(3.0);
-    assert!(bench.wants_to_quit());
-    assert_eq!(decide(&bench.model.outcome, false), Exit::RefusedOrAborted);
+    let mut rig = Rig::new(settings(false, false));
+    rig.phase = TdPhase::TD_PHASE_POWERED;
+    rig.run(2.0);
+    rig.interlocks = TdInterlock::TD_INTERLOCK_ARMED | TdInterlock::TD_INTERLOCK_DEGRADED;
+    rig.run(3.0);
+    assert!(!rig.wants_to_quit(), "it still flies");
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.verdict(true, TdLimit::empty());
+    rig.run(3.0);
+    assert!(rig.wants_to_quit());
+    assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
-/// Ids that the ground reads, and some it does not.
+/// Message ids that the ground uses, and some that it does not.
 const IDS: [u32; 24] = [
     0, 1, 2, 4, 22, 30, 31, 32, 74, 77, 109, 111, 245, 253, 54_000, 54_001, 54_002, 54_003, 54_004, 54_005,
     54_006, 54_007, 54_008, 54_009,
@@ -222,48 +222,48 @@ proptest! {
         rows in 1_u16..50,
         keys in "[AaRMSDq?]{0,4}",
     ) {
-        let mut bench = Bench::crewed();
-        bench.speaks = false;
+        let mut rig = Rig::crewed();
+        rig.speaks = false;
         for (id, payload, pause_ms) in frames {
-            bench.hear_payload(id, &payload);
-            bench.run((pause_ms / 100) as f64 / 10.0);
+            rig.hear_payload(id, &payload);
+            rig.run((pause_ms / 100) as f64 / 10.0);
         }
-        bench.screen(columns, rows);
-        bench.keys(&typed(&keys));
-        bench.screen(columns, rows);
-        bench.screen(80, 24);
+        rig.screen(columns, rows);
+        rig.keys(&typed(&keys));
+        rig.screen(columns, rows);
+        rig.screen(80, 24);
     }
 
     #[test]
     fn random_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..2_000)) {
-        let mut bench = Bench::crewed();
+        let mut rig = Rig::crewed();
         let mut framer = Framer::new();
         framer.push(&bytes);
         while let Some(frame) = framer.next_frame() {
-            bench.msg(Msg::Frame(frame));
+            rig.msg(Msg::Frame(frame));
         }
-        bench.msg(Msg::Received { bytes: bytes.len(), framing: framer.counters() });
-        bench.screen(80, 24);
+        rig.msg(Msg::Received { bytes: bytes.len(), framing: framer.counters() });
+        rig.screen(80, 24);
     }
 
     #[test]
     fn any_text_is_shown_without_controls(text in prop::collection::vec(any::<u8>(), 50)) {
-        let mut bench = Bench::crewed();
+        let mut rig = Rig::crewed();
         let text: [u8; 50] = text.try_into().unwrap_or([0; 50]);
-        bench.hear(&MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: text.into(), ..Default::default() }));
-        let screen = bench.screen(80, 24);
+        rig.hear(&MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: text.into(), ..Default::default() }));
+        let screen = rig.screen(80, 24);
         prop_assert!(!screen.chars().any(|c| c.is_control() && c != '\n'));
     }
 }
 
 #[test]
 fn the_smallest_terminals_are_drawn() {
-    let mut bench = Bench::crewed();
-    bench.state(0.0, 15.0, 0.0, 0.0, 90.0);
-    bench.plan(TdLimit::empty());
+    let mut rig = Rig::crewed();
+    rig.state(0.0, 15.0, 0.0, 0.0, 90.0);
+    rig.plan(TdLimit::empty());
     for columns in 1..90 {
         for rows in 1..30 {
-            bench.screen(columns, rows);
+            rig.screen(columns, rows);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A recorded flight on the same screens: seeking, speed, and that nothing is ever commanded.
+//! Replay: seeking, speed, and that nothing is ever commanded.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -7,19 +7,19 @@ use std::time::Duration;
 use ground::key::Key;
 use ground::model::page::Page;
 use ground::model::{Role, Settings};
-use ground::replay::film::{Film, FilmError, Scene};
 use ground::replay::player::Player;
+use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, TdPhase};
 use protocol::frame::Encoder;
 use protocol::identity::{GROUND, VEHICLE};
 
-use crate::bench::{MONO, settings};
-use crate::hand::ladder;
+use crate::keys::ladder;
+use crate::rig::{MONO, settings};
 
 const S: fn(u64) -> Duration = Duration::from_secs;
 
-/// A heartbeat a second for a minute: on the pad, falling from second 20, under thrust from 40, down at 50.
+/// One heartbeat per second for a minute: on the pad, descending from second 20, under thrust from 40, landed at 50.
 static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let mut encoder = Encoder::new(VEHICLE);
     let mut bytes = Vec::new();
@@ -39,22 +39,22 @@ static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     directory
 });
 
-fn film() -> Film {
-    load(&HEARTBEATS.path().join("heartbeats.tlog")).expect("a film")
+fn recording() -> Recording {
+    load(&HEARTBEATS.path().join("heartbeats.tlog")).expect("a recording")
 }
 
-fn load(path: &Path) -> Result<Film, FilmError> {
-    Film::load(path, None, &mut |_| {})
+fn load(path: &Path) -> Result<Recording, RecordingError> {
+    Recording::load(path, None, &mut |_| {})
 }
 
-/// Every scene of a film with its time.
-fn scenes(film: &Film) -> Vec<(Duration, Scene)> {
-    let mut reel = film.reel().expect("the film's file");
-    std::iter::from_fn(|| reel.next_scene().expect("the film's file")).collect()
+/// Every event of a recording with its time.
+fn events(recording: &Recording) -> Vec<(Duration, RecordedEvent)> {
+    let mut reader = recording.reader().expect("the recording's file");
+    std::iter::from_fn(|| reader.next_event().expect("the recording's file")).collect()
 }
 
 fn player() -> Player {
-    Player::new(film(), Settings { role: Role::Replaying, ..settings(false, true) })
+    Player::new(recording(), Settings { role: Role::Replaying, ..settings(false, true) })
 }
 
 fn phase(player: &Player) -> TdPhase {
@@ -62,7 +62,7 @@ fn phase(player: &Player) -> TdPhase {
 }
 
 #[test]
-fn time_passes_at_its_speed_and_stands_still_when_paused() {
+fn time_passes_at_the_chosen_speed_and_stops_when_paused() {
     let mut player = player();
     player.pass(S(2));
     assert_eq!(player.position(), S(2));
@@ -80,7 +80,7 @@ fn time_passes_at_its_speed_and_stands_still_when_paused() {
 }
 
 #[test]
-fn seeking_back_shows_what_was_known_then_and_nothing_later() {
+fn seeking_back_shows_nothing_from_later() {
     let mut player = player();
     player.seek(S(55));
     assert_eq!(player.model.page(), Page::Review);
@@ -98,9 +98,9 @@ fn seeking_back_shows_what_was_known_then_and_nothing_later() {
     assert_eq!(player.position(), S(50));
 }
 
-/// The same position is the same screen, however it was reached.
+/// A position shows the same screen, however it was reached.
 #[test]
-fn the_way_to_a_position_does_not_show() {
+fn a_position_shows_the_same_screen_however_it_was_reached() {
     let screen = |player: &Player| {
         let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(80, 24)).unwrap();
         let now = player.position();
@@ -127,7 +127,7 @@ fn no_key_commands_anything_in_a_replay() {
     assert!(player.on_key(Key::Char('q')), "quits at once: nothing is armed here");
 }
 
-/// The link's figures are those of the flight, and nothing says that a replay records.
+/// The link rates are those of the flight, and the log page does not claim to record.
 #[test]
 fn the_links_figures_are_the_recorded_ones() {
     let mut player = player();
@@ -146,9 +146,9 @@ fn the_links_figures_are_the_recorded_ones() {
     assert!(screen.contains("a recorded flight") && !screen.contains("recording"), "{screen}");
 }
 
-/// The crew's own commands are shown with what became of them, from the same code as live.
+/// Recorded commands are shown with their progress, by the same code as live ones.
 #[test]
-fn what_was_commanded_then_is_shown() {
+fn recorded_commands_are_shown() {
     let mut model = ground::model::Model::new(settings(false, true));
     let msg = Msg::Commanded(ground::model::command::CommandKind::Abort);
     let actions = ground::update::update(&mut model, msg, S(1));
@@ -170,26 +170,26 @@ fn a_tlog_is_played_up_to_its_damage() {
     }
     bytes.extend([1, 2, 3]);
     std::fs::write(&path, &bytes).unwrap();
-    let film = load(&path).unwrap();
+    let recording = load(&path).unwrap();
     let at_400_ms = Duration::from_millis(400);
-    let scenes = scenes(&film);
-    assert_eq!(scenes.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
-    assert!(matches!(scenes[1].1, Scene::Sent(21)), "our own heartbeat: {:?}", scenes[1]);
-    assert_eq!(film.damage.as_deref(), Some("unreadable 3 bytes before the end"));
-    assert_eq!(film.begin_of(TdPhase::TD_PHASE_POWERED), Some(S(0)));
+    let events = events(&recording);
+    assert_eq!(events.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
+    assert!(matches!(events[1].1, RecordedEvent::Sent(21)), "our own heartbeat: {:?}", events[1]);
+    assert_eq!(recording.damage.as_deref(), Some("unreadable 3 bytes before the end"));
+    assert_eq!(recording.begin_of(TdPhase::TD_PHASE_POWERED), Some(S(0)));
 }
 
 #[test]
-fn what_is_no_log_is_refused_by_name() {
+fn a_file_that_is_no_log_is_refused_by_name() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("notes.mcap");
     std::fs::write(&path, "not a log").unwrap();
     let refused = load(&path).unwrap_err();
-    assert!(matches!(refused, FilmError::Empty { .. }) && refused.to_string().contains("notes.mcap"));
-    assert!(matches!(load(&directory.path().join("gone")), Err(FilmError::Read { .. })));
+    assert!(matches!(refused, RecordingError::Empty { .. }) && refused.to_string().contains("notes.mcap"));
+    assert!(matches!(load(&directory.path().join("gone")), Err(RecordingError::Read { .. })));
 }
 
-/// The most memory that a process has held, kB, as Linux says it while it runs.
+/// The peak memory of a running process, kB (Linux).
 #[cfg(target_os = "linux")]
 fn peak_kb(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
@@ -197,11 +197,11 @@ fn peak_kb(process: u32) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// A log of 36 MB is shown in little more memory than one of a few bytes, and says how far the reading is.
+/// A log of 36 MB needs little more memory than one of a few bytes, and its reading progress is reported.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_long_tlog_is_played_in_bounded_memory() {
-    // Measured: 11 MB for a log of one frame, and 12 MB for this one; holding the frames takes 130 MB.
+    // Measured: 11 MB for a log of one frame, 12 MB for this one; keeping all frames in memory takes 130 MB.
     const MOST_KB: u64 = 40_000;
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.tlog");

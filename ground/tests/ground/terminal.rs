@@ -1,13 +1,13 @@
-//! The program on a real terminal, which then vanishes: link and log go on, and a screen finds them again.
+//! The program on a terminal that disappears: link and log continue, and a screen can attach again.
 //!
-//! `script` (util-linux) makes the terminal; where it is missing the test says so and checks nothing.
+//! `script` (util-linux) provides the terminal; without it the test reports that and checks nothing.
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Runs a command line on a terminal of its own.
+/// Runs a command line on its own terminal.
 fn on_a_terminal(directory: &Path, command_line: &str) -> Option<Child> {
     Command::new("script")
         .args(["--quiet", "--flush", "--command", command_line, "terminal.txt"])
@@ -22,7 +22,7 @@ fn on_a_terminal(directory: &Path, command_line: &str) -> Option<Child> {
         .ok()
 }
 
-/// Waits until a file holds this word, as long as a slow machine needs. A screen does not write its spaces.
+/// Waits until a file contains these words, long enough for a slow machine.
 fn wait_for(path: &Path, what: &str) -> bool {
     (0..600).any(|_| {
         std::thread::park_timeout(Duration::from_millis(50));
@@ -31,13 +31,13 @@ fn wait_for(path: &Path, what: &str) -> bool {
 }
 
 fn signal(name: &str, process: &str) -> bool {
-    // The shell's own: not every machine has the program.
+    // The built-in of the shell, because not every machine has a `kill` program.
     let sent = Command::new("sh").args(["-c", &format!("kill -s {name} {process}")]).status();
     sent.is_ok_and(|status| status.success())
 }
 
 #[test]
-fn a_terminal_that_vanishes_takes_nothing_with_it() {
+fn a_station_survives_the_loss_of_its_terminal() {
     let directory = tempfile::tempdir().unwrap();
     let program = env!("CARGO_BIN_EXE_ground");
     let arguments = "--connect udpin:127.0.0.1:0 --log kept.mcap";
@@ -51,7 +51,7 @@ fn a_terminal_that_vanishes_takes_nothing_with_it() {
     };
     assert!(wait_for(&directory.path().join("terminal.txt"), "Arming ladder"));
     let process = std::fs::read_to_string(directory.path().join("pid")).unwrap().trim().to_owned();
-    // The session drops: its terminal is gone at once.
+    // The session is dropped, and its terminal disappears.
     terminal.kill().unwrap();
     terminal.wait().unwrap();
     let socket = directory.path().join(format!("touchdown/{process}.sock"));

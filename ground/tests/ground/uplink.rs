@@ -1,4 +1,4 @@
-//! That the vehicle hears this station is a fact of its own.
+//! The uplink: whether the vehicle hears this station.
 
 use ground::key::Key;
 use ground::model::dialog::Dialog;
@@ -6,59 +6,59 @@ use ground::update::Action;
 use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA, TdFrameRefusal, TdPhase};
 use protocol::identity::{Address, GROUND};
 
-use crate::bench::{Bench, is_arm};
-use crate::hand::ladder;
+use crate::keys::ladder;
+use crate::rig::{Rig, is_arm};
 
-fn top(bench: &Bench) -> String {
-    bench.screen(80, 24).lines().nth(1).unwrap_or_default().to_owned()
+fn top(rig: &Rig) -> String {
+    rig.screen(80, 24).lines().nth(1).unwrap_or_default().to_owned()
 }
 
-/// Only the way up is cut. The vehicle is heard as before.
+/// Only the uplink is cut; the vehicle is still heard.
 #[test]
-fn an_uplink_that_is_lost_is_shown_alarms_and_is_no_go() {
-    let mut bench = Bench::crewed();
-    bench.run(2.0);
-    assert!(top(&bench).contains("down 0s up 0s"), "{}", top(&bench));
-    assert!(bench.screen(80, 24).contains(" GO: every arming check passes"));
-    bench.hears = false;
-    bench.run(2.4);
-    assert!(top(&bench).contains("down 0s up late 2s"), "{}", top(&bench));
-    assert!(!bench.screen(80, 24).contains(" GO: "), "{}", bench.screen(80, 24));
-    bench.run(2.0);
-    let screen = bench.screen(80, 24);
-    assert!(top(&bench).contains("down 0s UP LOST 4s"), "{screen}");
+fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
+    let mut rig = Rig::crewed();
+    rig.run(2.0);
+    assert!(top(&rig).contains("down 0s up 0s"), "{}", top(&rig));
+    assert!(rig.screen(80, 24).contains(" GO: every arming check passes"));
+    rig.hears = false;
+    rig.run(2.4);
+    assert!(top(&rig).contains("down 0s up late 2s"), "{}", top(&rig));
+    assert!(!rig.screen(80, 24).contains(" GO: "), "{}", rig.screen(80, 24));
+    rig.run(2.0);
+    let screen = rig.screen(80, 24);
+    assert!(top(&rig).contains("down 0s UP LOST 4s"), "{screen}");
     assert!(screen.contains("ALARM UPLINK LOST") && screen.contains("NO-GO: uplink not proven"), "{screen}");
     assert!(screen.contains("[ ] it hears us: uplink proven"), "{screen}");
-    bench.keys(&ladder());
-    assert!(bench.take_commands().is_empty(), "no offer to arm, and so nothing is sent");
-    assert!(bench.events().contains("cannot arm: the uplink is not proven"));
-    bench.hears = true;
-    bench.run(1.0);
-    assert!(bench.screen(80, 24).contains("[x] it hears us: uplink proven"));
-    bench.keys(&ladder());
-    assert!(bench.take_commands().iter().any(is_arm));
+    rig.keys(&ladder());
+    assert!(rig.take_commands().is_empty(), "no offer to arm, and so nothing is sent");
+    assert!(rig.events().contains("cannot arm: the uplink is not proven"));
+    rig.hears = true;
+    rig.run(1.0);
+    assert!(rig.screen(80, 24).contains("[x] it hears us: uplink proven"));
+    rig.keys(&ladder());
+    assert!(rig.take_commands().iter().any(is_arm));
 }
 
-/// It is lost while the word is being typed.
+/// The uplink is lost while the word is being typed.
 #[test]
-fn an_uplink_that_is_lost_in_the_ladder_ends_it() {
-    let mut bench = Bench::crewed();
-    bench.key(Key::Char('A'));
-    assert!(matches!(bench.model.dialog, Dialog::Arm { .. }));
-    bench.hears = false;
-    bench.run(4.0);
-    bench.keys(&ladder()[1..]);
-    assert!(bench.take_commands().is_empty());
+fn a_lost_uplink_prevents_arming_in_the_middle_of_the_ladder() {
+    let mut rig = Rig::crewed();
+    rig.key(Key::Char('A'));
+    assert!(matches!(rig.model.dialog, Dialog::Arm { .. }));
+    rig.hears = false;
+    rig.run(4.0);
+    rig.keys(&ladder()[1..]);
+    assert!(rig.take_commands().is_empty());
 }
 
-/// With a key on one side only the vehicle accepts nothing, and says so to whom it may concern.
+/// If only the vehicle has a key, it accepts nothing and reports that to every station.
 #[test]
 fn a_vehicle_that_accepts_nothing_says_why() {
-    let mut bench = Bench::crewed();
-    bench.hears = false;
+    let mut rig = Rig::crewed();
+    rig.hears = false;
     for _ in 0..10 {
-        bench.run(0.4);
-        bench.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+        rig.run(0.4);
+        rig.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
             accepted_age_ms: u16::MAX,
             refused_age_ms: 100,
             refused_count: 7,
@@ -68,71 +68,67 @@ fn a_vehicle_that_accepts_nothing_says_why() {
             ..TD_UPLINK_DATA::default()
         }));
     }
-    let screen = bench.screen(140, 45);
+    let screen = rig.screen(140, 45);
     assert!(screen.contains("UP NOT PROVEN"), "{screen}");
     assert!(screen.contains("it refuses frames of 255/190: not signed"), "{screen}");
-    bench.key(Key::Char('5'));
-    assert!(
-        bench.screen(140, 45).contains("up never ago; it refused 7 of 255/190"),
-        "{}",
-        bench.screen(140, 45)
-    );
+    rig.key(Key::Char('5'));
+    assert!(rig.screen(140, 45).contains("up never ago; it refused 7 of 255/190"), "{}", rig.screen(140, 45));
 }
 
-/// A vehicle that does not tell of its uplink answers questions if it hears them.
+/// A vehicle that does not report its uplink still answers TIMESYNC.
 #[test]
-fn an_answer_proves_the_uplink_of_a_vehicle_that_tells_nothing() {
-    let mut bench = Bench::crewed();
-    bench.model.link.uplink = ground::model::uplink::Uplink::default();
-    assert!(!bench.model.link.uplink.is_proven(bench.now));
-    let ts1 = i64::try_from(bench.now.as_nanos()).unwrap();
-    bench.now += std::time::Duration::from_millis(80);
-    bench.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
-    assert!(bench.model.link.uplink.is_proven(bench.now));
+fn an_answer_proves_the_uplink_of_a_vehicle_that_does_not_report_it() {
+    let mut rig = Rig::crewed();
+    rig.model.link.uplink = ground::model::uplink::Uplink::default();
+    assert!(!rig.model.link.uplink.is_proven(rig.now));
+    let ts1 = i64::try_from(rig.now.as_nanos()).unwrap();
+    rig.now += std::time::Duration::from_millis(80);
+    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
+    assert!(rig.model.link.uplink.is_proven(rig.now));
 }
 
 #[test]
 fn who_armed_the_vehicle_is_on_the_screen() {
-    let mut bench = Bench::crewed();
-    let identity = |bench: &Bench| bench.screen(80, 24).lines().next().unwrap_or_default().to_owned();
-    assert!(identity(&bench).contains("commands here"));
-    bench.armed = true;
-    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
-    bench.run(1.0);
-    assert!(identity(&bench).contains("armed here"), "{}", identity(&bench));
-    let mut bench = Bench::crewed();
-    bench.uplink_of(Address { system_id: 254, component_id: 190 }, 100, true);
-    assert!(identity(&bench).contains("armed 254/190"), "{}", identity(&bench));
+    let mut rig = Rig::crewed();
+    let identity = |rig: &Rig| rig.screen(80, 24).lines().next().unwrap_or_default().to_owned();
+    assert!(identity(&rig).contains("commands here"));
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(1.0);
+    assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
+    let mut rig = Rig::crewed();
+    rig.uplink_of(Address { system_id: 254, component_id: 190 }, 100, true);
+    assert!(identity(&rig).contains("armed 254/190"), "{}", identity(&rig));
 }
 
-fn heartbeats_in(bench: &mut Bench, seconds: f64) -> usize {
-    bench.actions.clear();
-    bench.run(seconds);
+fn heartbeats_in(rig: &mut Rig, seconds: f64) -> usize {
+    rig.actions.clear();
+    rig.run(seconds);
     let is_beat = |action: &&Action| matches!(action, Action::Send(message) if matches!(**message, MavMessage::HEARTBEAT(_)));
-    bench.actions.iter().filter(is_beat).count()
+    rig.actions.iter().filter(is_beat).count()
 }
 
 #[test]
-fn an_armed_vehicle_on_its_pad_hears_ten_heartbeats_a_second() {
-    let mut bench = Bench::crewed();
-    assert_eq!(heartbeats_in(&mut bench, 5.0), 5);
-    bench.armed = true;
-    bench.phase = TdPhase::TD_PHASE_PAD_ARMED;
-    bench.run(1.0);
-    assert_eq!(heartbeats_in(&mut bench, 5.0), 50);
-    bench.countdown_ms = 3_000;
-    assert_eq!(heartbeats_in(&mut bench, 2.0), 20);
-    bench.phase = TdPhase::TD_PHASE_AERO_DESCENT;
-    bench.run(0.2);
-    assert!(heartbeats_in(&mut bench, 5.0) <= 6);
+fn an_armed_vehicle_on_the_pad_gets_ten_heartbeats_a_second() {
+    let mut rig = Rig::crewed();
+    assert_eq!(heartbeats_in(&mut rig, 5.0), 5);
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(1.0);
+    assert_eq!(heartbeats_in(&mut rig, 5.0), 50);
+    rig.countdown_ms = 3_000;
+    assert_eq!(heartbeats_in(&mut rig, 2.0), 20);
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.run(0.2);
+    assert!(heartbeats_in(&mut rig, 5.0) <= 6);
 }
 
 #[test]
 fn without_a_link_the_loss_is_unknown() {
-    let mut bench = Bench::crewed();
-    bench.key(Key::Char('5'));
-    assert!(bench.screen(80, 24).contains("loss 0.0 %"));
-    bench.speaks = false;
-    bench.run(4.0);
-    assert!(bench.screen(80, 24).contains("loss unknown"), "{}", bench.screen(80, 24));
+    let mut rig = Rig::crewed();
+    rig.key(Key::Char('5'));
+    assert!(rig.screen(80, 24).contains("loss 0.0 %"));
+    rig.speaks = false;
+    rig.run(4.0);
+    assert!(rig.screen(80, 24).contains("loss unknown"), "{}", rig.screen(80, 24));
 }

@@ -1,34 +1,28 @@
-//! Flights from apogee to touchdown by the thousand: drawn, flown, judged and counted.
+//! Simulates thousands of flights on several threads and summarises how they end.
 //!
-//! * [`dispersion`]: what is uncertain about a flight and by how much, as data.
-//! * [`draw`]: one flight's truth from a seed and its number.
-//! * [`fault`]: what breaks in a flight, when, and what is expected then.
-//! * [`baseline`], [`timing`]: simpler controllers, to be beaten, and the height they light at.
-//! * [`fly`]: one flight, from apogee until it lies still.
-//! * [`outcome`]: what became of it, judged twice.
-//! * [`order`], [`sortie`], [`row`]: what a campaign flies, one flight of it, and that flight in a table.
-//! * [`run`], [`store`], [`table`]: many flights on several threads, and where their rows are kept.
-//! * [`statistics`], [`summary`], [`picture`], [`results`]: what a thousand rows say.
+//! * [`order`]: everything that a campaign's results depend on.
+//! * [`tally`]: one flight of a campaign, and what is counted during it.
+//! * [`row`]: one flight as a row of a table.
+//! * [`run`]: flies the missing flights on several threads.
+//! * [`store`]: the directory of a campaign.
+//! * [`table`]: rows as CSV and Parquet.
+//! * [`statistics`], [`summary`], [`picture`]: percentiles, texts and pictures from the rows.
+//! * [`results`]: writes tables, summary and pictures into the directory.
+//! * [`scenario`]: faults, and the expected outcome of a flight with them.
+//! * [`timing`]: the ignition height of the simpler guidance laws, found by simulated flights.
 //!
-//! A flight is a function of the order and its number, so a campaign can be cut into shards, stopped, gone on with and
-//! flown on any number of threads with the same results.
-#![warn(missing_docs)]
+//! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
+//! run on any number of threads with the same results.
 
-pub mod baseline;
-mod braking;
-pub mod dispersion;
-pub mod draw;
-pub mod fault;
-pub mod fly;
 pub mod order;
-pub mod outcome;
 pub mod picture;
 pub mod results;
 pub mod row;
 pub mod run;
-pub mod sortie;
+pub mod scenario;
 pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod table;
+pub mod tally;
 pub mod timing;

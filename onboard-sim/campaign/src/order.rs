@@ -1,50 +1,33 @@
-//! What a campaign flies: everything that its results depend on.
+//! The order of a campaign: everything that its results depend on.
 
-use flight::mission::Mission;
 use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
-
-use crate::baseline::Controller;
-use crate::dispersion::Dispersion;
-use crate::fault::TimedFault;
+use sim::recipe::Recipe;
 
 /// A campaign's order.
 #[derive(Debug, Clone)]
 pub struct Order {
-    /// The mission as flown.
-    pub mission: Mission,
-    /// Its text.
-    pub mission_toml: String,
-    /// What is uncertain.
-    pub dispersion: Dispersion,
-    /// Its name.
-    pub dispersion_name: String,
-    /// Its text.
-    pub dispersion_toml: String,
-    /// Seed of all flights.
-    pub seed: u64,
+    /// The recipe of every flight.
+    pub recipe: Recipe,
     /// Number of flights; they are numbered from 0.
     pub flights: u64,
-    /// Who flies the landing burn.
-    pub controller: Controller,
-    /// What breaks in every flight.
-    pub faults: Vec<TimedFault>,
 }
 
 impl Order {
-    /// What identifies the results; `build` names the program.
+    /// The manifest that identifies the results; `build` names the program.
     pub fn manifest(&self, build: &str, shard: Shard) -> Manifest {
+        let recipe = &self.recipe;
         Manifest {
             format: FORMAT,
-            mission: self.mission.name.clone(),
-            mission_sha256: sha256(&self.mission_toml),
-            dispersion: self.dispersion_name.clone(),
-            dispersion_sha256: sha256(&self.dispersion_toml),
-            seed: self.seed,
+            mission: recipe.mission.name.clone(),
+            mission_sha256: sha256(&recipe.mission_toml),
+            dispersion: recipe.dispersion_name.clone(),
+            dispersion_sha256: sha256(&recipe.dispersion_toml),
+            seed: recipe.seed,
             flights: self.flights,
-            controller: self.controller.name().to_owned(),
-            steered: self.mission.steered,
-            faults: self.faults.iter().map(ToString::to_string).collect(),
+            controller: recipe.controller.name().to_owned(),
+            steered: recipe.mission.steered,
+            faults: recipe.faults.iter().map(ToString::to_string).collect(),
             build: build.to_owned(),
             shard,
         }
@@ -54,7 +37,7 @@ impl Order {
 /// Version of the directory's layout and of the columns.
 const FORMAT: u32 = 1;
 
-/// What a directory of results was made from.
+/// What the results in a directory were made from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of the layout.
@@ -67,13 +50,12 @@ pub struct Manifest {
     pub dispersion: String,
     /// Digest of their text.
     pub dispersion_sha256: String,
-    /// Seed.
     pub seed: u64,
     /// Flights of the whole campaign.
     pub flights: u64,
     /// Name of the controller.
     pub controller: String,
-    /// The fins steer.
+    /// Whether the fins steer.
     pub steered: bool,
     /// Faults, as written on a command line.
     pub faults: Vec<String>,
@@ -84,7 +66,7 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The first difference to another, in words; `None` if there is none.
+    /// The first difference from another manifest, in words; `None` if the manifests are equal.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let pairs = [
             ("format", self.format.to_string(), other.format.to_string()),
@@ -114,14 +96,14 @@ impl Manifest {
 /// Part `index` of `count`, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// Which, from 1.
+    /// The number of the part, from 1.
     pub index: u64,
-    /// Of how many.
+    /// The number of parts.
     pub count: u64,
 }
 
 impl Shard {
-    /// All of it.
+    /// The whole campaign as one part.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Whether a chunk belongs to this part.
@@ -130,7 +112,7 @@ impl Shard {
     }
 }
 
-/// A shard that was not understood.
+/// Why the text of a shard is wrong.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("shard `{0}` is not I/N with 1 <= I <= N")]
 pub struct ShardError(String);
@@ -178,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn shards_are_read_and_share_everything() {
+    fn shards_are_parsed_and_divide_all_chunks() {
         let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].iter().map(|text| text.parse().unwrap()).collect();
         for chunk in 0..20 {
             assert_eq!(shards.iter().filter(|shard| shard.has(chunk)).count(), 1);

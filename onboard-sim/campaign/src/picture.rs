@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write};
 
-use flight::mission::LegLimits;
+use flight::vehicle::mission::LegLimits;
 
 use crate::row::Row;
 use crate::statistics::sorted;
@@ -16,7 +16,7 @@ const TOP: f64 = 40.0;
 const BOTTOM: f64 = 60.0;
 /// Bars of a histogram.
 const BARS: usize = 40;
-/// Values beyond this share at each end are gathered in the last bar, so that one crash does not hide the rest.
+/// Values beyond this fraction at each end go into the last bar, so that one crash does not hide the rest.
 const TAIL_SHARE: f64 = 0.005;
 
 /// File names and titles of the pictures.
@@ -58,7 +58,7 @@ fn drawn(draw: impl FnOnce(&mut String) -> fmt::Result) -> String {
     out
 }
 
-/// Values along one axis of a picture, and where they go.
+/// One axis of a picture: its values and their positions.
 #[derive(Clone, Copy)]
 struct Scale {
     from: f64,
@@ -72,7 +72,7 @@ impl Scale {
         self.from_px + (value - self.from) / (self.to - self.from) * (self.to_px - self.from_px)
     }
 
-    /// A round step that gives four to nine marks.
+    /// A round step between marks that gives four to nine marks.
     fn step(&self) -> f64 {
         let rough = (self.to - self.from) / 8.0;
         let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
@@ -123,12 +123,12 @@ fn frame(x: Scale, y: Scale, [title, x_label, y_label]: [&str; 3], out: &mut Str
     )
 }
 
-/// A mark's value without the noise of its last bits.
+/// A mark's value without rounding errors.
 fn plain(value: f64) -> f64 {
     libm::round(value * 1e6) / 1e6
 }
 
-/// Told apart in grey and by shape as well.
+/// The marks differ in shape, too, so that they can be told apart in grey.
 fn scatter(rows: &[Row], title: &str, out: &mut String) -> fmt::Result {
     let places: Vec<(f64, f64, &Row)> = rows
         .iter()

@@ -1,4 +1,4 @@
-//! What a campaign leaves in its directory: tables, summary, pictures.
+//! Writes a campaign's tables, summary and pictures into its directory.
 
 use crate::order::Order;
 use crate::picture::{PICTURES, pictures};
@@ -22,7 +22,7 @@ pub fn publish(order: &Order, store: &Store) -> Result<Summary, StoreError> {
         serde_json::to_string_pretty(&summary).map_err(|error| failed("summary.json", error.to_string()))?;
     store.publish("summary.json", json.as_bytes())?;
     store.publish("summary.md", to_markdown(&summary).as_bytes())?;
-    for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, &order.mission.leg_limits)) {
+    for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, &order.recipe.mission.leg_limits)) {
         store.publish(name, picture.as_bytes())?;
     }
     Ok(summary)

@@ -1,7 +1,7 @@
-//! One row a flight: what chance decided, what became of it, and what it cost.
+//! One row per flight: its random draws, its outcome and the work of its solver.
 //!
-//! The columns are named with their units once, here; CSV, Parquet and the summary take them from
-//! [`COLUMNS`]. A quantity that a flight never had (the height of an ignition that never came) is empty.
+//! The columns and their units are named only here; CSV, Parquet and the summary take them from [`COLUMNS`]. The cell
+//! of a quantity that a flight does not have (such as the height of an ignition that never came) is empty.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +16,11 @@ pub enum Value<'a> {
     Maybe(Option<f64>),
     /// Yes or no.
     Flag(bool),
-    /// A word.
     Word(&'a str),
 }
 
 impl Value<'_> {
-    /// The value as a number: flags are 0 and 1, words are none.
+    /// The value as a number: a flag is 0 or 1, a word is `None`.
     pub fn number(&self) -> Option<f64> {
         match *self {
             Self::Count(count) => Some(count as f64),
@@ -33,7 +32,7 @@ impl Value<'_> {
     }
 }
 
-/// What all cells of a column are.
+/// The type of a column's cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// [`Value::Count`].
@@ -99,7 +98,7 @@ impl Cell for String {
 pub struct Column {
     /// The name, with its unit.
     pub name: &'static str,
-    /// What its cells are.
+    /// The type of its cells.
     pub kind: Kind,
     /// The cell of a row.
     pub value: for<'a> fn(&'a Row) -> Value<'a>,
@@ -142,7 +141,7 @@ row! {
     cg_offset_z_m: f64,
     /// Drawn: mean wind 10 m above the ground, m/s.
     wind_m_s: f64,
-    /// Drawn: where the wind blows to, from world x towards world y, degrees.
+    /// Drawn: direction that the wind blows to, from world x towards world y, degrees.
     wind_towards_deg: f64,
     /// Drawn: height of apogee, m.
     apogee_height_m: f64,
@@ -156,11 +155,11 @@ row! {
     apogee_rate_deg_s: f64,
     /// The landing motor was commanded to light.
     ignited: bool,
-    /// It was commanded while a check of the ignition gate failed. Never true.
+    /// The motor was commanded to light while a check of the ignition gate failed. This must never happen.
     ignition_outside_gate: bool,
-    /// The parachute was thrown out.
+    /// The parachute was deployed.
     parachute: bool,
-    /// Height of the feet that was chosen for the first thrust, m, as of the command.
+    /// Height of the feet that was chosen for the first thrust, m, at the time of the command.
     chosen_onset_height_m: Option<f64>,
     /// Height of the feet at the ignition command, m.
     ignition_height_m: Option<f64>,
@@ -180,37 +179,38 @@ row! {
     touchdown_tilt_deg: Option<f64>,
     /// Size of the rotation rate at contact, degrees per second.
     touchdown_rate_deg_s: Option<f64>,
-    /// Place of contact, world x, m from the pad.
+    /// Position of contact, world x, m from the pad.
     touchdown_x_m: Option<f64>,
-    /// Place of contact, world y, m from the pad.
+    /// Position of contact, world y, m from the pad.
     touchdown_y_m: Option<f64>,
     /// Thrust over weight at contact.
     touchdown_thrust_over_weight: Option<f64>,
-    /// The largest share of what the legs take that the contact asked of them: above 1 is too much.
+    /// The load of the contact on the legs as a fraction of their limit, the largest of all limits; above 1 is too
+    /// much.
     leg_use: Option<f64>,
     /// Inside the landing paper's Table 2, and upright afterwards.
     strict: bool,
-    /// Within what the legs take, and upright afterwards.
+    /// Within the limits of the legs, and upright afterwards.
     legs: bool,
-    /// Why not within what the legs take; empty if it is.
+    /// Why the flight did not land within the limits of the legs; empty if it did.
     failure: String,
-    /// How it lies; empty if it does not.
+    /// How the vehicle came to rest; empty if it did not.
     rest: String,
     /// Last phase.
     phase: String,
     /// Plans that converged and land.
     plans_converged: u64,
-    /// Plans flown though not converged, or missing the end a little.
+    /// Plans that were flown although they did not converge or missed their end conditions slightly.
     plans_best_feasible: u64,
-    /// Plans that the previous one stood in for.
+    /// Ticks on which the previous plan was continued.
     plans_shifted: u64,
-    /// Plans that the upright law stood in for.
+    /// Ticks on which the upright law flew.
     plans_stabiliser: u64,
-    /// Iterations of the solver in all.
+    /// Total iterations of the solver.
     solver_iterations: u64,
     /// Solves that did not converge.
     solver_failures: u64,
-    /// Share of the frames under thrust with a gimbal axis commanded to its stop.
+    /// Fraction of the frames under thrust in which a gimbal axis was commanded to its stop.
     gimbal_saturation_share: f64,
     /// Largest error of the estimated vertical velocity below 10 m, m/s.
     error_vertical_m_s: f64,
@@ -220,14 +220,14 @@ row! {
     error_height_m: f64,
     /// Largest error of the estimated direction of the nose below 10 m, degrees.
     error_nose_deg: f64,
-    /// Faults that came about.
+    /// Faults that happened.
     faults: u64,
-    /// From apogee until it lay still, s.
+    /// Time from apogee until the vehicle was at rest, s.
     flight_time_s: f64,
 }
 
 impl Row {
-    /// The columns that chance decides, in order, with what they would be without chance, if that is one value.
+    /// The drawn columns in order, each with its nominal value if it has one.
     pub const DRAWN: [(&'static str, Option<f64>); 15] = [
         ("impulse_scale", Some(1.0)),
         ("burn_time_scale", Some(1.0)),
@@ -247,7 +247,7 @@ impl Row {
     ];
 }
 
-/// The column of a name.
+/// The column of that name.
 pub fn column(name: &str) -> Option<&'static Column> {
     COLUMNS.iter().find(|column| column.name == name)
 }

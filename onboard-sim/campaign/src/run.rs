@@ -1,7 +1,7 @@
-//! Flies what is missing of a campaign, on several threads.
+//! Flies the missing flights of a campaign on several threads.
 //!
-//! Threads take chunks of flights as they come; a flight depends on nothing but the order and its number, so the
-//! results do not depend on who flew it.
+//! Each thread takes the next chunk of flights. A flight depends only on the order and its number, so the results do
+//! not depend on the thread that flew it.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,20 +9,20 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use crate::fly::FlyError;
 use crate::order::Order;
 use crate::row::Row;
-use crate::sortie;
 use crate::store::{Store, StoreError};
+use crate::tally;
+use sim::sortie::SetUpError;
 
-/// How far a run has come.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Progress {
     /// Flights flown in this run.
     pub flown: u64,
     /// Flights that this run has to fly.
     pub of: u64,
-    /// Flights of this run that landed within what the legs take.
+    /// Flights of this run that landed within the limits of the legs.
     pub legs: u64,
     /// Flights of this run that landed inside Table 2.
     pub strict: u64,
@@ -36,24 +36,21 @@ pub enum RunError {
     /// A flight cannot be set up.
     #[error("flight {number}")]
     Fly {
-        /// Which.
         number: u64,
-        /// Why.
         #[source]
-        source: FlyError,
+        source: SetUpError,
     },
-    /// A flight panicked: a fault of this program.
+    /// A flight panicked, which is a bug in this program.
     #[error("flight {number} panicked: {message}")]
     Panic {
-        /// Which.
         number: u64,
-        /// What it said.
+        /// The panic's message.
         message: String,
     },
-    /// The directory.
+    /// The directory cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A thread could not be had.
+    /// A thread could not be started.
     #[error("a thread could not be started")]
     Thread(#[source] std::io::Error),
 }
@@ -61,7 +58,7 @@ pub enum RunError {
 /// Flies the chunks that are not in the store yet, on `jobs` threads. `progress` is called after every flight.
 ///
 /// # Errors
-/// The first thing that went wrong; the chunks done until then stay.
+/// The first error; the chunks that were finished before it stay in the store.
 pub fn run(
     order: &Order,
     store: &Store,
@@ -72,7 +69,7 @@ pub fn run(
     let of = missing.iter().map(|chunk| store.flights_of(*chunk).count() as u64).sum();
     let state = Mutex::new((Progress { of, ..Progress::default() }, None::<RunError>));
     let next = AtomicUsize::new(0);
-    // A thread that panics with the lock held is a fault of `progress`; what was counted is still true.
+    // Only `progress` can panic with the lock held, and then the counts are still valid.
     let locked = || state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let fly_chunk = |chunk: u64| -> Result<(), RunError> {
         let mut rows = Vec::new();
@@ -116,7 +113,7 @@ pub fn run(
 }
 
 fn fly_caught(order: &Order, number: u64) -> Result<Row, RunError> {
-    match catch_unwind(AssertUnwindSafe(|| sortie::fly(order, number))) {
+    match catch_unwind(AssertUnwindSafe(|| tally::fly(&order.recipe, number))) {
         Ok(row) => row.map_err(|source| RunError::Fly { number, source }),
         Err(panic) => Err(RunError::Panic { number, message: words(panic.as_ref()) }),
     }

@@ -5,14 +5,14 @@ use serde::Serialize;
 /// 97.5 % point of the normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// How many of how many, with a 95 % interval for the true share.
+/// A count of a total, with a 95 % confidence interval of the true fraction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Share {
-    /// How many.
+    /// The count.
     pub count: u64,
-    /// Of how many.
+    /// The total.
     pub of: u64,
-    /// Their share.
+    /// The count divided by the total.
     pub share: f64,
     /// Low end of the interval.
     pub low: f64,
@@ -21,8 +21,8 @@ pub struct Share {
 }
 
 impl Share {
-    /// With E. B. Wilson's score interval (Journal of the American Statistical Association 22, 1927): unlike the
-    /// normal approximation it is right near 0 and 1.
+    /// Uses E. B. Wilson's score interval (Journal of the American Statistical Association 22, 1927), which unlike the
+    /// normal approximation is right near 0 and 1.
     pub fn new(count: u64, of: u64) -> Self {
         if of == 0 {
             return Self { count, of, share: 0.0, low: 0.0, high: 1.0 };
@@ -38,8 +38,8 @@ impl Share {
     }
 }
 
-/// The value below which a share of the values lies, between neighbours by a straight line (R's type 7); `None`
-/// without values. `sorted` ascends.
+/// The quantile of a fraction, with linear interpolation between neighbours (R's type 7); `None` without values.
+/// `sorted` must be in ascending order.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;
@@ -48,14 +48,14 @@ pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     Some(sorted[below] + (place - below as f64) * (sorted[above] - sorted[below]))
 }
 
-/// Sorted, numbers only.
+/// The finite values, sorted.
 pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
     values.sort_by(f64::total_cmp);
     values
 }
 
-/// Spearman's rank correlation, equal values sharing their mean rank; 0 where one side does not vary.
+/// Spearman's rank correlation. Equal values get their mean rank. The result is 0 if one side does not vary.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> f64 {
     let ranks = |values: Vec<f64>| {
         let mut order: Vec<usize> = (0..values.len()).collect();

@@ -1,7 +1,7 @@
-//! The directory of a campaign: its manifest, the chunks of flights that are done, and what is made of them.
+//! The directory of a campaign: its manifest, the finished chunks of flights, and the results.
 //!
-//! A chunk is written under another name and renamed when it is whole, so that a campaign that was stopped goes on
-//! with the chunks that are there. A directory belongs to one order of flights: another is refused.
+//! A chunk is written under a temporary name and renamed when it is complete, so a stopped campaign can continue with
+//! the finished chunks. A directory belongs to one order; another order is refused.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -12,10 +12,9 @@ use crate::picture::PICTURES;
 use crate::row::Row;
 use crate::table;
 
-/// Flights of a chunk.
 pub const CHUNK_FLIGHTS: u64 = 10;
 
-/// Files of results, but for the pictures.
+/// Result files, except the pictures.
 const RESULTS: [&str; 5] = ["flights.csv", "flights.parquet", "summary.json", "summary.md", "cost.json"];
 
 /// Why a directory cannot be used.
@@ -24,56 +23,50 @@ pub enum StoreError {
     /// A file cannot be read or written.
     #[error("{path}")]
     File {
-        /// Which.
         path: PathBuf,
-        /// Why.
         #[source]
         source: io::Error,
     },
-    /// A file is not what it should be.
+    /// A file has the wrong content.
     #[error("{path}: {message}")]
     Content {
-        /// Which.
         path: PathBuf,
         /// What is wrong.
         message: String,
     },
-    /// It holds other results.
+    /// The directory holds the results of another order.
     #[error("{path} holds other results: {difference}; give another directory")]
     OtherOrder {
         /// The directory.
         path: PathBuf,
-        /// In what they differ.
+        /// The first difference.
         difference: String,
     },
-    /// A new campaign would overwrite what is there.
-    #[error("{path} exists already and is of no campaign; give another directory")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Another process is at work in it.
+    /// A new campaign would overwrite an existing file.
+    #[error("{path} already exists and belongs to no campaign; give another directory")]
+    Foreign { path: PathBuf },
+    /// Another process uses the directory.
     #[error("{path} is in use by another process")]
     InUse {
         /// The directory.
         path: PathBuf,
     },
-    /// Flights are missing.
-    #[error("flights {from} to {to} are in none of the directories; run what is missing first")]
+    /// Some flights are missing.
+    #[error("flights {from} to {to} are in none of the directories; fly the missing ones first")]
     Missing {
-        /// The first of them.
+        /// The first missing flight.
         from: u64,
-        /// The last of them.
+        /// The last missing flight.
         to: u64,
     },
-    /// The same flights differ.
-    #[error("flights {from} and on are in {one} and in {two}, and differ")]
+    /// Two directories have different results for the same flights.
+    #[error("{one} and {two} have different results for the flights from {from} on")]
     Contradiction {
         /// The first flight of the chunk.
         from: u64,
-        /// A directory.
+        /// The first directory.
         one: PathBuf,
-        /// Another.
+        /// The second directory.
         two: PathBuf,
     },
 }
@@ -88,15 +81,15 @@ fn file_error(path: &Path) -> impl FnOnce(io::Error) -> StoreError {
 pub struct Store {
     path: PathBuf,
     manifest: Manifest,
-    /// Held as long as the directory is in use.
+    /// Locked as long as the directory is in use.
     _lock: File,
 }
 
 impl Store {
-    /// Makes a directory for an order, or goes on with one that was made for the same.
+    /// Creates a directory for an order, or opens one that was created for the same order.
     ///
     /// # Errors
-    /// It was made for another order, is in use, or cannot be written.
+    /// The directory was created for another order, is in use, or cannot be written.
     pub fn open(path: &Path, order: &Order, manifest: &Manifest) -> Result<Self, StoreError> {
         let chunks = path.join("chunks");
         fs::create_dir_all(&chunks).map_err(file_error(&chunks))?;
@@ -109,8 +102,8 @@ impl Store {
             }
         } else {
             refuse_loss(path, order)?;
-            write_whole(&path.join("mission.toml"), order.mission_toml.as_bytes())?;
-            write_whole(&path.join("dispersion.toml"), order.dispersion_toml.as_bytes())?;
+            write_whole(&path.join("mission.toml"), order.recipe.mission_toml.as_bytes())?;
+            write_whole(&path.join("dispersion.toml"), order.recipe.dispersion_toml.as_bytes())?;
             let text = serde_json::to_string_pretty(manifest).map_err(|error| StoreError::Content {
                 path: path.join("manifest.json"),
                 message: error.to_string(),
@@ -120,7 +113,6 @@ impl Store {
         Ok(Self { path: path.to_owned(), manifest: manifest.clone(), _lock: lock })
     }
 
-    /// What it was made for.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
@@ -130,7 +122,7 @@ impl Store {
         &self.path
     }
 
-    /// The chunks that belong here, as their numbers.
+    /// The numbers of the chunks that belong to this directory.
     pub fn chunks(&self) -> impl Iterator<Item = u64> + use<> {
         let shard = self.manifest.shard;
         (0..self.manifest.flights.div_ceil(CHUNK_FLIGHTS)).filter(move |chunk| shard.has(*chunk))
@@ -142,7 +134,7 @@ impl Store {
         from..(from + CHUNK_FLIGHTS).min(self.manifest.flights)
     }
 
-    /// Whether a chunk is done.
+    /// Whether a chunk is finished.
     pub fn has(&self, chunk: u64) -> bool {
         chunk_path(&self.path, chunk).exists()
     }
@@ -158,7 +150,7 @@ impl Store {
         write_whole(&path, &text)
     }
 
-    /// Every flight that belongs here, in order.
+    /// Every flight that belongs to this directory, in order.
     ///
     /// # Errors
     /// A chunk is missing or damaged.
@@ -177,7 +169,7 @@ impl Store {
         Ok(rows)
     }
 
-    /// Writes a file of results; `name` is its name in the directory.
+    /// Writes a result file; `name` is its name in the directory.
     ///
     /// # Errors
     /// It cannot be written.
@@ -186,10 +178,11 @@ impl Store {
     }
 }
 
-/// What stands in a directory without a manifest was not made by a campaign, but for the texts of one that was stopped
-/// before its manifest was written.
+/// Refuses a directory with result files but without a manifest, because no campaign wrote those files. The only files
+/// accepted are the texts of a campaign that was stopped before it wrote its manifest.
 fn refuse_loss(directory: &Path, order: &Order) -> Result<(), StoreError> {
-    let texts = [("mission.toml", &order.mission_toml), ("dispersion.toml", &order.dispersion_toml)];
+    let texts =
+        [("mission.toml", &order.recipe.mission_toml), ("dispersion.toml", &order.recipe.dispersion_toml)];
     let is_own = |name: &str, path: &Path| {
         let text = texts.iter().find(|(known, _)| *known == name).map(|(_, text)| text.as_bytes());
         text.is_some() && fs::read(path).ok().as_deref() == text
@@ -208,7 +201,7 @@ fn chunk_path(directory: &Path, chunk: u64) -> PathBuf {
     directory.join("chunks").join(format!("{chunk:06}.csv"))
 }
 
-/// Under another name first: a file of this name is always whole.
+/// Writes under a temporary name first, so that a file of this name is always complete.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
     let unfinished = path.with_extension("unfinished");
     let written = File::create(&unfinished).and_then(|mut file| {
@@ -221,17 +214,17 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
 /// The manifest of a directory.
 ///
 /// # Errors
-/// There is none, or it is not one.
+/// There is no manifest, or it does not parse.
 pub fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
     let path = directory.join("manifest.json");
     let text = fs::read_to_string(&path).map_err(file_error(&path))?;
     serde_json::from_str(&text).map_err(|error| StoreError::Content { path, message: error.to_string() })
 }
 
-/// Gathers the parts of a campaign into one directory. The order is rebuilt from the texts the parts keep.
+/// Merges the parts of a campaign into one directory. The order is rebuilt from the texts in the parts.
 ///
 /// # Errors
-/// The parts are of different campaigns, contradict each other or leave flights out.
+/// The parts belong to different campaigns, contradict each other, or some flights are missing.
 pub fn merge(
     parts: &[PathBuf],
     out: &Path,

@@ -1,7 +1,7 @@
 //! Rows as CSV and as Parquet.
 //!
-//! A number in CSV has as many digits as it takes to read the same bits back. Parquet is written without compression and
-//! in one row group: a thousand flights are half a megabyte.
+//! A number in CSV has enough digits to read the same bits back. Parquet is written without compression and in one row
+//! group: a thousand flights need half a megabyte.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use parquet::schema::types::Type;
 
 use crate::row::{COLUMNS, Column, Kind, Row, Value};
 
-/// Rows as CSV, with a line of names.
+/// Rows as CSV, with a header line.
 ///
 /// # Errors
-/// Never for rows of a campaign; the writer's own.
+/// The error of the CSV writer; it does not happen for rows of a campaign.
 pub fn to_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
@@ -29,7 +29,7 @@ pub fn to_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
 /// Rows from CSV.
 ///
 /// # Errors
-/// A line or a cell is not one of a campaign.
+/// A line or a cell does not fit the columns of a campaign.
 pub fn from_csv(bytes: &[u8]) -> Result<Vec<Row>, csv::Error> {
     csv::Reader::from_reader(bytes).deserialize().collect()
 }
@@ -37,7 +37,7 @@ pub fn from_csv(bytes: &[u8]) -> Result<Vec<Row>, csv::Error> {
 /// Rows as Parquet.
 ///
 /// # Errors
-/// The writer's own.
+/// The error of the Parquet writer.
 pub fn to_parquet(rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
     let fields = COLUMNS.iter().map(field).collect::<Result<_, _>>()?;
     let schema = Type::group_type_builder("flight").with_fields(fields).build()?;
@@ -45,7 +45,7 @@ pub fn to_parquet(rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
     let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for column in COLUMNS {
-        // There are as many as the schema has.
+        // There are as many writers as columns in the schema.
         let Some(mut cells) = group.next_column()? else { break };
         write_column(column, rows, &mut cells)?;
         cells.close()?;

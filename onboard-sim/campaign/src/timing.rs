@@ -1,36 +1,36 @@
-//! The height that a timed ignition is set to before the flight.
+//! Finds the ignition height of the simpler guidance laws before the flight.
 
-use flight::mission::Mission;
+use flight::vehicle::mission::Mission;
 
-use crate::baseline::{Baseline, Controller};
-use crate::dispersion::Dispersion;
-use crate::draw::draw;
-use crate::fly::{Flight, FlyError};
+use flight::guidance::baseline::{Controller, Law};
+use sim::dispersion::Dispersion;
+use sim::draw::draw;
+use sim::sortie::{SetUpError, Sortie};
 
-/// Searched on either side of the first guess, as a share of it.
+/// Search range on either side of the first guess, as a fraction of it.
 const SPAN_SHARE: f64 = 0.08;
-/// Flights of the search: to a centimetre or two.
+/// Flights of the search; they give the height to a centimetre or two.
 const FLIGHTS: usize = 14;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
-/// The height, m, from which a baseline touches down most slowly if everything is as in the data: found by flying it.
-/// `None` for the pilot, who decides for himself.
+/// The ignition height, m, from which a baseline touches down most slowly with nominal data, found by simulated
+/// flights. `None` for the pilot, which decides in flight.
 ///
 /// # Errors
 /// The mission cannot be flown.
-pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Option<f64>, FlyError> {
-    let Some(baseline) = Baseline::new(controller, mission)? else { return Ok(None) };
+pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Option<f64>, SetUpError> {
+    let law = Law::of(controller, mission);
+    let Some(guess_m) = law.ignition_height_m() else { return Ok(None) };
     let certain = Dispersion::default();
-    let speed_m_s = |height_m: f64| -> Result<f64, FlyError> {
+    let speed_m_s = |height_m: f64| -> Result<f64, SetUpError> {
         let mut timed = mission.clone();
         timed.ignition.fixed_height_m = Some(height_m);
         let draw = draw(&timed, &certain, 0, 0);
-        let mut flight = Flight::new(&timed, &certain, &draw)?.with_baseline(Some(baseline.clone()));
+        let mut flight = Sortie::drawn_as(&timed, &certain, &draw, law.clone())?;
         let outcome = flight.run();
         Ok(outcome.touchdown.map_or(f64::INFINITY, |touchdown| touchdown.vertical_m_s.abs()))
     };
-    let guess_m = baseline.ignition_height_m();
     let (mut low_m, mut high_m) = (guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE));
     let inside =
         |low_m: f64, high_m: f64| [high_m - GOLDEN * (high_m - low_m), low_m + GOLDEN * (high_m - low_m)];

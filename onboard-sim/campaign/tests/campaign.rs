@@ -1,37 +1,26 @@
-//! A campaign's results do not depend on how it was flown.
+//! A campaign's results do not depend on how it was run.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs;
 use std::path::Path;
 
-use campaign::baseline::Controller;
-use campaign::dispersion::{self, Dispersion};
 use campaign::order::{Order, Shard};
 use campaign::store::{CHUNK_FLIGHTS, Store, StoreError, merge};
 use campaign::{results, run, table};
-use flight::mission::{self, Mission};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::RowAccessor as _;
+use sim::dispersion;
+use sim::recipe::Recipe;
 
 const FLIGHTS: u64 = 23;
 
-/// Passive descents, low: quick to fly.
+/// Passive descents from a low height, which are quick to simulate.
 fn order(seed: u64) -> Order {
-    let mission_toml = mission::BUILTIN[0].1.replace("height_m = 300.0", "height_m = 60.0");
-    let mut mission = Mission::from_toml(&mission_toml, "test").unwrap();
-    mission.steered = false;
-    let (name, dispersion_toml) = dispersion::BUILTIN[2];
-    Order {
-        mission,
-        mission_toml,
-        dispersion: Dispersion::builtin(name).unwrap(),
-        dispersion_name: name.to_owned(),
-        dispersion_toml: dispersion_toml.to_owned(),
-        seed,
-        flights: FLIGHTS,
-        controller: Controller::Nmpc,
-        faults: Vec::new(),
-    }
+    let (name, text) = vehicles::mission::BUILTIN[0];
+    let low = text.replace("height_m = 300.0", "height_m = 60.0");
+    let mut recipe = Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap();
+    recipe.mission.steered = false;
+    Order { recipe: Recipe { seed, ..recipe }, flights: FLIGHTS }
 }
 
 fn fly(order: &Order, shard: Shard, jobs: usize, out: &Path) -> u64 {
@@ -59,7 +48,7 @@ fn assert_same(one: &Path, two: &Path) {
 }
 
 #[test]
-fn the_results_depend_neither_on_threads_nor_on_shards_nor_on_a_stop() {
+fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
     let order = order(1);
@@ -75,7 +64,7 @@ fn the_results_depend_neither_on_threads_nor_on_shards_nor_on_a_stop() {
     results::publish(&merged, &store).unwrap();
     assert_same(&at("one"), &at("merged"));
 
-    // Stopped after a chunk, gone on with.
+    // Stopped after a chunk, then continued.
     fs::remove_file(at("three").join("chunks/000001.csv")).unwrap();
     fs::remove_file(at("three").join("flights.csv")).unwrap();
     assert_eq!(fly(&order, Shard::WHOLE, 2, &at("three")), CHUNK_FLIGHTS);
@@ -85,7 +74,7 @@ fn the_results_depend_neither_on_threads_nor_on_shards_nor_on_a_stop() {
     read_them(&at("one"));
 }
 
-/// What other programs read.
+/// The formats that other programs read.
 fn read_them(out: &Path) {
     let csv = fs::read(out.join("flights.csv")).unwrap();
     let rows = table::from_csv(&csv).unwrap();
@@ -127,7 +116,7 @@ fn read_them(out: &Path) {
 }
 
 #[test]
-fn a_directory_of_other_flights_or_in_use_is_refused_with_the_reason() {
+fn a_directory_of_another_order_or_in_use_is_refused_with_the_reason() {
     let root = tempfile::tempdir().unwrap();
     let order_1 = order(1);
     let store = Store::open(root.path(), &order_1, &order_1.manifest("test", Shard::WHOLE)).unwrap();
@@ -145,14 +134,14 @@ fn a_directory_of_other_flights_or_in_use_is_refused_with_the_reason() {
     let message = refused(&order_1, "test", Shard { index: 1, count: 2 });
     assert!(message.contains("its shard is `1/1`, this run's is `1/2`"), "{message}");
     let mut heavier = order_1.clone();
-    heavier.mission_toml.push('\n');
+    heavier.recipe.mission_toml.push('\n');
     let message = refused(&heavier, "test", Shard::WHOLE);
     assert!(message.contains("text of the mission"), "{message}");
 }
 
-/// A directory in which somebody keeps files of the same names.
+/// A directory with somebody else's files of the same names.
 #[test]
-fn files_of_no_campaign_are_never_overwritten() {
+fn files_that_no_campaign_wrote_are_never_overwritten() {
     let order = order(1);
     let manifest = order.manifest("test", Shard::WHOLE);
     let picture = campaign::picture::PICTURES[0].0;
@@ -164,14 +153,14 @@ fn files_of_no_campaign_are_never_overwritten() {
         assert!(matches!(refused, Err(StoreError::Foreign { .. })), "{name}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "notes", "{name}");
     }
-    // A campaign that was stopped before its manifest was written goes on.
+    // A campaign that was stopped before its manifest was written continues.
     let root = tempfile::tempdir().unwrap();
-    std::fs::write(root.path().join("mission.toml"), &order.mission_toml).unwrap();
+    std::fs::write(root.path().join("mission.toml"), &order.recipe.mission_toml).unwrap();
     assert!(Store::open(root.path(), &order, &manifest).is_ok());
 }
 
 #[test]
-fn parts_of_other_campaigns_and_gaps_are_refused() {
+fn a_merge_refuses_parts_of_another_campaign_and_missing_flights() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
     let (order_1, order_2) = (order(1), order(2));

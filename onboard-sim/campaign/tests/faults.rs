@@ -1,31 +1,20 @@
-//! Every fault ends as is expected of it.
+//! Every flight with a fault ends as expected.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
-use campaign::baseline::Controller;
-use campaign::dispersion::Dispersion;
-use campaign::fault::EXPECTATIONS;
-use campaign::order::Order;
 use campaign::row::Row;
-use campaign::sortie;
-use flight::mission::{self, Mission};
+use campaign::scenario::EXPECTATIONS;
+use campaign::tally;
+use flight::guidance::baseline::Controller;
+use sim::recipe::Recipe;
 
-/// The data as they stand, with sensors, in still air.
+/// Nominal data, with sensors, in still air.
 const SENSORS_ONLY: &str = "sensors = true";
 
 fn fly(controller: Controller, faults: &[&str]) -> Row {
-    let mission_toml = mission::BUILTIN[0].1.to_owned();
-    let order = Order {
-        mission: Mission::from_toml(&mission_toml, "test").unwrap(),
-        mission_toml,
-        dispersion: Dispersion::from_toml(SENSORS_ONLY, "test").unwrap(),
-        dispersion_name: "sensors only".to_owned(),
-        dispersion_toml: SENSORS_ONLY.to_owned(),
-        seed: 1,
-        flights: 1,
-        controller,
-        faults: faults.iter().map(|fault| fault.parse().unwrap()).collect(),
-    };
-    sortie::fly(&order, 0).unwrap()
+    let mission = vehicles::mission::BUILTIN[0];
+    let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+    let recipe = Recipe::from_texts(mission, ("sensors only", SENSORS_ONLY)).unwrap();
+    tally::fly(&Recipe { controller, faults, ..recipe }, 0).unwrap()
 }
 
 #[test]
@@ -33,7 +22,7 @@ fn every_fault_ends_as_expected() {
     let mut wrong = Vec::new();
     for expectation in EXPECTATIONS {
         let row = fly(Controller::Nmpc, &[expectation.fault]);
-        assert_eq!(row.faults, 1, "{} did not come about", expectation.fault);
+        assert_eq!(row.faults, 1, "{} did not happen", expectation.fault);
         if !expectation.expected.met(&row) {
             wrong.push(format!(
                 "{} should {}: {} in {}, {:?} m/s, rest {}",
@@ -50,14 +39,14 @@ fn every_fault_ends_as_expected() {
 }
 
 #[test]
-fn without_a_fault_it_lands_and_a_silent_radio_changes_nothing() {
+fn a_flight_without_faults_lands_and_a_silent_radio_changes_nothing() {
     let row = fly(Controller::Nmpc, &[]);
     assert!(row.legs, "{row:?}");
     let silent = fly(Controller::Nmpc, &["link-loss@0"]);
     assert_eq!(Row { faults: 0, ..silent }, row);
 }
 
-/// They brake, which is what they are for; how well is a campaign's to say.
+/// The simple controllers brake. How well they brake is a question for a campaign.
 #[test]
 fn the_simple_controllers_brake() {
     for controller in [Controller::OpenLoop, Controller::Oscillating] {

@@ -1,12 +1,12 @@
-//! What the estimator costs: one second of flight, 200 frames, with every sensor at its rate; and one frame.
+//! Times the estimator: one second of flight (200 frames, with every sensor at its rate), and one frame.
 //!
 //! `cargo bench -p flight --bench estimator`
 
 use divan::black_box;
-use flight::estimator::{
+use flight::estimation::estimator::{
     Estimator, EstimatorConfig, GRAVITY_M_S2, GnssFix, ImuSample, Measurements, StartUncertainty, VehicleNow,
 };
-use flight::rigid::RigidState;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 
 fn main() {
@@ -25,7 +25,7 @@ const VEHICLE: VehicleNow = VehicleNow {
     lidar_behind_cg_m: 0.4,
 };
 
-/// Falling upright at a steady 39 m/s, low enough for the lidar: the dearest second there is.
+/// A second of upright fall at a steady 39 m/s, low enough for the lidar. No other second takes longer.
 fn second() -> Vec<Measurements> {
     (1..=200_u32)
         .map(|frame| {

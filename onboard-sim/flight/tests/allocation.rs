@@ -1,20 +1,17 @@
-//! A tick of the controller does not allocate, once it has rehearsed; nor does a search for the final time.
+//! After a rehearsal neither a tick of the controller nor a search for the final time allocates.
 #![expect(clippy::expect_used, reason = "a missing built-in profile is a failed test")]
 
-use flight::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
-use flight::dynamics::{PlanarModel, PlanarState};
-use flight::nmpc::Problem;
-use flight::nmpc::free_time::{
-    FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into,
-};
-use flight::phase::Phase;
-use flight::profile::Profile;
+use flight::guidance::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
+use flight::guidance::landing::landing_problem;
+use flight::rules::phase::Phase;
+use flight::vehicle::dynamics::PlanarState;
+use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
 
-/// A kicked landing with two blind ticks and an abort at its end: every way a tick can go.
+/// A disturbed landing with two ticks without an estimate and an abort at its end: every branch of a tick.
 #[test]
 fn powered_ticks_do_not_allocate() {
-    let profile = Profile::builtin("paper-calibrated").expect("built in");
-    let model = PlanarModel::from_profile(&profile);
+    let profile = vehicles::profile::builtin("paper-calibrated").expect("built in");
+    let model = profile.planar_model();
     let mut controller = ControllerState::new(&ControllerConfig::from_profile(&profile));
     let mut input = ControllerInput {
         tick: 0,
@@ -59,7 +56,7 @@ fn powered_ticks_do_not_allocate() {
     }
 }
 
-/// 37 N now and 1.5 N/s less ever after, on 3 kg that stay.
+/// 37 N now, falling by 1.5 N/s, on a constant mass of 3 kg.
 struct Fading;
 
 impl Motor for Fading {
@@ -74,9 +71,9 @@ impl Motor for Fading {
 
 #[test]
 fn warm_searches_for_the_final_time_do_not_allocate() {
-    let profile = Profile::builtin("paper-calibrated").expect("built in");
+    let profile = vehicles::profile::builtin("paper-calibrated").expect("built in");
     let mut problem = FreeTimeProblem {
-        landing: Problem::from_profile(&profile, profile.start.planar_state(), 0.0, 0, 1.0),
+        landing: landing_problem(&profile, profile.start.planar_state(), 0.0, 0, 1.0),
         intervals: 50,
         earliest_s: 0.5,
         latest_s: 6.0,

@@ -1,18 +1,18 @@
-//! Whole landings: the controller against a plant integrated a hundred times finer, contact and all.
+//! Whole landings: the controller with a plant that is integrated in a hundred times smaller steps, down to contact.
 //!
-//! The plant is the same planar model at 1 ms, so what is tested is the loop: delay, shrinking horizon, warm start,
-//! end conditions, contact. The command of a tick acts one sample later; the first sample flies with the gimbal
-//! centred, as in the landing paper.
+//! The plant is the same planar model at 1 ms, so these tests check the loop: delay, shrinking horizon, warm start, end
+//! conditions, contact. The command of a tick acts one sample later; in the first sample the gimbal is centred, as in
+//! the landing paper.
 #![expect(clippy::print_stdout, reason = "the touchdown states are what a reader of the test wants to see")]
 #![expect(clippy::expect_used, reason = "a missing built-in profile is a failed test")]
 
-use flight::controller::{
+use flight::guidance::controller::{
     ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, step,
 };
-use flight::dynamics::{PlanarModel, PlanarState};
-use flight::phase::Phase;
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::profile::Profile;
 
 const PLANT_STEP_S: f64 = 1e-3;
 const PLANT_STEPS_PER_SAMPLE: u32 = 100;
@@ -20,20 +20,20 @@ const PLANT_STEPS_PER_SAMPLE: u32 = 100;
 type Kick = Box<dyn Fn(u64, &mut PlanarState)>;
 type Deceit = Box<dyn Fn(&mut ControllerInput)>;
 
-/// A flight under test: what it starts from and what goes wrong on the way.
+/// A flight under test: its start and its disturbances.
 struct Scenario {
     start: PlanarState,
-    /// True thrust over nominal, known to the controller.
+    /// True thrust divided by nominal thrust, known to the controller.
     thrust_scale: f64,
     /// Whether the controller rehearsed on the pad.
     rehearsed: bool,
-    /// Ticks whose output comes too late to be applied.
+    /// Ticks whose output comes too late.
     late: Vec<u64>,
     /// Whether the actuator then holds the last command instead of taking the plan's next input.
     holds_when_late: bool,
     /// Changes the true state at a tick.
     kick: Kick,
-    /// Changes what the controller is told at a tick.
+    /// Changes the controller's input at a tick.
     deceive: Deceit,
 }
 
@@ -51,7 +51,7 @@ struct Flight {
 }
 
 fn profile() -> Profile {
-    Profile::builtin("paper-calibrated").expect("built in")
+    vehicles::profile::builtin("paper-calibrated").expect("built in")
 }
 
 fn nominal() -> Scenario {
@@ -86,7 +86,7 @@ fn fly(scenario: &Scenario) -> Flight {
     if scenario.rehearsed {
         assert!(step(&mut controller, &pad).solver.converged());
     }
-    let model = PlanarModel::from_profile(&profile);
+    let model = profile.planar_model();
     let mut state = scenario.start;
     let mut applied_rad = 0.0;
     let mut last_in_time: Option<ControllerOutput> = None;
@@ -125,8 +125,8 @@ fn fly(scenario: &Scenario) -> Flight {
             let before = state;
             state = model.rk4_step(&before, applied_rad, thrust_n, PLANT_STEP_S);
             if state.z_m <= 0.0 {
-                // At the instant of contact: its share of the step by the heights on either side, and once more
-                // between there and the end, because the path is curved.
+                // The instant of contact: interpolated from the heights on either side, and then once more between that
+                // point and the end, because the path is curved.
                 let within =
                     |share: f64| model.rk4_step(&before, applied_rad, thrust_n, share * PLANT_STEP_S);
                 let near = before.z_m / (before.z_m - state.z_m);
@@ -167,7 +167,7 @@ fn assert_lands(name: &str, scenario: &Scenario) {
     let flight = fly(scenario);
     let verdict = judged(name, &flight);
     assert!(verdict.landed(), "{name}: {}", verdict.summary());
-    // Contact while thrust still exceeds weight would not be the end of the flight.
+    // A contact while thrust still exceeds weight would not end the flight.
     assert!(flight.contact_s >= 4.95, "{name}: contact at {} s, under thrust", flight.contact_s);
 }
 
@@ -230,12 +230,12 @@ fn half_a_percent_of_thrust_known_to_the_controller_lands() {
 }
 
 #[test]
-fn a_cold_first_tick_lands_too() {
+fn a_flight_without_a_rehearsal_also_lands() {
     assert_lands("cold", &Scenario { rehearsed: false, ..nominal() });
 }
 
 #[test]
-fn a_kick_in_flight_is_flown_out() {
+fn a_flight_disturbed_at_one_tick_still_lands() {
     for at in [5, 20, 40] {
         let kick = move |tick, state: &mut PlanarState| {
             if tick == at {
@@ -248,9 +248,9 @@ fn a_kick_in_flight_is_flown_out() {
     }
 }
 
-/// Estimates off by 2 mm/s and 0.05 deg/s (one sigma, new at every tick).
+/// Estimates with errors of 2 mm/s and 0.05 deg/s (one sigma, new at every tick).
 #[test]
-fn noisy_estimates_are_flown_out() {
+fn a_flight_with_noisy_estimates_still_lands() {
     for seed in 1..=5_u64 {
         let deceive = move |input: &mut ControllerInput| {
             let noise = |channel: u64| gaussian(seed.wrapping_mul(1_000) + 10 * input.tick + channel);
@@ -263,8 +263,8 @@ fn noisy_estimates_are_flown_out() {
     }
 }
 
-/// A number drawn from a near-normal distribution of sigma one, the same for the same key: the sum of twelve uniform
-/// ones out of a `SplitMix64` stream.
+/// A nearly normal random number of sigma one that depends only on the key: the sum of twelve uniform numbers from a
+/// `SplitMix64` stream.
 fn gaussian(key: u64) -> f64 {
     let uniform = |draw: u64| {
         let mut bits = (key.wrapping_mul(12) + draw).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -276,13 +276,14 @@ fn gaussian(key: u64) -> f64 {
 }
 
 #[test]
-fn late_outputs_cost_nothing_when_the_actuator_takes_the_plans_next_input() {
+fn late_outputs_do_no_harm_when_the_actuator_takes_the_plans_next_input() {
     for late in [vec![1], vec![3], vec![4, 5], vec![17, 18, 19], vec![40], vec![47]] {
         assert_lands(&format!("late at {late:?}"), &Scenario { late, ..nominal() });
     }
 }
 
-/// What holding the last command instead means: in the first half second, at full gimbal, the landing is lost.
+/// If the actuator holds the last command instead, a late output in the first half second, at full gimbal, loses the
+/// landing.
 #[test]
 fn late_outputs_in_the_first_turn_lose_the_landing_when_the_last_command_is_held() {
     let flight = fly(&Scenario { late: vec![3], holds_when_late: true, ..nominal() });
@@ -290,7 +291,7 @@ fn late_outputs_in_the_first_turn_lose_the_landing_when_the_last_command_is_held
 }
 
 #[test]
-fn two_blind_ticks_fly_the_shifted_plan_and_still_land() {
+fn two_ticks_without_an_estimate_fly_the_shifted_plan_and_still_land() {
     let deceive = |input: &mut ControllerInput| {
         if matches!(input.tick, 20 | 21) {
             input.state.u_m_s = f64::NAN;
@@ -304,16 +305,16 @@ fn two_blind_ticks_fly_the_shifted_plan_and_still_land() {
     assert_eq!(levels, [seen, blind, blind, seen]);
 }
 
-/// An abort under thrust gives up the landing, not the attitude.
+/// An abort under thrust gives up the landing but keeps the attitude.
 #[test]
-fn degraded_from_two_seconds_on_it_comes_down_upright() {
+fn with_the_upright_law_from_two_seconds_on_the_vehicle_comes_down_upright() {
     let deceive = |input: &mut ControllerInput| input.degraded = input.tick >= 20;
     let flight = fly(&Scenario { deceive: Box::new(deceive), ..nominal() });
     judged("degraded", &flight);
     assert!((flight.contact.theta_rad.to_degrees() - 90.0).abs() < 1.0);
 }
 
-/// Two flights from the same inputs agree in every bit of every output and of the controller's memory.
+/// Two flights with the same inputs agree in every bit of every output and of the controller's memory.
 #[test]
 fn two_runs_agree_in_every_bit() {
     let start = PlanarState { w_m_s: 0.3, theta_rad: 1.5, ..profile().start.planar_state() };

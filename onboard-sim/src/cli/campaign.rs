@@ -6,17 +6,18 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::baseline::Controller;
-use campaign::dispersion::{self, Dispersion};
-use campaign::fault::{Expected, Scenario, TimedFault};
 use campaign::order::{Manifest, Order, Shard};
+use campaign::scenario::{Expected, Scenario};
 use campaign::store::{Store, merge};
 use campaign::summary::to_text;
 use campaign::{results, run, timing};
 use clap::{Args, Subcommand};
-use flight::mission::{self, Mission};
+use flight::guidance::baseline::Controller;
 use protocol::log::build::build_info;
 use sha2::Digest as _;
+use sim::dispersion::{self, Dispersion};
+use sim::fault::TimedFault;
+use sim::recipe::Recipe;
 
 use super::cost::Stopwatch;
 use super::single;
@@ -32,7 +33,7 @@ pub(crate) struct CampaignArguments {
     /// Built-in set of dispersions (none, thrust-only, field, harsh) or TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
-    /// How many flights; they are numbered from 0.
+    /// Number of flights; they are numbered from 0.
     #[arg(long, default_value_t = 1000, value_name = "N")]
     flights: u64,
     /// Seed of everything random.
@@ -44,19 +45,19 @@ pub(crate) struct CampaignArguments {
     /// Fly only this part of the chunks of flights, counted from 1.
     #[arg(long, default_value = "1/1", value_name = "I/N")]
     shard: Shard,
-    /// Who flies the landing burn: nmpc, open-loop or oscillating.
+    /// Controller of the landing burn: nmpc, open-loop or oscillating.
     #[arg(long, default_value = "nmpc", value_name = "NAME")]
     controller: Controller,
-    /// Fall on open, equal fins that steer nothing.
+    /// Fall with equally open fins that do not steer.
     #[arg(long)]
     passive: bool,
     /// Break something in every flight: NAME[:VALUE]@WHEN, as in gnss-out@5 or fin-stuck:2@apogee; may be repeated.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<TimedFault>,
-    /// Break what a scenario file says.
+    /// Inject the faults of a scenario file.
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Directory of the results. One that holds part of the same campaign is gone on with.
+    /// Directory of the results. If it holds part of the same campaign, the campaign is continued.
     #[arg(long, value_name = "DIR", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
@@ -69,7 +70,7 @@ pub(crate) struct CampaignArguments {
 
 #[derive(Subcommand)]
 enum CampaignCommand {
-    /// Gather the parts of a campaign that was flown in shards.
+    /// Merge the parts of a campaign that was flown in shards.
     Merge {
         /// Directories of the parts.
         #[arg(required = true, value_name = "DIR")]
@@ -86,7 +87,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
     }
     let (order, expected) = order(arguments)?;
     if let Some(number) = arguments.only {
-        return single::fly(&order, number, expected, arguments.log.as_deref());
+        return single::fly(&order.recipe, number, expected, arguments.log.as_deref());
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
     let store = Store::open(out, &order, &order.manifest(&program()?, arguments.shard))?;
@@ -116,27 +117,27 @@ fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The order that a directory was made for, from what it keeps.
+/// Rebuilds the order of a campaign from the texts in its directory.
 fn order_of(manifest: &Manifest, mission_toml: &str, dispersion_toml: &str) -> anyhow::Result<Order> {
-    let mut mission = Mission::from_toml(mission_toml, "mission.toml")?;
+    let mut mission = vehicles::mission::from_toml(mission_toml, "mission.toml")?;
     mission.steered = manifest.steered;
     let faults = manifest.faults.iter().map(|fault| fault.parse()).collect::<Result<_, _>>()?;
-    Ok(Order {
+    let recipe = Recipe {
         mission,
         mission_toml: mission_toml.to_owned(),
         dispersion: Dispersion::from_toml(dispersion_toml, "dispersion.toml")?,
         dispersion_name: manifest.dispersion.clone(),
         dispersion_toml: dispersion_toml.to_owned(),
         seed: manifest.seed,
-        flights: manifest.flights,
         controller: manifest.controller.parse()?,
         faults,
-    })
+    };
+    Ok(Order { recipe, flights: manifest.flights })
 }
 
 fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
-    let mission_toml = text_of(&arguments.profile, mission::BUILTIN, "mission")?;
-    let mut mission = Mission::from_toml(&mission_toml, &arguments.profile)?;
+    let mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
+    let mut mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {
         mission.ignition.fixed_height_m = timing::fixed_height_m(arguments.controller, &mission)?;
@@ -150,21 +151,20 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
         faults.extend(scenario.faults);
         expected = scenario.expected;
     }
-    let order = Order {
+    let recipe = Recipe {
         mission,
         mission_toml,
         dispersion: Dispersion::from_toml(&dispersion_toml, &arguments.dispersion)?,
         dispersion_name: arguments.dispersion.clone(),
         dispersion_toml,
         seed: arguments.seed,
-        flights: arguments.flights,
         controller: arguments.controller,
         faults,
     };
-    Ok((order, expected))
+    Ok((Order { recipe, flights: arguments.flights }, expected))
 }
 
-/// The text of a built-in, or of a file.
+/// The text of a built-in set, or of a file.
 pub(super) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
     if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
         return Ok((*text).to_owned());
@@ -175,7 +175,7 @@ pub(super) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyho
     })
 }
 
-/// The build and a digest of the running program: results of different programs are not mixed.
+/// The build and a digest of the running program, so that results of different programs are not mixed.
 fn program() -> anyhow::Result<String> {
     let path = std::env::current_exe().context("which program this is")?;
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;

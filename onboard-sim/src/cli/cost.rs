@@ -1,4 +1,4 @@
-//! How fast a campaign is flown. The only part of it that looks at a clock.
+//! Measures how fast a campaign is flown. No other part of a campaign reads a clock.
 
 use core::fmt;
 use std::io::{IsTerminal as _, Write as _};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use campaign::run::Progress;
 use serde_json::json;
 
-/// Between two lines of progress: on a terminal, and in a file.
+/// Time between two lines of progress: on a terminal, and in a file.
 const SHOW_EVERY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
 
 /// Measures a run and shows how far it is.
@@ -18,7 +18,7 @@ pub(super) struct Stopwatch {
     on_terminal: bool,
 }
 
-/// What a run cost.
+/// Cost of a run.
 pub(super) struct Cost {
     flights: u64,
     wall_s: f64,
@@ -32,7 +32,7 @@ impl Stopwatch {
         Self { started: now(), shown: Mutex::new(None), on_terminal: std::io::stderr().is_terminal() }
     }
 
-    /// Says how far it is, if it has not just done so.
+    /// Prints the progress, unless it was printed just before.
     pub(super) fn show(&self, progress: &Progress) {
         let mut shown = self.shown.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let now = now();
@@ -45,7 +45,7 @@ impl Stopwatch {
         let left_s = (progress.of - progress.flown) as f64 / rate;
         let (before, after) = if self.on_terminal { ("\r\x1b[K", "") } else { ("", "\n") };
         let after = if progress.flown == progress.of { "\n" } else { after };
-        // Talk goes to standard error; nobody may be listening.
+        // Messages go to standard error, which may be closed.
         let _ = write!(
             std::io::stderr(),
             "{before}{} of {} flights, {rate:.1} a second, landed: legs {}, strict {}; {left_s:.0} s to go{after}",
@@ -95,7 +95,7 @@ impl fmt::Display for Cost {
     }
 }
 
-#[expect(clippy::disallowed_methods, reason = "how long a campaign takes is told, and decides nothing")]
+#[expect(clippy::disallowed_methods, reason = "the duration of a campaign is only reported")]
 fn now() -> Instant {
     Instant::now()
 }

@@ -1,4 +1,4 @@
-//! `onboard-sim fly`: one flight, on the wire or by itself.
+//! `onboard-sim fly`: one flight, over MAVLink links or without them.
 
 use std::io::Write as _;
 use std::num::NonZeroU32;
@@ -6,23 +6,23 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::dispersion::{self, Dispersion};
-use campaign::fault::TimedFault;
 use clap::Args;
-use onboard_sim::craft::Judged;
 use onboard_sim::fly::{
-    FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Outcome, Speed, fly_observed, load_profile,
+    FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
     log_header,
 };
-use onboard_sim::vehicle::{DeadlinePolicy, VehicleEvent};
+use onboard_sim::vehicle::{Judged, VehicleEvent};
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
+use sim::dispersion::{self, Dispersion};
+use sim::fault::TimedFault;
+use sim::plane::DeadlinePolicy;
 use tokio::sync::watch;
 
 use super::campaign::text_of;
 
-/// The strongest mean wind that can be asked for, m/s.
+/// The strongest mean wind that can be requested, m/s.
 const WIND_MAX_M_S: f64 = 30.0;
 
 #[derive(Args)]
@@ -33,15 +33,15 @@ pub(crate) struct FlyArguments {
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once.
     #[arg(long, value_name = "LINK")]
-    mavlink: Vec<Endpoint>,
+    mavlink: Vec<LinkAddress>,
     /// MAVLink system id of the vehicle: each vehicle on one link needs its own.
     #[arg(long, default_value_t = VEHICLE.system_id, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
     sysid: u8,
-    /// Sign every frame with this key, and act on nothing that is not signed with it. See keygen.
+    /// Sign every frame with this key, and ignore frames that are not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// Bytes per second that a network link may be asked to carry, 2000 to 1000000; a serial link stays at 2000. Nothing
-    /// more is sent until a station asks for it.
+    /// Budget of a network link, bytes per second, 2000 to 1000000; a serial link stays at 2000. More is sent only if a
+    /// station asks for it.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     network_budget: u32,
@@ -75,7 +75,7 @@ pub(crate) struct FlyArguments {
     /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
     #[arg(long)]
     stay: bool,
-    /// Do not apply a controller output that took longer than its sample, as hardware would not.
+    /// Drop a controller output that took longer than one sample period, as hardware would.
     #[arg(long)]
     enforce_deadline: bool,
 }
@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 }
 
 impl FlyArguments {
-    /// Puts what was asked for into a flight from apogee. A start at ignition has its dispersions in its profile.
+    /// Applies the options to a flight from apogee. A start at ignition has its dispersions in its profile.
     fn choose(&self, profile: &mut LoadedFlight) -> anyhow::Result<()> {
         let LoadedFlight::FromApogee(flight) = profile else {
             let given = [
@@ -103,30 +103,29 @@ impl FlyArguments {
             }
             return Ok(());
         };
-        let order = &mut flight.order;
+        let recipe = &mut flight.recipe;
         flight.number = self.flight.unwrap_or(0);
-        order.flights = flight.number.saturating_add(1);
         if let Some(name) = &self.dispersion {
-            order.dispersion_toml = text_of(name, dispersion::BUILTIN, "set of dispersions")?;
-            order.dispersion = Dispersion::from_toml(&order.dispersion_toml, name)?;
-            order.dispersion_name.clone_from(name);
+            recipe.dispersion_toml = text_of(name, dispersion::BUILTIN, "set of dispersions")?;
+            recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, name)?;
+            recipe.dispersion_name.clone_from(name);
         }
         if let Some(wind_m_s) = self.wind {
             anyhow::ensure!(
                 (0.0..=WIND_MAX_M_S).contains(&wind_m_s),
                 "--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
             );
-            order.dispersion_toml = with_wind(&order.dispersion_toml, wind_m_s);
-            order.dispersion_name = format!("{} with {wind_m_s} m/s of wind", order.dispersion_name);
-            order.dispersion = Dispersion::from_toml(&order.dispersion_toml, &order.dispersion_name)?;
+            recipe.dispersion_toml = with_wind(&recipe.dispersion_toml, wind_m_s);
+            recipe.dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
+            recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, &recipe.dispersion_name)?;
         }
-        order.faults.clone_from(&self.faults);
+        recipe.faults.clone_from(&self.faults);
         Ok(())
     }
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
-    let mut profile = load_profile(&arguments.profile)?;
+    let mut profile = load_flight(&arguments.profile)?;
     arguments.choose(&mut profile)?;
     let recorder = match &arguments.log {
         None => None,
@@ -167,20 +166,20 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let log_path = recorder.as_ref().map(Recorder::finish).transpose();
     let summary = flown?;
     print_summary(&summary)?;
-    if let Some(path) = log_path.context("the flight is over, but its log is not whole")? {
+    if let Some(path) = log_path.context("the flight is over, but its log is incomplete")? {
         writeln!(std::io::stdout(), "log {}", path.display())?;
     }
     Ok(exit_code(&summary.outcome))
 }
 
-/// The text of a set of dispersions with this mean wind: the log keeps the text, and a replay draws from it again.
+/// The text of a set of dispersions with this mean wind. The log keeps the text, and a replay draws from it again.
 fn with_wind(toml: &str, wind_m_s: f64) -> String {
     const KEY: &str = "wind_m_s";
     let is_wind = |line: &&str| {
         line.trim_start().strip_prefix(KEY).is_some_and(|rest| rest.trim_start().starts_with('='))
     };
     let others: String = toml.split_inclusive('\n').filter(|line| !is_wind(line)).collect();
-    // At the top, before any table begins.
+    // At the top, before the first table.
     format!("{KEY} = [{wind_m_s:?}, {wind_m_s:?}]\n{others}")
 }
 
@@ -210,7 +209,7 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
 fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     if let Some(judged) = &summary.judged {
-        let by = if summary.judged_by_table_2.is_some() { ", by what the legs take" } else { "" };
+        let by = if summary.judged_by_table_2.is_some() { ", by the limits of the legs" } else { "" };
         writeln!(out, "touchdown at {:.3} s{by}:", judged.impact.time_s)?;
         print_limits(&mut out, judged)?;
     }
@@ -232,12 +231,12 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
     match &summary.outcome {
-        Outcome::Landed if summary.judged_by_table_2.is_some_and(|judged| !judged.landed) => {
-            writeln!(out, "LANDED within what the legs take, outside a limit of Table 2")?;
+        FlightEnd::Landed if summary.judged_by_table_2.is_some_and(|judged| !judged.landed) => {
+            writeln!(out, "LANDED within the limits of the legs, outside a limit of Table 2")?;
         }
-        Outcome::Landed => writeln!(out, "LANDED inside every limit")?,
-        Outcome::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
-        Outcome::Aborted => {
+        FlightEnd::Landed => writeln!(out, "LANDED inside every limit")?,
+        FlightEnd::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
+        FlightEnd::Aborted => {
             let came_down = match summary.judged.as_ref().map(|judged| judged.landed) {
                 Some(true) => "; it LANDED inside its limits",
                 Some(false) => "; NOT LANDED inside its limits",
@@ -245,13 +244,13 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
             };
             writeln!(out, "ABORTED in {}{came_down}", summary.phase.name())?;
         }
-        Outcome::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
-        Outcome::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
+        FlightEnd::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
+        FlightEnd::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
     }
     Ok(())
 }
 
-/// Without the digits that come from turning degrees to radians and back.
+/// Rounds away the error of converting degrees to radians and back.
 fn round(limit: f64) -> f64 {
     (1e9 * limit).round() / 1e9
 }
@@ -272,12 +271,12 @@ fn print_limits(out: &mut impl std::io::Write, judged: &Judged) -> std::io::Resu
     Ok(())
 }
 
-fn exit_code(outcome: &Outcome) -> ExitCode {
+fn exit_code(outcome: &FlightEnd) -> ExitCode {
     ExitCode::from(match outcome {
-        Outcome::Landed => 0,
-        Outcome::OutsideLimits => 3,
-        Outcome::Aborted | Outcome::Refused(_) => 4,
-        Outcome::Stopped => 5,
+        FlightEnd::Landed => 0,
+        FlightEnd::OutsideLimits => 3,
+        FlightEnd::Aborted | FlightEnd::Refused(_) => 4,
+        FlightEnd::Stopped => 5,
     })
 }
 

@@ -1,4 +1,4 @@
-//! Subcommands of the program, a file each.
+//! The subcommands of the program, one file each.
 
 pub(crate) mod campaign;
 mod cost;

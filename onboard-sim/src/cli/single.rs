@@ -1,33 +1,34 @@
-//! One flight of a campaign, by its number, and its log.
+//! Flies one flight of a campaign, by its number, and writes its log.
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::fault::Expected;
-use campaign::order::Order;
 use campaign::row::{COLUMNS, Row, Value};
-use campaign::sortie::Sortie;
-use onboard_sim::{from_apogee, pilot_log};
+use campaign::scenario::Expected;
+use campaign::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
+use sim::recipe::Recipe;
+use tick_log::sortie;
 
-/// Flies it and prints its row, a column a line.
+/// Flies it and prints its row, one column on each line.
 ///
-/// Exit code 0 if it did what the scenario expects, or without one if it landed within what the legs take; else 3.
+/// Exit code 0 if the flight met the scenario's expectation or, without a scenario, landed within the limits of the
+/// legs; otherwise 3.
 pub(super) fn fly(
-    order: &Order,
+    recipe: &Recipe,
     number: u64,
     expected: Option<Expected>,
     log: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
-    let mut sortie = Sortie::new(order, number)?;
+    let mut tally = Tally::new(recipe, number)?;
     match log {
-        None => while sortie.step() {},
-        Some(path) => fly_logged(order, number, &mut sortie, path)?,
+        None => while tally.step() {},
+        Some(path) => fly_logged(recipe, number, &mut tally, path)?,
     }
-    let row = sortie.row();
+    let row = tally.row();
     let mut stdout = std::io::stdout().lock();
     print_row(&row, &mut stdout)?;
     let met = expected.unwrap_or(Expected::Land).met(&row);
@@ -54,26 +55,26 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
     Ok(())
 }
 
-fn fly_logged(order: &Order, number: u64, sortie: &mut Sortie, path: &Path) -> anyhow::Result<()> {
-    let recorder = Recorder::create(path, &from_apogee::header(order, number))?;
-    recorder.record(pilot_log::start(sortie.flight()), 0);
-    let mut phase = sortie.flight().pilot().mode().phase;
+fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<()> {
+    let recorder = Recorder::create(path, &sortie::campaign_header(recipe, number))?;
+    recorder.record(sortie::start(tally.flight()), 0);
+    let mut phase = tally.flight().computer().mode().phase;
     loop {
-        let goes_on = sortie.step();
-        let flight = sortie.flight();
-        let time_ns = from_apogee::time_ns(flight);
-        for record in from_apogee::frame(flight, phase) {
+        let goes_on = tally.step();
+        let flight = tally.flight();
+        let time_ns = sortie::time_ns(flight);
+        for record in sortie::frame_and_phase(flight, phase) {
             recorder.record(record, time_ns);
         }
-        phase = flight.pilot().mode().phase;
+        phase = flight.computer().mode().phase;
         if !goes_on {
             break;
         }
     }
-    let flight = sortie.flight();
-    if let Some(verdict) = from_apogee::verdict(flight) {
-        recorder.record(Record::LandingVerdict(Box::new(verdict)), from_apogee::time_ns(flight));
+    let flight = tally.flight();
+    if let Some(verdict) = sortie::verdict(flight) {
+        recorder.record(Record::LandingVerdict(Box::new(verdict)), sortie::time_ns(flight));
     }
-    recorder.finish().context("the flight is over, but its log is not whole")?;
+    recorder.finish().context("the flight is over, but its log is incomplete")?;
     Ok(())
 }

@@ -1,26 +1,22 @@
-//! How much a link carried just now, and what it has room for.
+//! Tracks how much a link has carried recently and how much room it has left.
 
 use std::collections::VecDeque;
 
-/// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so that
-/// no second on the wire carries more.
-pub(crate) const WINDOW_S: f64 = 1.02;
-
-/// In a fifth of a second telemetry may take a fifth of the budget and a tenth of that, answers and texts a sixth of it: after
-/// a burst the whole budget would be spent, and even what the crew lives by would wait.
+/// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
+/// Otherwise a burst could spend the whole budget, and even vital messages would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
 
-/// That share for telemetry, bytes.
+/// The share of telemetry, bytes.
 pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
     capacity_bytes_s as usize * 22 / 100
 }
 
-/// That share for answers and texts, bytes.
+/// The share of answers and texts, bytes.
 pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
     capacity_bytes_s as usize / 6
 }
 
-/// The bytes of the time just past.
+/// The bytes sent in a sliding window of time.
 #[derive(Debug, Clone)]
 pub(super) struct Window {
     span_s: f64,
@@ -30,19 +26,19 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Of this length; it has no room until it is given a limit.
+    /// A window of this length; it has no room until it gets a limit.
     pub(super) fn of(span_s: f64) -> Self {
         Self { span_s, limit: 0, sent: VecDeque::new(), bytes: 0 }
     }
 
-    /// So many bytes at most in any such time, from now on.
+    /// Sets the most bytes in any window from now on.
     pub(super) fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 
-    /// What was sent longer ago no longer counts.
+    /// Drops bytes that were sent before the window.
     pub(super) fn move_to(&mut self, now_s: f64) {
-        // Times are multiples of a frame; rounding must not keep one of them for a frame more.
+        // Times are multiples of a frame; rounding must not keep an entry one frame too long.
         while let Some((sent_s, bytes)) = self.sent.front()
             && now_s - sent_s >= self.span_s - 1e-9
         {
@@ -56,7 +52,7 @@ impl Window {
         self.limit.saturating_sub(self.bytes)
     }
 
-    /// Takes note of bytes sent now.
+    /// Notes bytes sent now.
     pub(super) fn take(&mut self, bytes: usize, now_s: f64) {
         self.sent.push_back((now_s, bytes));
         self.bytes += bytes;
@@ -66,9 +62,10 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::streams::WINDOW_S;
 
     #[test]
-    fn what_was_sent_counts_for_a_second_and_no_longer() {
+    fn sent_bytes_count_for_a_second_and_no_longer() {
         let mut window = Window::of(WINDOW_S);
         assert_eq!(window.room(), 0);
         window.set_limit(100);

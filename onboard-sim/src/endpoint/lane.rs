@@ -1,7 +1,7 @@
-//! Links that carry the same frames: what they may carry, and what waits for room on them.
+//! A lane: links that carry the same frames, their budget, and the queue of what waits for room on them.
 //!
-//! All links begin in one lane, so that a ground that hears several of them knows the copies by their numbers. A link
-//! that is given intervals of its own gets a lane of its own, with its own numbers.
+//! All links begin in one lane, so that a ground station that hears several of them can recognise copies by their
+//! sequence numbers. A link with different message intervals gets its own lane with its own sequence numbers.
 
 use std::collections::VecDeque;
 
@@ -10,19 +10,19 @@ use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::Address;
 
-use super::budget::{BRIEFLY_S, WINDOW_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
+use super::budget::{BRIEFLY_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::{Context, MAX_REQUESTED, Outgoing};
-use crate::craft::{Craft, Snapshot};
 use crate::stations::MAX_STATIONS;
-use crate::streams::{Due, Streams, kept_free_bytes, share_bytes_s};
+use crate::streams::{Due, Streams, WINDOW_S, kept_free_bytes, share_bytes_s};
+use crate::vehicle::{Snapshot, Vehicle};
 use crate::{parameters, telemetry};
 
-/// Answers and texts that may wait, each; what comes beyond is dropped, and whoever wants an answer asks again.
+/// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
 const MAX_WAITING: usize = 32;
-/// However often an abort is repeated, it is answered this long after the last answer at the earliest, s.
+/// Shortest interval between answers to a repeated abort, s.
 const ABORT_ANSWERED_S: f64 = 0.09;
 
-/// An answer that waits to be sent.
+/// An answer in the queue.
 #[derive(Debug, Clone)]
 pub(super) enum Answer {
     Message(Box<MavMessage>),
@@ -43,29 +43,28 @@ pub(super) struct Lane {
     encoder: Encoder,
     signature_len: usize,
     sent: Window,
-    /// Of that, telemetry of the last moment.
+    /// Telemetry of the last [`BRIEFLY_S`] seconds.
     telemetry_briefly: Window,
-    /// Of that, answers and texts of the last moment.
+    /// Answers and texts of the last [`BRIEFLY_S`] seconds.
     answers_briefly: Window,
-    /// Of that, answers.
     answered: Window,
-    /// Of that, texts.
+    /// Texts of the last second.
     said: Window,
-    /// How the vehicle hears its stations, as told last; not yet sent.
+    /// Uplink reports (TD_UPLINK) that are not yet sent.
     uplinks: VecDeque<MavMessage>,
-    /// Answers to aborts; one for each station at most.
+    /// Answers to aborts, at most one for each station.
     aborts: VecDeque<CommandAnswer>,
     abort_answered_s: f64,
     texts: VecDeque<Answer>,
     answers: VecDeque<Answer>,
-    /// Messages that were asked for; they come after all that the crew lives by.
+    /// Requested messages; they are sent after all vital messages.
     requested: VecDeque<MavMessage>,
-    /// The next parameter of a list that was asked for; none when the list has been sent.
+    /// The next parameter of a requested list; `None` when the list has been sent.
     next_parameter: Option<u16>,
 }
 
 impl Lane {
-    /// As this address from now on.
+    /// Sets the sender's address.
     pub(super) fn speak_as(&mut self, us: Address) {
         self.encoder = Encoder::new(us);
     }
@@ -103,20 +102,20 @@ impl Lane {
         self.said.set_limit(share_bytes_s(capacity_bytes_s));
     }
 
-    /// One of its links, alone: with all that was sent and waits.
+    /// A copy of this lane for one of its links, with its history and queue.
     pub(super) fn of_its_own(&mut self, link: usize) -> Self {
         self.links.retain(|other| *other != link);
         Self { links: vec![link], ..self.clone() }
     }
 
-    /// An answer to an abort. One that waits already says the same.
+    /// Queues an answer to an abort, unless one is already waiting.
     pub(super) fn answer_abort(&mut self, answer: CommandAnswer) {
         if !self.aborts.contains(&answer) && self.aborts.len() < MAX_WAITING {
             self.aborts.push_back(answer);
         }
     }
 
-    /// How the vehicle hears a station. What could not be sent before is old news.
+    /// Queues an uplink report; it replaces an older one that is not yet sent.
     pub(super) fn tell_of_uplink(&mut self, message: MavMessage) {
         self.uplinks.truncate(MAX_STATIONS - 1);
         self.uplinks.push_front(message);
@@ -134,8 +133,8 @@ impl Lane {
         }
     }
 
-    /// Sends them when there is room; says whether they may wait. Beyond that they are dropped: whoever wants them asks
-    /// again.
+    /// Queues requested messages; returns whether there was room in the queue. Otherwise they are dropped, and the
+    /// station has to ask again.
     pub(super) fn request(&mut self, messages: Vec<MavMessage>) -> bool {
         let fits = self.requested.len() + messages.len() <= MAX_REQUESTED;
         if fits {
@@ -144,17 +143,17 @@ impl Lane {
         fits
     }
 
-    /// Sends every parameter, from the beginning, also while an earlier list is on its way.
+    /// Sends every parameter from the first one, also if an earlier list is not finished.
     pub(super) fn list_parameters(&mut self) {
         self.next_parameter = Some(0);
     }
 
-    /// What is to be sent now: first what the crew lives by, then answers, then telemetry, most important first, then
-    /// what was asked for. In every second it is within the budget.
+    /// The frames to send now: vital messages first, then answers, then telemetry by importance, then requested
+    /// messages. The budget holds in every second.
     pub(super) fn poll(
         &mut self,
         context: &Context,
-        vehicle: &dyn Craft,
+        vehicle: &Vehicle,
         snapshot: &mut Option<Snapshot>,
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
@@ -201,7 +200,8 @@ impl Lane {
             self.texts.pop_front();
         }
         for due in due.iter().filter(|due| !due.vital) {
-            // By its longest, so that nothing is put together in vain. What is less important does not overtake it.
+            // The check uses the longest form of the message, so that no frame is built for nothing. Less important
+            // messages do not overtake it.
             if due.frame_len > self.room_for_telemetry() {
                 break;
             }
@@ -209,7 +209,7 @@ impl Lane {
         }
         let longest = self.streams.longest_frame_len();
         while let Some(message) = self.next_requested(vehicle) {
-            // Also free for telemetry that falls due in the meantime: it is not to wait for this.
+            // Some room is also kept free for telemetry that falls due in the meantime.
             let room = self.room_for_telemetry().saturating_sub(longest);
             let Some(frame) = self.encode(&message.into(), room) else { break };
             self.telemetry_briefly.take(self.len_of(&frame), now_s);
@@ -221,7 +221,7 @@ impl Lane {
         frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
     }
 
-    /// Room for what the crew does not live by: for that some is kept free, so that it never waits for anything else.
+    /// Room for messages that are not vital. Some of the budget is kept free so that vital messages never wait.
     fn room(&self) -> usize {
         self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
     }
@@ -238,15 +238,15 @@ impl Lane {
         &mut self,
         due: &Due,
         context: &Context,
-        vehicle: &dyn Craft,
+        vehicle: &Vehicle,
         snapshot: &mut Option<Snapshot>,
         frames: &mut Vec<Frame>,
     ) {
-        // In most frames nothing is due, and the state is not put together for nothing.
+        // In most frames nothing is due, so the state is only collected when needed.
         let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
         if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
             let frame = self.encoder.encode(&message);
-            // What the crew lives by is beside the smoothing: a change of phase must cost no position.
+            // Vital messages do not count as recent telemetry: a change of phase must not delay a position.
             if !due.vital {
                 self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
             }
@@ -255,21 +255,21 @@ impl Lane {
         self.streams.on_sent(due.message_id, context.now_s);
     }
 
-    /// What was asked for and is to be sent next: single messages first, then the list of parameters.
-    fn next_requested(&mut self, vehicle: &dyn Craft) -> Option<MavMessage> {
+    /// The next requested message: single messages first, then the list of parameters.
+    fn next_requested(&mut self, vehicle: &Vehicle) -> Option<MavMessage> {
         if let Some(message) = self.requested.front() {
             return Some(message.clone());
         }
         self.next_parameter = self.next_parameter.filter(|place| *place < parameters::count(&self.streams));
-        self.next_parameter.map(|place| parameters::value(place, &self.streams, vehicle.weights()))
+        self.next_parameter.map(|place| parameters::value(place, &self.streams, &vehicle.weights()))
     }
 
-    /// The frame, if it is no longer than this; a frame that is not sent takes no number.
+    /// The frame, if it is not longer than this; a frame that is not sent uses no sequence number.
     fn encode(&mut self, answer: &Answer, room: usize) -> Option<Frame> {
         let mut encoder = self.encoder.clone();
         let frame = match answer {
             Answer::Message(message) => encoder.encode(message),
-            // The dialect has COMMAND_ACK; were it not so, there would be nothing to send.
+            // The dialect always has COMMAND_ACK.
             Answer::Command(answer) => answer.encode(&mut encoder)?,
         };
         if self.len_of(&frame) > room {

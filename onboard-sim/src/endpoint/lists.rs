@@ -1,9 +1,9 @@
-//! Lists that this vehicle does not keep: missions, fences, rally points, logs on board.
+//! Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board.
 //!
-//! Other people's ground stations ask for them whatever the capabilities say, and tell their user of a failure if they
-//! hear nothing. So every question is answered: the lists are empty, and nothing can be put into them. Protocols:
-//! <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of common.xml. Questions are read by their bytes,
-//! because a mission type that the dialect does not know must be answered, too.
+//! Other ground stations ask for them whatever the capabilities say, and report a failure to their user if there is no
+//! answer. So every question is answered: the lists are empty, and nothing can be put into them. Protocols:
+//! <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of common.xml. Questions are parsed from raw
+//! bytes, because a mission type that the dialect does not know must be answered, too.
 
 use protocol::dialect::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult,
@@ -14,7 +14,7 @@ use protocol::identity::Address;
 
 /// A question about a list, with its answer.
 pub(super) struct ListQuestion {
-    /// Who is asked; 0 means all.
+    /// The addressee; 0 means all.
     pub(super) target: Address,
     pub(super) answer: MavMessage,
 }
@@ -31,7 +31,7 @@ impl ListQuestion {
         };
         Some(match frame.message_id() {
             MISSION_REQUEST_LIST => of(0, 2).empty(),
-            // To begin an upload of nothing is to clear the list: it is clear.
+            // An upload of zero items clears the list, which is always clear.
             MISSION_COUNT if integer(0) == 0 => of(2, 4).done(),
             MISSION_COUNT => of(2, 4).unsupported(),
             MISSION_CLEAR_ALL => of(0, 2).done(),
@@ -66,7 +66,7 @@ const MISSION_ITEM_INT: u32 = 73;
 const LOG_REQUEST_LIST: u32 = 117;
 const LOG_REQUEST_DATA: u32 = 119;
 
-/// One of the three kinds of list; `None` for a number that is none of them.
+/// The kind of list; `None` for an unknown number.
 fn mission_type(number: u8) -> Option<MavMissionType> {
     match number {
         0 => Some(MavMissionType::MAV_MISSION_TYPE_MISSION),
@@ -108,7 +108,7 @@ impl List {
             target_system: self.asker.system_id,
             target_component: self.asker.component_id,
             mavtype: result,
-            // All of them, where it was asked about none that there is.
+            // An unknown kind is answered with "all".
             mission_type: self.mission_type.unwrap_or(MavMissionType::MAV_MISSION_TYPE_ALL),
             ..MISSION_ACK_DATA::default()
         };

@@ -1,4 +1,4 @@
-//! Questions that are no commands: parameters, and files and lists that this vehicle does not have.
+//! Answers messages that are not commands: questions about parameters, files and lists.
 
 use protocol::dialect::MavParamError;
 use protocol::frame::Frame;
@@ -7,12 +7,13 @@ use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::VehicleEndpoint;
 use super::lists::ListQuestion;
-use crate::craft::{Craft, Severity};
 use crate::parameters;
+use crate::vehicle::Vehicle;
+use flight::computer::news::Severity;
 
 impl VehicleEndpoint {
-    /// Answers a question about parameters, files or lists; says whether the frame was one.
-    pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &dyn Craft) -> bool {
+    /// Answers a question about parameters, files or lists; returns whether the frame was one.
+    pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &Vehicle) -> bool {
         let unkept = FileRequest::from_frame(frame)
             .map(|request| (request.target, request.decline()))
             .or_else(|| ListQuestion::from_frame(frame).map(|question| (question.target, question.answer)));
@@ -32,7 +33,7 @@ impl VehicleEndpoint {
             ParamQuestion::Read(key) => {
                 let lane = self.lane(link);
                 let answer = match parameters::place_of(key, &lane.streams) {
-                    Some(place) => parameters::value(place, &lane.streams, vehicle.weights()),
+                    Some(place) => parameters::value(place, &lane.streams, &vehicle.weights()),
                     None => error_message(key, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, asker),
                 };
                 lane.request(vec![answer]);
@@ -46,7 +47,7 @@ impl VehicleEndpoint {
                 let lane = self.lane(link);
                 let (answer, refusal) = match set {
                     Ok((place, refusal)) => {
-                        (parameters::value(place, &lane.streams, vehicle.weights()), refusal)
+                        (parameters::value(place, &lane.streams, &vehicle.weights()), refusal)
                     }
                     Err(refusal) => (error_message(ParamKey::Name(id), refusal.error, asker), Some(refusal)),
                 };

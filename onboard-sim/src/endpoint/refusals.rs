@@ -1,15 +1,15 @@
-//! A vehicle that has to refuse says why once, and then counts: a flood of refused requests must neither fill the radio
-//! nor the crew's screen.
+//! Limits how often refusals are explained: the reason is sent once and then counted, so that a flood of refused
+//! requests fills neither the radio nor the crew's screen.
 
 use std::collections::BTreeMap;
 
 use protocol::identity::Address;
 
-/// Refused commands of one station that are answered at once. More than this no client sends before it waits.
+/// Number of refused commands of one station that are answered at once. No known client sends more before it waits.
 const AT_ONCE: f64 = 8.0;
-/// After those, answers to one station's refused commands, in a second: whoever repeats waits 0.5 s for each.
+/// After those, answers per second to one station's refused commands: each repetition waits 0.5 s.
 const PER_S: f64 = 2.0;
-/// Stations told apart. A flood of forged addresses shares the last place.
+/// Number of stations tracked separately. A flood of forged addresses shares the last entry.
 const MAX_STATIONS: usize = 16;
 
 /// How often each station's refused commands are answered.
@@ -18,7 +18,7 @@ pub(super) struct Refusals {
     stations: BTreeMap<Address, Left>,
 }
 
-/// Answers that are left.
+/// Answers left.
 #[derive(Debug, Clone, Copy)]
 struct Left {
     answers: f64,
@@ -26,7 +26,7 @@ struct Left {
 }
 
 impl Refusals {
-    /// Whether a station is answered that one more of its commands is refused.
+    /// Whether to answer one more refused command of a station.
     pub(super) fn may_answer(&mut self, station: Address, now_s: f64) -> bool {
         let known = self.stations.contains_key(&station) || self.stations.len() < MAX_STATIONS - 1;
         let place = if known { station } else { Address { system_id: 0, component_id: 0 } };
@@ -41,12 +41,12 @@ impl Refusals {
     }
 }
 
-/// A warning that was said is said again after this at the earliest, s, with how often it would have been said.
+/// Shortest time before the same warning is sent again, s, with the number of times it was held back.
 const SAID_FOR_S: f64 = 5.0;
-/// Different warnings in that time; of more only the number is said.
+/// Most different warnings in that time; only the number of further ones is sent.
 const MAX_DIFFERENT: usize = 8;
 
-/// Warnings that were said just now.
+/// Recently sent warnings.
 #[derive(Debug, Default)]
 pub(super) struct Warnings {
     said: Vec<Said>,
@@ -62,8 +62,8 @@ struct Said {
 }
 
 impl Warnings {
-    /// Whether a warning is to be said now. Words that differ in their figures only are the same warning: a value that
-    /// is measured anew each time is no news.
+    /// Whether to send a warning now. Texts that differ only in their digits are the same warning, because a newly
+    /// measured value is no news.
     pub(super) fn is_news(&mut self, words: &str, now_s: f64) -> bool {
         if let Some(said) = self.said.iter_mut().find(|said| same_but_for_figures(&said.words, words)) {
             said.more += 1;
@@ -81,7 +81,7 @@ impl Warnings {
         true
     }
 
-    /// What has been counted for long enough, in words.
+    /// Texts with the counts that are due.
     pub(super) fn counted(&mut self, now_s: f64) -> Vec<String> {
         let mut words = Vec::new();
         self.said.retain_mut(|said| {
@@ -123,7 +123,7 @@ mod tests {
         // 10 s at 20 Hz.
         assert!((26..=28).contains(&answered(&mut refusals, 0.0)));
         assert!((18..=20).contains(&answered(&mut refusals, 10.0)));
-        // Another station is not made to wait by this one.
+        // Another station does not have to wait because of this one.
         assert!(refusals.may_answer(Address { system_id: 254, component_id: 190 }, 20.0));
     }
 
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_warning_is_said_once_and_then_counted() {
+    fn a_warning_is_sent_once_and_then_counted() {
         let mut warnings = Warnings::default();
         assert!(warnings.is_news("arm refused: tilt: found 5.21 deg, required at most 5 deg", 0.0));
         for n in 1..=40 {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_different_warnings_only_the_number_is_said() {
+    fn only_the_number_of_many_different_warnings_is_sent() {
         let mut warnings = Warnings::default();
         let mut words = (0..26u8).map(|n| format!("no {}", char::from(b'a' + n)));
         assert_eq!(words.by_ref().filter(|words| warnings.is_news(words, 0.0)).count(), MAX_DIFFERENT);

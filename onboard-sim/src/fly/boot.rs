@@ -1,35 +1,36 @@
-//! What a vehicle is on the wire, fixed at its power-up.
+//! Identity and budgets of a vehicle on the wire, fixed at power-up.
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::num::NonZeroU32;
 
 use protocol::identity::RADIO_BUDGET_BYTES_S;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
 
-/// What a vehicle is on the wire beside what it does.
+/// Identity and budgets of a vehicle on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OnTheWire {
-    /// Random, drawn once for each power-up: whoever sees another number sees another boot.
+    /// Random number drawn once at each power-up: a different number means a different boot.
     pub boot_number: NonZeroU32,
-    /// What each network link may be asked to carry, bytes per second; a serial link leads to a radio and has its budget.
+    /// Budget of each network link, bytes per second; a serial link leads to a radio and has the radio's budget.
     pub network_bytes_s: u32,
 }
 
 impl OnTheWire {
-    /// A boot of its own, and a radio's budget on every link.
+    /// A random boot number, and a radio's budget on every link.
     pub fn drawn() -> Self {
-        // The system's own random keys: every process has others.
+        // The standard library's random hash keys differ in every process.
         let drawn = RandomState::new().build_hasher().finish() as u32;
         let boot_number = NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN);
         Self { boot_number, network_bytes_s: RADIO_BUDGET_BYTES_S }
     }
 
-    pub(super) fn capacity_bytes_s(self, link: &Endpoint) -> u32 {
+    pub(super) fn capacity_bytes_s(self, link: &LinkAddress) -> u32 {
         match link {
-            Endpoint::Serial { .. } => RADIO_BUDGET_BYTES_S,
-            Endpoint::UdpIn(_) | Endpoint::UdpOut(_) | Endpoint::TcpIn(_) | Endpoint::TcpOut(_) => {
-                self.network_bytes_s
-            }
+            LinkAddress::Serial { .. } => RADIO_BUDGET_BYTES_S,
+            LinkAddress::UdpIn(_)
+            | LinkAddress::UdpOut(_)
+            | LinkAddress::TcpIn(_)
+            | LinkAddress::TcpOut(_) => self.network_bytes_s,
         }
     }
 }

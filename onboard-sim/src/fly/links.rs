@@ -1,4 +1,4 @@
-//! The open links: their frames heard once, signed if a key is set, and in the log.
+//! The open links: removes copies, checks and adds signatures if a key is set, and records the frames.
 
 use std::time::Duration;
 
@@ -9,18 +9,18 @@ use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
 use protocol::signing::{Rejection, stamp_of};
-use protocol::transport::{Endpoint, Transport, TransportSender};
+use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::FlyError;
 use super::recording::{note, record_raw};
 use crate::endpoint::Outgoing;
 
-/// Timestamps are remembered this often at least, in stamps (10 us).
+/// Longest interval between saved timestamps, in units of 10 us.
 const REMEMBER_EVERY: u64 = 100_000;
-/// Things taken from one link before the vehicle's own work goes on: a flood must not hold up a frame of the loop.
+/// Most items taken from one link in a frame, so that a flood cannot delay the run loop.
 const MAX_AT_ONCE: usize = 1024;
 
-/// Frames from outside that are recorded in a second, at most: a flood must neither fill the log nor stop it.
+/// Most received frames recorded in a second, so that a flood neither fills the log nor stops it.
 const MAX_RECORDED_S: u32 = 500;
 
 /// Every link of the vehicle.
@@ -40,7 +40,7 @@ struct OpenLink {
     name: String,
 }
 
-/// What comes from outside on its way into the log.
+/// Received frames on their way into the log.
 struct Intake {
     recorder: Option<Recorder>,
     second: u64,
@@ -74,15 +74,15 @@ impl Intake {
 
 /// A frame from a link.
 pub(super) enum Heard {
-    /// To be acted on; and the number of its link.
+    /// A frame to act on, and the number of its link.
     Frame(usize, Frame),
-    /// Not to be acted on: its signature is missing or wrong.
+    /// A frame to ignore: its signature is missing or wrong.
     Rejected(Frame, Rejection),
 }
 
 impl Links {
     pub(super) async fn open(
-        endpoints: &[Endpoint],
+        endpoints: &[LinkAddress],
         key_file: Option<&std::path::Path>,
         recorder: Option<Recorder>,
     ) -> Result<Self, FlyError> {
@@ -92,7 +92,7 @@ impl Links {
             let transport = Transport::open(endpoint.clone())
                 .await
                 .map_err(|source| FlyError::Link { link: endpoint.to_string(), source })?;
-            let name = transport.endpoint().to_string();
+            let name = transport.address().to_string();
             open.push(OpenLink { sender: transport.sender(), transport, name });
         }
         let hub = Hub::new(open.len(), signing);
@@ -119,7 +119,7 @@ impl Links {
                             heard.push(Heard::Frame(number, frame));
                         }
                         News::Copy(frame) => self.intake.record(name, &frame, time_s),
-                        // Not recorded: a flood of forgeries must not fill the log. It is counted.
+                        // Counted but not recorded: a flood of forgeries must not fill the log.
                         News::Rejected(frame, why) => heard.push(Heard::Rejected(frame, why)),
                         News::Strangers(words) => note(recorder, time_s, &format!("link {name}: {words}")),
                         News::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
@@ -128,7 +128,7 @@ impl Links {
                 }
             }
         }
-        // Before anything is done about it, so that a restart does not make it new.
+        // Save the timestamp before acting on the frame, so that it cannot be replayed after a restart.
         if believed || clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
             self.remembered_at = clock;
             self.remember(time_s);
@@ -144,7 +144,7 @@ impl Links {
             }
             let bytes = self.hub.bytes_for(number, frame, clock);
             let count = bytes.len();
-            // What found no room was not sent, and the log must not say so.
+            // A frame without room was not sent, so the log must not contain it.
             if sender.send(bytes) {
                 self.tx_bytes += count as u64;
                 self.hub.on_sent(number, count, now);
@@ -153,12 +153,12 @@ impl Links {
         }
     }
 
-    /// Frames that found no room on their link.
+    /// Number of frames dropped because their link had no room.
     pub(super) fn dropped(&self) -> u64 {
         self.open.iter().map(|link| link.sender.dropped()).sum()
     }
 
-    /// The last words to the log: what each link carried, and what signatures kept out.
+    /// Writes the final statistics into the log: traffic of each link, and frames refused for their signature.
     pub(super) fn close(&mut self, time_s: f64) {
         let now = Duration::from_secs_f64(time_s);
         for (link, OpenLink { name, .. }) in self.hub.links().iter().zip(&self.open) {
@@ -192,12 +192,12 @@ impl Links {
         if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory())
             && let Err(error) = file.remember(&memory)
         {
-            note(self.recorder.as_ref(), time_s, &format!("timestamps are not remembered: {error}"));
+            note(self.recorder.as_ref(), time_s, &format!("timestamps are not saved: {error}"));
         }
     }
 }
 
-/// Now, as signatures count time.
+/// The current time in the units of signatures.
 #[expect(
     clippy::disallowed_methods,
     reason = "signatures need the time of day; nothing in flight depends on it"

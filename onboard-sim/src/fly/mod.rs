@@ -1,9 +1,9 @@
-//! The run loop: a craft, its clock, its links and its log.
+//! The run loop: a vehicle, its clock, its links and its log.
 
-mod autopilot;
 mod boot;
 mod links;
 mod load;
+mod own_start;
 mod pace;
 mod radio;
 mod recording;
@@ -12,35 +12,36 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use flight::mission::MissionError;
-use flight::phase::Phase;
-use flight::profile::ProfileError;
+use flight::rules::phase::Phase;
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
+use sim::recipe::RecipeError;
 use tokio::sync::watch;
+use vehicles::profile::ProfileError;
 
-use self::autopilot::AutoPilot;
 pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
-pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_planar, load_profile, log_header};
+pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_flight, load_planar, log_header};
+use self::own_start::OwnStart;
 pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
 pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
-use crate::craft::{Craft, Judged};
 use crate::endpoint::VehicleEndpoint;
 use crate::solve_times::SolveTimes;
 use crate::streams::Standard;
-use crate::vehicle::{DeadlinePolicy, VehicleError, VehicleEvent};
+use crate::vehicle::{Judged, VehicleEvent};
+use flight::computer::plane::PlaneError;
+pub use sim::plane::DeadlinePolicy;
 
 /// How fast simulated time runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Speed {
     /// This many times real time.
     Factor(f64),
-    /// As fast as the machine can. On its pad with a crew a vehicle is never faster than real time, however fast it is to
-    /// be: its uplink is judged by the age of what it heard.
+    /// As fast as the machine can. On its pad with a crew a vehicle is never faster than real time, because it judges
+    /// its uplink by the age of the last heartbeat.
     Max,
 }
 
@@ -58,19 +59,19 @@ impl std::str::FromStr for Speed {
     }
 }
 
-/// What to fly.
+/// The options of a flight.
 pub struct FlyOptions {
-    /// What flies.
+    /// The profile or mission to fly.
     pub profile: LoadedFlight,
     /// MAVLink system id of the vehicle.
     pub system_id: u8,
-    /// Links to serve; none is allowed.
-    pub links: Vec<Endpoint>,
-    /// The key that every frame is to be signed with; none is allowed.
+    /// Links to serve; may be empty.
+    pub links: Vec<LinkAddress>,
+    /// The key for signing every frame, if any.
     pub key_file: Option<PathBuf>,
     /// Log to write into.
     pub recorder: Option<Recorder>,
-    /// What it is on the wire beside what it does.
+    /// Its identity and budgets on the wire.
     pub on_the_wire: OnTheWire,
     /// Seed of the dispersions.
     pub seed: u64,
@@ -78,21 +79,21 @@ pub struct FlyOptions {
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
     pub auto_start: bool,
-    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to stop. After an abort on
-    /// the pad links are served in any case: the crew has to see the wait run down.
+    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to stop. After an abort
+    /// on the pad the links are always served: the crew has to see the countdown of the waiting time.
     pub exit_when_safed: bool,
-    /// What a late controller output leads to.
+    /// What happens to a late controller output.
     pub deadline_policy: DeadlinePolicy,
-    /// Told the vehicle's time every frame, for others who write into the same log.
+    /// Receives the vehicle's time every frame, for other writers of the same log.
     pub log_clock: Option<LogClock>,
 }
 
-/// The vehicle's time as its log counts it: one log has one clock, however fast the simulation runs.
+/// The vehicle's time in its log: one log has one clock, however fast the simulation runs.
 #[derive(Debug, Clone, Default)]
 pub struct LogClock(Arc<AtomicU64>);
 
 impl LogClock {
-    /// A clock at nought.
+    /// A clock at zero.
     pub fn new() -> Self {
         Self::default()
     }
@@ -110,16 +111,15 @@ impl LogClock {
 /// Why a flight could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
-    /// No such profile.
+    /// No profile of that name.
     #[error("no profile `{given}`: not a file, and the built-in ones are {}", load::builtin_names())]
     NoProfile {
-        /// What was asked for.
+        /// The requested name.
         given: String,
     },
     /// The profile's file cannot be read.
     #[error("cannot read the profile {path}")]
     ReadProfile {
-        /// The file.
         path: String,
         /// What the system said.
         source: std::io::Error,
@@ -129,8 +129,8 @@ pub enum FlyError {
     Profile(#[from] ProfileError),
     /// The mission is wrong.
     #[error(transparent)]
-    Mission(#[from] MissionError),
-    /// The mission flies from apogee, where only a start at ignition will do.
+    Recipe(#[from] RecipeError),
+    /// The mission flies from apogee, but a start at ignition is needed.
     #[error(
         "{name} flies from apogee; this takes a profile that starts at ignition: {}",
         load::planar_names()
@@ -147,17 +147,16 @@ pub enum FlyError {
     },
     /// The flight from apogee cannot be set up.
     #[error(transparent)]
-    Rocket(#[from] campaign::fly::FlyError),
+    Rocket(#[from] sim::sortie::SetUpError),
     /// The profile cannot be simulated.
     #[error(transparent)]
-    Vehicle(#[from] VehicleError),
-    /// The key is not used.
+    Plane(#[from] PlaneError),
+    /// The key cannot be used.
     #[error(transparent)]
     Key(#[from] KeyFileError),
     /// A link cannot be opened.
     #[error("cannot open the link {link}")]
     Link {
-        /// The link.
         link: String,
         /// What the system said.
         source: std::io::Error,
@@ -166,8 +165,8 @@ pub enum FlyError {
 
 /// How a flight ended.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// Inside every limit; from apogee: inside what the legs take.
+pub enum FlightEnd {
+    /// Landed inside every limit; from apogee: inside the limits of the legs.
     Landed,
     /// On the ground, outside a limit.
     OutsideLimits,
@@ -179,14 +178,13 @@ pub enum Outcome {
     Stopped,
 }
 
-/// What a flight came to.
+/// Summary of a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlightSummary {
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Contact and its judgement, if there was one.
+    pub outcome: FlightEnd,
+    /// Contact and its verdict, if there was one.
     pub judged: Option<Judged>,
-    /// The same by the landing paper's Table 2, where the former goes by what the legs take.
+    /// The verdict by the landing paper's Table 2, if `judged` goes by the limits of the legs.
     pub judged_by_table_2: Option<Judged>,
     /// Last phase.
     pub phase: Phase,
@@ -208,7 +206,7 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
     Box::pin(fly_observed(options, stop, |_, _| ())).await
 }
 
-/// The vehicle's end of its links, as ordered.
+/// The vehicle's endpoint, set up from the options.
 fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEndpoint {
     let endpoint = match options.key_file {
         Some(_) => VehicleEndpoint::sending_signed(standard),
@@ -225,8 +223,8 @@ fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEn
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
-/// The outcome depends only on profile, seed and what arrives on the links: not on the speed, the machine or
-/// the clock (unless deadlines are enforced, which makes it the machine's business).
+/// The outcome depends only on the profile, the seed and the frames that arrive on the links, not on the speed, the
+/// machine or the clock. (If deadlines are enforced, it also depends on the speed of the machine.)
 ///
 /// # Errors
 /// The profile cannot be simulated, or a link cannot be opened.
@@ -235,42 +233,41 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let mut craft = options.profile.craft(options.seed, options.deadline_policy)?;
-    let craft: &mut dyn Craft = craft.as_mut();
-    craft.pull_pin();
+    let mut vehicle = options.profile.vehicle(options.seed, options.deadline_policy)?;
+    // The crew pulls the pin by hand; the simulation does it when the program starts.
+    vehicle.set_pin_out(true);
     let mut links =
         Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
-    let mut endpoint = endpoint_of(&options, craft.standard());
+    let mut endpoint = endpoint_of(&options, vehicle.standard());
     let crewed = !options.links.is_empty() && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
-    let mut pilot = AutoPilot { wanted: options.auto_start, refused: None };
-    let mut pace = Pace::new(options.speed, craft.frame_s());
+    let mut own_start = OwnStart { wanted: options.auto_start, refused: None };
+    let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
     let mut dropped = 0;
 
     let stopped = loop {
-        if craft.time_s() >= log_state_due_s {
-            craft.set_log_state(log_state(options.recorder.as_ref()));
+        if vehicle.time_s() >= log_state_due_s {
+            vehicle.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
         }
-        let arrived = links.receive(craft.time_s());
-        for heard in heard.pass(arrived, craft.time_s(), craft.radio()) {
+        let arrived = links.receive(vehicle.time_s());
+        for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             match heard {
-                Heard::Frame(link, frame) => endpoint.on_frame(link, &frame, craft),
+                Heard::Frame(link, frame) => endpoint.on_frame(link, &frame, &vehicle),
                 Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
-        endpoint.watch_the_uplink(craft);
-        pilot.act(craft);
+        let own = own_start.requests(&vehicle);
         let stopwatch = pace.clock();
-        let events = craft.advance_frame(&mut || stopwatch.elapsed());
-        let time_s = craft.time_s();
+        let (events, answers) = endpoint.step(&mut vehicle, &own, &mut || stopwatch.elapsed());
+        own_start.on_answers(&answers);
+        let time_s = vehicle.time_s();
         if let Some(clock) = &options.log_clock {
             clock.set(nanoseconds(time_s));
         }
         for event in &events {
-            endpoint.on_event(event);
             observe(time_s, event);
             match event {
                 VehicleEvent::Tick(tick) => solve_times.add(tick.solve_time_s, tick.deadline_s),
@@ -279,18 +276,18 @@ pub async fn fly_observed(
             }
         }
         if let Some(recorder) = &options.recorder {
-            record(recorder, craft, &events);
+            record(recorder, &vehicle, &events);
         }
-        let leaving = endpoint.poll(craft);
-        for outgoing in sent.pass(leaving, time_s, craft.radio()) {
+        let leaving = endpoint.poll(&vehicle);
+        for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {
             links.send(&outgoing, time_s);
         }
         if links.dropped() > dropped {
             dropped = links.dropped();
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
-        let over = craft.is_over() || pilot.refused.is_some();
-        let aborted_on_the_pad = craft.phase().on_pad() && craft.aborted() && !options.links.is_empty();
+        let over = vehicle.is_over() || own_start.refused.is_some();
+        let aborted_on_the_pad = vehicle.phase().on_pad() && vehicle.aborted() && !options.links.is_empty();
         if over
             && !aborted_on_the_pad
             && options.exit_when_safed
@@ -300,33 +297,33 @@ pub async fn fly_observed(
         }
         let waiting = match () {
             () if over => Waiting::Over,
-            () if crewed && craft.phase().on_pad() => Waiting::Crew,
+            () if crewed && vehicle.phase().on_pad() => Waiting::Crew,
             () => Waiting::Nobody,
         };
         tokio::select! {
             () = pace.wait(waiting) => {}
             changed = stop.changed() => {
-                // A stop sender that is gone can ask for nothing any more; the flight ends with its owner.
+                // If the sender of the stop signal is gone, the flight ends.
                 if changed.is_err() || *stop.borrow() { break true; }
             }
         }
     };
-    links.close(craft.time_s());
-    let outcome = match (craft.judged().map(|judged| judged.landed), pilot.refused) {
-        // An abort stays an abort, however the vehicle came down; the verdict stands beside it.
-        _ if craft.aborted() => Outcome::Aborted,
-        (Some(true), _) => Outcome::Landed,
-        (None, Some(reason)) => Outcome::Refused(reason),
-        (None, None) if stopped => Outcome::Stopped,
-        // Judged so, or given up: it never came down.
-        (Some(false) | None, _) => Outcome::OutsideLimits,
+    links.close(vehicle.time_s());
+    let outcome = match (vehicle.judged().map(|judged| judged.landed), own_start.refused) {
+        // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
+        _ if vehicle.aborted() => FlightEnd::Aborted,
+        (Some(true), _) => FlightEnd::Landed,
+        (None, Some(reason)) => FlightEnd::Refused(reason),
+        (None, None) if stopped => FlightEnd::Stopped,
+        // The verdict is outside a limit, or the vehicle never came down.
+        (Some(false) | None, _) => FlightEnd::OutsideLimits,
     };
     Ok(FlightSummary {
         outcome,
-        judged: craft.judged(),
-        judged_by_table_2: craft.judged_by_table_2(),
-        phase: craft.phase(),
-        time_s: craft.time_s(),
+        judged: vehicle.judged(),
+        judged_by_table_2: vehicle.judged_by_table_2(),
+        phase: vehicle.phase(),
+        time_s: vehicle.time_s(),
         solve_times,
         lateness: pace.into_lateness(),
         tx_bytes: links.tx_bytes,

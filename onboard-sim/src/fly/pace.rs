@@ -1,15 +1,15 @@
-//! The wall clock's part: pacing and timing, and nothing that decides.
+//! Uses the wall clock for pacing and timing. Nothing here affects a decision.
 
 use std::time::{Duration, Instant};
 
 use super::Speed;
 
-/// Who waits meanwhile.
+/// Who is waiting for the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Waiting {
-    /// Nobody: as fast as was asked for.
+    /// Nobody: as fast as requested.
     Nobody,
-    /// A crew around the pad: never faster than real time, in which its station speaks.
+    /// A crew at the pad: never faster than real time, because its station works in real time.
     Crew,
     /// The flight is over.
     Over,
@@ -66,7 +66,7 @@ impl Lateness {
 impl Pace {
     /// After the flight the links are served this long, so that the verdict arrives.
     const LINGER: Duration = Duration::from_millis(1500);
-    /// A machine that slept does not race to catch up.
+    /// After a suspend the loop does not race to catch up.
     const MAX_LAG: Duration = Duration::from_millis(500);
 
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]

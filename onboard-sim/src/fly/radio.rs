@@ -1,12 +1,12 @@
-//! What a broken radio does to what crosses it: nothing gets through, or it arrives late. By simulated time.
+//! Simulates a broken radio, by simulated time: frames are lost or arrive late.
 
 use std::collections::VecDeque;
 
-use crate::craft::Radio;
+use sim::sortie::Radio;
 
 /// One direction of the radio.
 pub(crate) struct Delayed<T> {
-    /// What is on its way, with the time it arrives, s; in the order it was sent.
+    /// Frames on their way with their arrival times, s, in the order they were sent.
     on_its_way: VecDeque<(f64, T)>,
 }
 
@@ -17,7 +17,7 @@ impl<T> Default for Delayed<T> {
 }
 
 impl<T> Delayed<T> {
-    /// What arrives at a time, of what is sent then and of what was sent before.
+    /// The frames that arrive at a time; takes the frames sent at that time.
     pub(crate) fn pass(&mut self, sent: Vec<T>, time_s: f64, radio: Radio) -> Vec<T> {
         if radio.silent {
             self.on_its_way.clear();
@@ -36,26 +36,26 @@ mod tests {
     const WHOLE: Radio = Radio { silent: false, delay_s: 0.0 };
 
     #[test]
-    fn a_whole_radio_delays_nothing() {
+    fn a_working_radio_delays_nothing() {
         let mut radio = Delayed::default();
         assert_eq!(radio.pass(vec![1, 2], 0.0, WHOLE), [1, 2]);
         assert!(radio.pass(Vec::new(), 0.1, WHOLE).is_empty());
     }
 
     #[test]
-    fn what_is_late_arrives_in_order_and_nothing_is_lost() {
+    fn late_frames_arrive_in_order_and_none_is_lost() {
         let late = Radio { delay_s: 0.5, ..WHOLE };
         let mut radio = Delayed::default();
         assert!(radio.pass(vec!['a'], 0.0, late).is_empty());
         assert!(radio.pass(vec!['b'], 0.25, late).is_empty());
         assert_eq!(radio.pass(Vec::new(), 0.5, late), ['a']);
-        // Whole again: what was sent before still arrives first.
+        // The radio works again: frames sent earlier still arrive first.
         assert!(radio.pass(vec!['c'], 0.625, WHOLE).is_empty());
         assert_eq!(radio.pass(Vec::new(), 0.75, WHOLE), ['b', 'c']);
     }
 
     #[test]
-    fn a_silent_radio_swallows_what_was_on_its_way_too() {
+    fn a_silent_radio_also_loses_frames_on_their_way() {
         let late = Radio { delay_s: 0.5, ..WHOLE };
         let silent = Radio { silent: true, ..late };
         let mut radio = Delayed::default();

@@ -1,4 +1,4 @@
-//! What of a flight goes into its log.
+//! Chooses what is recorded in the log of a flight.
 
 use std::path::Path;
 
@@ -7,7 +7,10 @@ use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 
-use crate::craft::{Craft, LogState, Severity, VehicleEvent};
+use flight::computer::LogState;
+use flight::computer::news::Severity;
+
+use crate::vehicle::{Vehicle, VehicleEvent};
 
 pub(super) fn nanoseconds(time_s: f64) -> u64 {
     (1e9 * time_s) as u64
@@ -35,18 +38,21 @@ pub(super) fn note(recorder: Option<&Recorder>, time_s: f64, words: &str) {
     }
 }
 
-pub(super) fn record(recorder: &Recorder, craft: &dyn Craft, events: &[VehicleEvent]) {
-    let time_ns = nanoseconds(craft.time_s());
+pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEvent]) {
+    let time_ns = nanoseconds(vehicle.time_s());
+    for record in vehicle.computer_records() {
+        recorder.record(record, time_ns);
+    }
     for event in events {
         let record = match event {
             VehicleEvent::Tick(tick) => Record::from(tick_log::tick_to_log(
-                &tick.input,
-                &tick.output,
-                tick.state_digest,
+                &tick.tick.input,
+                &tick.tick.output,
+                tick.tick.state_digest,
                 tick.solve_time_s,
                 tick.deadline_s,
             )),
-            VehicleEvent::Verdict { .. } => match craft.verdict_record() {
+            VehicleEvent::Verdict { .. } => match vehicle.verdict_record() {
                 Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
                 None => continue,
             },
@@ -78,12 +84,12 @@ pub(super) fn record(recorder: &Recorder, craft: &dyn Craft, events: &[VehicleEv
         }
     }
     let changed = events.iter().any(|event| matches!(event, VehicleEvent::PhaseChanged { .. }));
-    for record in craft.log(changed) {
+    for record in vehicle.records(changed) {
         recorder.record(record, time_ns);
     }
 }
 
-/// A flight without a log is the operator's choice, not a failed log.
+/// A flight without a log is the operator's choice and not a failure.
 pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     let Some(recorder) = recorder else {
         return LogState { running: true, space_bytes: u64::MAX };

@@ -1,11 +1,11 @@
-//! A quantity and the values of it that a map covers.
+//! An axis of a map: a quantity and its values.
 
 use std::fmt;
 use std::str::FromStr;
 
-use flight::profile::Profile;
+use flight::vehicle::profile::Profile;
 
-/// What a map varies.
+/// A quantity that a map varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Nominal thrust over weight.
@@ -107,14 +107,14 @@ impl Axis {
     /// The most values of one axis.
     pub const MAX_COUNT: usize = 500;
 
-    /// The value at a place, counted from 0.
+    /// The value at an index, counted from 0.
     pub fn value(&self, place: usize) -> f64 {
         let steps = self.count.saturating_sub(1).max(1);
         self.from + (self.to - self.from) * place as f64 / steps as f64
     }
 }
 
-/// Why an axis was not understood.
+/// Why an axis cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "axis `{given}`: {problem}; write QUANTITY=FROM:TO:COUNT with a quantity of {}",
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_axis_is_refused_with_what_would_do() {
+    fn a_wrong_axis_is_refused_with_the_valid_forms() {
         for text in
             ["", "height", "depth=1:2:3", "height=1:2", "height=a:2:3", "height=1:2:1", "height=-1:2:3"]
         {

@@ -1,8 +1,8 @@
-//! Where a landing exists: a map over two quantities of the start or the motor.
+//! Maps where a landing exists, over two quantities of the start or the motor.
 //!
-//! Every cell is one cold solve of the profile's own landing problem, from both bent guesses; it lands if the plan
-//! converges and ends inside the touchdown limits (Table 2 of the landing paper). Cells are independent, so the map
-//! does not depend on how many of them are computed at a time.
+//! Every cell is one cold solve of the profile's landing problem, from both bent initial guesses. A cell lands if the
+//! plan converges and ends inside the touchdown limits (Table 2 of the landing paper). Cells are independent, so the
+//! map does not depend on how many of them are computed at the same time.
 
 mod axis;
 mod picture;
@@ -10,19 +10,20 @@ mod picture;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use flight::nmpc::{self, Problem, SolveStatus};
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::guidance::landing::landing_problem;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::profile::Profile;
+use nmpc::SolveStatus;
 
 pub use axis::{Axis, AxisError, Quantity};
 pub use picture::write_svg;
 
-/// What was found in one cell.
+/// The result of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// Whether, and if not why.
+    /// Whether a landing exists, and if not, why.
     pub finding: Finding,
-    /// Speed at the end of the plan, m/s; the bound's where nothing was planned.
+    /// Speed at the end of the plan, m/s; the lower bound if nothing was planned.
     pub touchdown_speed_m_s: f64,
 }
 
@@ -87,7 +88,7 @@ pub fn map(profile: &Profile, x: Axis, y: Axis, jobs: usize, progress: &(dyn Fn(
         let workers: Vec<_> = (1..jobs.max(1)).map(|_| scope.spawn(work)).collect();
         let mut found = work();
         for worker in workers {
-            // A worker can only fail by a panic, which the scope passes on.
+            // A worker can only fail by a panic, which the scope propagates.
             found.extend(worker.join().unwrap_or_default());
         }
         found
@@ -104,7 +105,7 @@ fn cell(profile: &Profile, x_value: f64, y_value: f64, x: Axis, y: Axis) -> Cell
     }
     let limits = TouchdownLimits::from_profile(&profile);
     let initial = profile.start.planar_state();
-    let problem = Problem::from_profile(&profile, initial, 0.0, profile.nmpc.horizon_steps, thrust_scale);
+    let problem = landing_problem(&profile, initial, 0.0, profile.nmpc.horizon_steps, thrust_scale);
     let solution = nmpc::solve(&problem, None);
     if solution.status == SolveStatus::NotLandable {
         return Cell {
@@ -124,12 +125,12 @@ fn cell(profile: &Profile, x_value: f64, y_value: f64, x: Axis, y: Axis) -> Cell
 }
 
 impl Map {
-    /// Cells with this finding.
+    /// Number of cells with this finding.
     pub fn count(&self, finding: Finding) -> usize {
         self.cells.iter().filter(|cell| cell.finding == finding).count()
     }
 
-    /// The map as text: a sign a cell, the highest row first.
+    /// The map as text: one character for each cell, the highest row first.
     ///
     /// # Errors
     /// The output cannot be written.
@@ -159,7 +160,7 @@ impl Map {
         )
     }
 
-    /// The map as CSV: one row a cell.
+    /// The map as CSV: one row for each cell.
     ///
     /// # Errors
     /// The output cannot be written.
@@ -183,7 +184,7 @@ mod tests {
     use super::*;
 
     fn small_map(jobs: usize) -> Map {
-        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
         let x = Axis { quantity: Quantity::ThrustToWeight, from: 0.95, to: 1.2, count: 6 };
         let y = Axis { quantity: Quantity::Height, from: 11.0, to: 19.0, count: 5 };
         map(&profile, x, y, jobs, &|_| ())
@@ -197,7 +198,7 @@ mod tests {
     /// 33.3 N from 15 m lands (thrust to weight 1.13); 30 N (1.02) and less than the weight do not.
     #[test]
     fn val_hand_integration_and_study_agree_with_the_map() {
-        let profile = Profile::builtin("paper-calibrated").unwrap();
+        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
         let weight_n = profile.vehicle.mass_kg * profile.environment.gravity_m_s2;
         let at = |thrust_n: f64| {
             let x = Axis { quantity: Quantity::ThrustToWeight, from: thrust_n / weight_n, to: 2.0, count: 1 };

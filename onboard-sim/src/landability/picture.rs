@@ -1,4 +1,4 @@
-//! A map as an SVG picture.
+//! Draws a map as an SVG picture.
 
 use std::io::{self, Write};
 
@@ -10,7 +10,7 @@ const TOP_PX: usize = 40;
 const BOTTOM_PX: usize = 70;
 const RIGHT_PX: usize = 20;
 
-/// Writes the picture. Every cell names its values and its touchdown speed when pointed at.
+/// Writes the picture. A tooltip on every cell shows its values and its touchdown speed.
 ///
 /// # Errors
 /// The output cannot be written.
@@ -71,7 +71,7 @@ pub fn write_svg(map: &Map, profile_name: &str, out: &mut impl Write) -> io::Res
     writeln!(out, "</svg>")
 }
 
-/// Told apart in grey as well: light, middle, dark.
+/// Also different in greyscale: light, middle, dark.
 fn colour(finding: Finding) -> &'static str {
     match finding {
         Finding::Lands => "#7fc97f",

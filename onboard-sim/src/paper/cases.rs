@@ -1,6 +1,6 @@
 //! The paper's experiments and the numbers it prints for them (its Tables 3 to 6).
 
-use flight::dynamics::PlanarState;
+use flight::vehicle::dynamics::PlanarState;
 
 /// Which of the paper's tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +19,6 @@ impl Table {
     /// Every table, in the paper's order.
     pub const ALL: [Self; 4] = [Self::InputWeights, Self::Pitch, Self::LateralVelocity, Self::PitchRate];
 
-    /// Its title.
     pub fn title(self) -> &'static str {
         match self {
             Self::InputWeights => "Table 3: input weight P",
@@ -37,13 +36,11 @@ pub struct PaperRow {
     pub x_m: f64,
     /// Altitude, m.
     pub z_m: f64,
-    /// Pitch, degrees.
     pub pitch_deg: f64,
     /// Axial velocity, m/s.
     pub u_m_s: f64,
     /// Lateral velocity, m/s.
     pub w_m_s: f64,
-    /// Pitch rate, degrees per second.
     pub pitch_rate_deg_s: f64,
 }
 
@@ -64,7 +61,7 @@ impl PaperRow {
 /// One experiment. Every one starts at 15 m and -5 m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    /// The table it stands in.
+    /// The table in which it appears.
     pub table: Table,
     /// Input weight P.
     pub input_weight: f64,

@@ -1,20 +1,19 @@
 //! The paper's closed loop: the controller at 10 Hz against the same equations integrated a hundred times finer.
 
-use flight::controller::{ControllerConfig, ControllerInput, ControllerState, step};
-use flight::dynamics::PlanarModel;
-use flight::phase::Phase;
-use flight::profile::Profile;
-use flight::verdict::TouchdownLimits;
+use flight::guidance::controller::{ControllerConfig, ControllerInput, ControllerState, step};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::TouchdownLimits;
+use flight::vehicle::profile::Profile;
 
 use super::Finish;
-use crate::plant::STEP_S;
+use sim::plane::plant::STEP_S;
 
 /// Flies from ignition to the end of the burn. As in the paper there is no ground in between: its final state is
 /// the state at the end of its 5 s, and its optimum dips some millimetres below the ground just before.
 pub(super) fn fly(profile: &Profile, limits: &TouchdownLimits) -> Finish {
     let config = ControllerConfig::from_profile(profile);
     let mut controller = ControllerState::new(&config);
-    let model = PlanarModel::from_profile(profile);
+    let model = profile.planar_model();
     let sample_s = profile.nmpc.sample_time_s;
     let steps_per_sample = (sample_s / STEP_S).round() as u32;
     let mut state = profile.start.planar_state();
@@ -36,7 +35,7 @@ pub(super) fn fly(profile: &Profile, limits: &TouchdownLimits) -> Finish {
         };
         let output = step(&mut controller, &input);
         first_cost.get_or_insert(output.solver.cost);
-        // At the last tick nothing is left to plan.
+        // At the last tick there is nothing left to plan.
         converged &= output.solver.converged() || tick + 1 == profile.nmpc.horizon_steps as u32;
         for plant_step in 0..steps_per_sample {
             let plant_s = time_s + f64::from(plant_step) * STEP_S;

@@ -1,6 +1,6 @@
-//! The same, for machines.
+//! The paper's experiments as JSON.
 
-use flight::dynamics::PlanarState;
+use flight::vehicle::dynamics::PlanarState;
 use serde_json::{Value, json};
 
 use super::{AsPrinted, Finish, Row};

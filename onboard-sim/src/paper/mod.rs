@@ -1,10 +1,10 @@
 //! The landing paper's own experiments, its numbers beside ours.
 //!
-//! Tables 3 to 6 of *Definition of a Landing Strategy for a Model-Scale Reusable Rocket* (EuroGNC): the optimal
-//! landing for several input weights and from several starts. Here each is solved open loop (the whole plan at
-//! once) and flown closed loop (the horizon shrinks to touchdown; the first action comes one sample late, as in
-//! the paper), and each final state is judged by the paper's Table 2. Besides, what the paper's equations say when
-//! they are taken exactly as printed.
+//! Tables 3 to 6 of *Definition of a Landing Strategy for a Model-Scale Reusable Rocket* (EuroGNC) give the optimal
+//! landing for several input weights and from several starts. Here each is solved open loop (the whole plan at once)
+//! and flown closed loop (the horizon shrinks to touchdown; the first action comes one sample late, as in the paper),
+//! and each final state is judged by the paper's Table 2. A second part shows what the paper's equations predict
+//! exactly as printed.
 
 mod cases;
 mod closed_loop;
@@ -12,17 +12,18 @@ mod json;
 mod printed;
 mod table;
 
-use flight::dynamics::PlanarState;
-use flight::nmpc::{self, Problem, SolveStatus};
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::guidance::landing::landing_problem;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::profile::Profile;
+use nmpc::SolveStatus;
 
 pub use cases::{Case, PaperRow, Table};
 pub use json::to_json;
 pub use printed::{AsPrinted, as_printed};
 pub use table::write_tables;
 
-/// One experiment: what the paper reports and what we find.
+/// One experiment: the paper's result and ours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The experiment.
@@ -31,7 +32,7 @@ pub struct Row {
     pub paper_landed: Option<bool>,
     /// The plan's end, solved once from the start.
     pub open_loop: Finish,
-    /// Where the controller brings the vehicle.
+    /// The end of the closed-loop flight.
     pub closed_loop: Finish,
 }
 
@@ -63,13 +64,13 @@ pub fn experiments() -> Result<Vec<Row>, MissingProfile> {
     Ok(cases::all().into_iter().map(|case| experiment(&base, case)).collect())
 }
 
-/// A built-in profile that is not there.
+/// A built-in profile is missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the built-in profile {0} is missing")]
 pub struct MissingProfile(&'static str);
 
 fn builtin(name: &'static str) -> Result<Profile, MissingProfile> {
-    Profile::builtin(name).ok_or(MissingProfile(name))
+    vehicles::profile::builtin(name).ok_or(MissingProfile(name))
 }
 
 /// The profile with the paper's own problem: its conditions at the end and no others.
@@ -88,7 +89,7 @@ fn experiment(base: &Profile, case: Case) -> Row {
     let profile = papers_own(base, &case);
     let limits = TouchdownLimits::from_profile(&profile);
     let initial = profile.start.planar_state();
-    let problem = Problem::from_profile(&profile, initial, 0.0, profile.nmpc.horizon_steps, 1.0);
+    let problem = landing_problem(&profile, initial, 0.0, profile.nmpc.horizon_steps, 1.0);
     let solution = nmpc::solve(&problem, None);
     let end = solution.states.last().copied().unwrap_or(initial);
     let converged = solution.status == SolveStatus::Converged;

@@ -1,29 +1,30 @@
-//! The paper's numbers and equations exactly as printed: what they would have promised, and what is true.
+//! The paper's numbers and equations exactly as printed: what they predict, and what really happens.
 
-use flight::dynamics::{PlanarModel, PlanarState};
-use flight::nmpc::{self, Problem, Solution, SolveStatus};
-use flight::profile::{ModelKind, Profile};
+use flight::guidance::landing::landing_problem;
+use flight::vehicle::dynamics::{PlanarModel, PlanarState};
+use flight::vehicle::profile::{ModelKind, Profile};
+use nmpc::{Solution, SolveStatus};
 
 use super::{MissingProfile, builtin};
-use crate::plant::{Plant, STEP_S};
-use crate::scatter::draw;
+use sim::plane::draw::draw;
+use sim::plane::plant::{Plant, STEP_S};
 
-/// Iterations that the printed equations need; they are stiffer to the solver than the mended ones.
+/// Iterations that the printed equations need; they are harder for the solver than the corrected ones.
 const MAX_ITERATIONS: usize = 1000;
 
-/// What the printed numbers and equations come to.
+/// Results of the printed numbers and equations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AsPrinted {
     /// Printed thrust, N.
     pub thrust_n: f64,
-    /// No controller touches down slower than this with it, m/s: upright under full thrust all the way.
+    /// The slowest touchdown that is possible with it, m/s: upright under full thrust all the way.
     pub best_touchdown_speed_m_s: f64,
     /// The slowest touchdown that counts as a landing, m/s.
     pub limit_m_s: f64,
     /// Energy gained or lost in one second of coasting from a tilted attitude without thrust or drag, J/kg: by the
-    /// printed equations, and by the mended ones.
+    /// printed equations, and by the corrected ones.
     pub energy_error_j_kg: [f64; 2],
-    /// What a solver that believes the printed equations promises with the printed thrust.
+    /// The landing that a solver with the printed equations and the printed thrust predicts.
     pub promised: PlanarState,
     /// Its vertical velocity there by the printed equations, whose frames are their own, m/s.
     pub promised_vertical_m_s: f64,
@@ -35,7 +36,7 @@ pub struct AsPrinted {
     pub happens: Option<PlanarState>,
 }
 
-/// Takes the paper at its word.
+/// Solves and flies the landing with the equations as printed.
 ///
 /// # Errors
 /// A built-in profile is missing: a defect of the build.
@@ -43,10 +44,10 @@ pub fn as_printed() -> Result<AsPrinted, MissingProfile> {
     let profile = builtin("paper-as-printed")?;
     let intervals = profile.nmpc.horizon_steps;
     let initial = profile.start.planar_state();
-    let true_problem = Problem::from_profile(&profile, initial, 0.0, intervals, 1.0);
+    let true_problem = landing_problem(&profile, initial, 0.0, intervals, 1.0);
     let promise = promise(&profile);
     let promised = promise.states.last().copied().unwrap_or(initial);
-    let printed_model = PlanarModel { kind: ModelKind::AsPrinted, ..PlanarModel::from_profile(&profile) };
+    let printed_model = PlanarModel { kind: ModelKind::AsPrinted, ..profile.planar_model() };
     Ok(AsPrinted {
         thrust_n: profile.motor.thrust_n,
         best_touchdown_speed_m_s: nmpc::best_touchdown_speed_m_s(&true_problem),
@@ -61,22 +62,22 @@ pub fn as_printed() -> Result<AsPrinted, MissingProfile> {
     })
 }
 
-/// The plan of a solver that believes the printed equations.
+/// The plan of a solver that uses the printed equations.
 fn promise(profile: &Profile) -> Solution {
     let mut believed = profile.clone();
     believed.nmpc.model = ModelKind::AsPrinted;
     believed.nmpc.limits.final_box = None;
     believed.nmpc.solver.max_iterations = MAX_ITERATIONS;
     let initial = believed.start.planar_state();
-    let mut problem = Problem::from_profile(&believed, initial, 0.0, believed.nmpc.horizon_steps, 1.0);
-    // The bound that proves "not landable" is physics, which the printed equations are not bound by.
+    let mut problem = landing_problem(&believed, initial, 0.0, believed.nmpc.horizon_steps, 1.0);
+    // The bound that proves "not landable" follows from physics, which the printed equations violate.
     problem.touchdown_speed_max_m_s = f64::INFINITY;
     nmpc::solve(&problem, None)
 }
 
 /// Change of specific energy over 1 s without thrust and drag, from 30 degrees of tilt.
 fn coasting_energy_error(profile: &Profile, kind: ModelKind) -> f64 {
-    let mut model = PlanarModel { kind, ..PlanarModel::from_profile(profile) };
+    let mut model = PlanarModel { kind, ..profile.planar_model() };
     model.params.drag_per_m = 0.0;
     let tilted = PlanarState { theta_rad: 60f64.to_radians(), ..profile.start.planar_state() };
     let mut state = tilted;
@@ -116,15 +117,16 @@ mod tests {
     }
 
     #[test]
-    fn the_printed_equations_make_energy_and_the_mended_ones_do_not() {
+    fn the_printed_equations_create_energy_and_the_corrected_ones_do_not() {
         let [printed, mended] = as_printed().unwrap().energy_error_j_kg;
         assert!(printed.abs() > 1.0, "{printed}");
         assert!(mended.abs() < 1e-9, "{mended}");
     }
 
-    /// Believed, the motor brings the vehicle back up to the ground from below; true, it cannot even stop it.
+    /// By the printed equations the motor brings the vehicle back up to the ground from below; in truth it cannot even
+    /// stop it.
     #[test]
-    fn what_the_printed_equations_promise_does_not_happen() {
+    fn the_landing_predicted_by_the_printed_equations_does_not_happen() {
         let printed = as_printed().unwrap();
         assert!(printed.promise_converged && printed.promised.z_m.abs() < 1e-6, "{printed:?}");
         assert!(printed.promised_vertical_m_s > 0.0, "{printed:?}");

@@ -1,12 +1,12 @@
-//! The tables, for people.
+//! Prints the tables for people.
 
 use std::io::{self, Write};
 
-use flight::dynamics::PlanarState;
+use flight::vehicle::dynamics::PlanarState;
 
 use super::{AsPrinted, Finish, Row, Table};
 
-/// Writes Tables 3 to 6 and what the printed equations come to.
+/// Writes Tables 3 to 6 and the results of the printed equations.
 ///
 /// # Errors
 /// The output cannot be written.
@@ -87,7 +87,7 @@ fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
     writeln!(out, "As printed")?;
     writeln!(
         out,
-        "  {} N: NOT LANDABLE. Upright under full thrust all the way, which no other programme beats, the",
+        "  {} N: NOT LANDABLE. Upright under full thrust all the way, which no other input can beat, the",
         printed.thrust_n
     )?;
     writeln!(
@@ -95,16 +95,16 @@ fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
         "  vehicle still touches down at {:.2} m/s; a landing allows {} m/s.",
         printed.best_touchdown_speed_m_s, printed.limit_m_s
     )?;
-    let [by_printed, by_mended] = printed.energy_error_j_kg;
+    let [by_printed, by_corrected] = printed.energy_error_j_kg;
     writeln!(
         out,
         "  Eq. 18-22 do not conserve energy: one second of coasting at 30 deg of tilt changes it by {by_printed:+.2} J/kg"
     )?;
-    writeln!(out, "  (the mended equations: {by_mended:+.1e} J/kg).")?;
+    writeln!(out, "  (the corrected equations: {by_corrected:+.1e} J/kg).")?;
     let converged = if printed.promise_converged { "" } else { " (not converged)" };
     writeln!(
         out,
-        "  A solver that believes them promises with {} N to be at z = {:.3} m after the burn, moving at {:+.2} m/s,",
+        "  A solver that uses them predicts with {} N to be at z = {:.3} m after the burn, moving at {:+.2} m/s,",
         printed.thrust_n,
         printed.promised.z_m.abs(),
         printed.promised_vertical_m_s

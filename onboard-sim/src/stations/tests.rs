@@ -1,10 +1,10 @@
-//! Who is heard, who is remembered, and what a countdown through bad air comes to.
+//! Tests which stations are heard and remembered, and how a countdown survives a bad link.
 
 use protocol::dialect::{COMMAND_LONG_DATA, HEARTBEAT_DATA as BEAT, RADIO_STATUS_DATA as RADIO};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
 
-use flight::phase::UPLINK_SILENT_S;
+use flight::rules::phase::UPLINK_SILENT_S;
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn station(system_id: u8) -> Address {
     Address { system_id, component_id: 190 }
 }
 
-/// What is told at a time, by the station that it is told to.
+/// The reports sent at a time, by addressee.
 fn told(stations: &mut Stations, time_s: f64) -> Vec<(Address, TD_UPLINK_DATA)> {
     let read = |message| match message {
         MavMessage::TD_UPLINK(uplink) => {
@@ -51,7 +51,7 @@ fn any_accepted_frame_counts_for_the_age_and_a_heartbeat_alone_proves_the_uplink
     assert_eq!(stations.best_uplink(4.0), Uplink::Heard { age_s: 2.0 });
 }
 
-/// It is taken unsigned: otherwise anybody without the key could keep a dead uplink alive.
+/// It is accepted unsigned, so it must not count: otherwise anybody without the key could keep a dead uplink alive.
 #[test]
 fn a_radio_s_report_proves_nothing_whatever_address_it_names() {
     let mut stations = Stations::default();
@@ -60,7 +60,7 @@ fn a_radio_s_report_proves_nothing_whatever_address_it_names() {
 }
 
 #[test]
-fn while_nothing_was_accepted_everybody_is_told_why() {
+fn before_any_accepted_frame_everybody_gets_the_reason_of_refusals() {
     let mut stations = Stations::default();
     let [(to, uplink)] = &told(&mut stations, 0.0)[..] else { panic!("one message") };
     assert_eq!(*to, EVERYBODY);
@@ -126,7 +126,7 @@ fn a_flood_of_strangers_pushes_out_no_station_that_has_proved_itself() {
     assert_eq!(stations.age_s(GROUND, 1.0), Some(1.0));
     assert_eq!(stations.age_s(station(7), 1.0), Some(1.0), "it armed the vehicle");
     assert_eq!(stations.age_s(station(250), 1.0), Some(0.0), "the free place went round");
-    // A minute after its last heartbeat a station that is gone makes room.
+    // A minute after its last heartbeat the entry of a station is free.
     stations.accepted(&beat_from(station(9)), 30.0);
     stations.accepted(&beat_from(station(10)), 59.0);
     assert_eq!(stations.age_s(station(10), 59.0), None, "all three are proven, or armed it");
@@ -134,9 +134,9 @@ fn a_flood_of_strangers_pushes_out_no_station_that_has_proved_itself() {
     assert_eq!((stations.age_s(GROUND, 61.0), stations.age_s(station(10), 61.0)), (None, Some(0.0)));
 }
 
-/// The chance that, of so many frames of which each is lost with a chance, so many in a row are.
+/// The probability of a run of lost frames of this length, among frames lost independently with a given probability.
 fn chance_of_a_run(frames: usize, run: usize, lost: f64) -> f64 {
-    // Chance of each number of frames lost last, as long as no run was complete.
+    // Probability of each number of trailing lost frames, while no run is complete.
     let mut lost_last = vec![0.0; run];
     lost_last[0] = 1.0;
     let mut complete = 0.0;
@@ -152,7 +152,7 @@ fn chance_of_a_run(frames: usize, run: usize, lost: f64) -> f64 {
 }
 
 #[test]
-fn the_chance_of_a_run_is_that_of_counting_every_outcome() {
+fn the_probability_of_a_run_equals_that_of_enumerating_all_outcomes() {
     for (frames, run) in [(6, 2), (9, 3), (12, 4)] {
         let with_run = (0_u32..1 << frames).filter(|outcome| {
             let lost = |frame: usize| outcome >> frame & 1 == 1;
@@ -163,13 +163,13 @@ fn the_chance_of_a_run_is_that_of_counting_every_outcome() {
     }
 }
 
-/// A ground station speaks ten times a second while a vehicle is armed. Through air that loses every second frame, a
-/// countdown is then held by chance less than once in a thousand; at one heartbeat a second it would be often.
+/// A ground station sends ten heartbeats a second while a vehicle is armed. On a link that loses every second frame, a
+/// countdown is then held by chance less than once in a thousand; at one heartbeat a second it would happen often.
 #[test]
-fn through_half_lost_air_a_countdown_is_held_by_chance_less_than_once_in_a_thousand() {
+fn with_half_the_frames_lost_a_countdown_is_held_less_than_once_in_a_thousand() {
     const LOST: f64 = 0.5;
     const RATE_HZ: f64 = 10.0;
-    // One fewer than fits, for a frame that comes a little late.
+    // One frame fewer, to allow for a frame that comes a little late.
     let silent_frames = (UPLINK_SILENT_S * RATE_HZ) as usize - 1;
     // The longest countdown that is flown is 5 s; half a minute is safe, too.
     for countdown_s in [5.0, 30.0] {

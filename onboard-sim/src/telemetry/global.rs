@@ -1,4 +1,4 @@
-//! Attitude in angles, and the vehicle on the globe: for other people's clients, whose maps and instruments show these.
+//! Attitude as angles and the position on the globe, for the maps and instruments of other clients.
 
 use mavlink::MessageData as _;
 use protocol::dialect::{
@@ -7,13 +7,13 @@ use protocol::dialect::{
 };
 
 use super::boot_ms;
-use crate::craft::Snapshot;
+use crate::vehicle::Snapshot;
 
-/// Pitch is this close to upright when roll and heading are one and the same rotation: above a sine of 0.99999 (0.26
-/// degrees) a single float does not tell them apart any more.
+/// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees from upright) single
+/// precision cannot separate them.
 const UPRIGHT_SINE: f64 = 0.999_99;
 
-/// The message of this id, or `None` if it is none of these.
+/// The message of this id, or `None` for any other id.
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
     match message_id {
         ATTITUDE_DATA::ID => Some(attitude(snapshot)),
@@ -25,8 +25,8 @@ pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage
     }
 }
 
-/// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, where roll and yaw are one
-/// rotation, all of it is yaw.
+/// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, roll and yaw are the same
+/// rotation, and all of it counts as yaw.
 fn roll_pitch_yaw_rad([w, x, y, z]: &[f64; 4]) -> [f64; 3] {
     let sine = 2.0 * (w * y - x * z);
     if sine.abs() > UPRIGHT_SINE {
@@ -45,8 +45,8 @@ fn wrapped_rad(angle_rad: f64) -> f64 {
     libm::atan2(libm::sin(angle_rad), libm::cos(angle_rad))
 }
 
-/// Where the vehicle points on a compass, degrees from north over east, 0 to 360. A nose that is steeper than 45 degrees
-/// points nowhere on it; its belly does then, as an aircraft's that has pitched up from there.
+/// The compass heading of the vehicle, degrees from north over east, 0 to 360. If the nose is steeper than 45 degrees,
+/// the heading is that of the belly, as for an aircraft that has pitched up from that heading.
 pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
     let nose = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)];
     let belly = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x)];
@@ -74,7 +74,7 @@ fn attitude(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-/// Latitude and longitude, 1e-7 degrees, of a place so far north and east of the pad, m.
+/// Latitude and longitude, 1e-7 degrees, of a point at this distance north and east of the pad, m.
 fn degrees_e7(snapshot: &Snapshot, north_m: f64, east_m: f64) -> (i32, i32) {
     let (latitude_deg, longitude_deg) = snapshot.site.at_deg(north_m, east_m);
     ((1e7 * latitude_deg).round() as i32, (1e7 * longitude_deg).round() as i32)
@@ -101,7 +101,7 @@ fn position(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-/// The pad. Which way the ground slopes there, and from where one would approach it, is not known.
+/// The pad. The slope of the ground and the approach direction are unknown.
 fn home(snapshot: &Snapshot) -> MavMessage {
     let (latitude, longitude) = degrees_e7(snapshot, 0.0, 0.0);
     MavMessage::HOME_POSITION(HOME_POSITION_DATA {
@@ -119,8 +119,8 @@ fn home(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-/// Whether the satellite receiver reports, and where the estimate has the vehicle then: single fixes are not kept. A craft
-/// without sensors has no receiver.
+/// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
+/// kept. A vehicle without sensors has no receiver.
 fn gps(snapshot: &Snapshot) -> MavMessage {
     let [north_m, east_m, down_m] = snapshot.motion.position_m;
     let [north_m_s, east_m_s, _] = snapshot.motion.velocity_m_s;
@@ -156,7 +156,7 @@ fn gps(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-/// No clock on board knows the time of day: nought, as the standard has it.
+/// No clock on board knows the time of day, so the field is zero, as the standard requires.
 fn system_time(snapshot: &Snapshot) -> MavMessage {
     MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(snapshot.time_s) })
 }
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_come_back_from_the_rotation() {
+    fn angles_are_recovered_from_the_rotation() {
         for (yaw, pitch, roll) in
             [(0.0, 0.0, 0.0), (30.0, 20.0, -40.0), (-120.0, 80.0, 10.0), (170.0, -60.0, 5.0)]
         {
@@ -208,7 +208,7 @@ mod tests {
                 assert!(close(found, yaw), "yaw {yaw}, pitch {pitch}: {found}");
             }
         }
-        // A rocket that leans over backwards does not turn round for it.
+        // A rocket that leans over backwards does not change its heading.
         assert!(close(heading_deg(&ned_from_body(75.0 + 180.0, 80.0, 180.0)), 75.0));
     }
 }

@@ -1,6 +1,6 @@
-//! The messages of our own dialect that every craft sends.
+//! The messages of our dialect that every vehicle sends.
 
-use flight::phase::{HoldCause, Interlocks, MotorStatus, Phase};
+use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
@@ -9,7 +9,9 @@ use protocol::dialect::{
 };
 
 use super::{boot_ms, centidegrees, centimetres};
-use crate::craft::{AbortEffect, PATH_POINTS, Snapshot};
+use flight::computer::AbortEffect;
+
+use crate::vehicle::{PATH_POINTS, Snapshot};
 
 pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_ignition_s.map(|since_s| -since_s));
@@ -37,7 +39,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
     })
 }
 
-/// What an abort would do, and the speed of the impact it leads to, m/s, or nought.
+/// What an abort would do, and the speed of the impact it leads to, m/s, or zero.
 fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
     match effect {
         AbortEffect::None => (TdAbortEffect::TD_ABORT_EFFECT_NONE, 0),
@@ -127,8 +129,8 @@ pub(super) fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
     }))
 }
 
-fn td_level(level: flight::controller::ControlLevel) -> TdControlLevel {
-    use flight::controller::ControlLevel as L;
+fn td_level(level: flight::guidance::controller::ControlLevel) -> TdControlLevel {
+    use flight::guidance::controller::ControlLevel as L;
     match level {
         L::Idle => TdControlLevel::TD_CONTROL_LEVEL_IDLE,
         L::Rehearsal => TdControlLevel::TD_CONTROL_LEVEL_REHEARSAL,
@@ -139,8 +141,8 @@ fn td_level(level: flight::controller::ControlLevel) -> TdControlLevel {
     }
 }
 
-fn td_status(status: flight::nmpc::SolveStatus) -> TdSolverStatus {
-    use flight::nmpc::SolveStatus as S;
+fn td_status(status: nmpc::SolveStatus) -> TdSolverStatus {
+    use nmpc::SolveStatus as S;
     match status {
         S::NotRun => TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN,
         S::Converged => TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
@@ -213,19 +215,20 @@ pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
 
 #[cfg(test)]
 mod tests {
-    use flight::nmpc::SolveStatus as S;
-    use flight::profile::Profile;
+    use nmpc::SolveStatus as S;
 
     use super::*;
-    use crate::craft::Craft as _;
-    use crate::scatter::draw;
-    use crate::vehicle::{DeadlinePolicy, Vehicle};
+    use crate::vehicle::Vehicle;
+    use sim::plane::draw::draw;
+    use sim::plane::{DeadlinePolicy, PlanarFlight};
 
-    /// The bits of `checks_failed` follow the order of the vehicle's checks: each bit's name begins its check's.
+    /// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the start of its
+    /// check's name.
     #[test]
     fn the_dialect_names_the_arming_checks_in_their_order() {
-        let profile = Profile::builtin("paper-calibrated").unwrap();
-        let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
+        let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+        let vehicle = Vehicle::in_plane(flight);
         let checks = vehicle.arming_checks();
         let bits: Vec<_> = TdCheck::all().iter_names().collect();
         assert_eq!(bits.len(), checks.len());
@@ -241,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_speed_of_an_impact_is_told_with_it_and_with_nothing_else() {
+    fn only_an_impact_is_sent_with_its_speed() {
         let told = [
             (AbortEffect::None, 0, 0),
             (AbortEffect::SafeOnPad, 1, 0),
@@ -263,7 +266,7 @@ mod tests {
         for phase in Phase::ALL {
             assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
         }
-        for level in flight::controller::ControlLevel::ALL {
+        for level in flight::guidance::controller::ControlLevel::ALL {
             assert_eq!(td_level(level) as u32, u32::from(level.index()));
         }
         for status in [

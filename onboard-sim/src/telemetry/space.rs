@@ -1,6 +1,6 @@
-//! What only a craft in space has to tell: descent, estimator, sensors. And the battery that no craft has.
+//! Messages of the rocket in space only: descent, estimator, sensors; and the battery status, always unknown.
 
-use flight::estimator::{Doubt, Health};
+use flight::estimation::estimator::{Doubt, Health};
 use mavlink::MessageData as _;
 use protocol::dialect::{
     BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA,
@@ -8,9 +8,9 @@ use protocol::dialect::{
 };
 
 use super::boot_ms;
-use crate::craft::{Chute, Snapshot};
+use crate::vehicle::{Chute, Snapshot};
 
-/// The message of this id, or `None` if the craft has none or nothing to say in it.
+/// The message of this id, or `None` if the vehicle has no such message or no data for it.
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
     match message_id {
         TD_DESCENT_DATA::ID => descent(snapshot),
@@ -21,8 +21,8 @@ pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage
     }
 }
 
-/// The sensors that are there, and those of them that are silent. The lidar speaks only close to the ground: its silence
-/// says nothing.
+/// The sensors that exist, and those that are silent. The lidar works only close to the ground, so its silence means
+/// nothing.
 pub(super) fn sensors(snapshot: &Snapshot) -> (MavSysStatusSensor, MavSysStatusSensor) {
     use MavSysStatusSensor as S;
     let mut silent = S::empty();
@@ -65,7 +65,7 @@ fn descent(snapshot: &Snapshot) -> Option<MavMessage> {
     }))
 }
 
-/// Which outputs hold, by what the estimator doubts; its test ratios are not kept, hence unknown.
+/// The outputs that are valid, by the estimator's own doubts; its test ratios are not kept and are sent as unknown.
 fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     let estimator = snapshot.estimator.as_ref()?;
@@ -128,7 +128,7 @@ fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
     }))
 }
 
-/// No battery is modelled, and none is made up: every value is MAVLink's "unknown".
+/// No battery is modelled: every value is MAVLink's "unknown".
 fn battery() -> MavMessage {
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         temperature: i16::MAX,

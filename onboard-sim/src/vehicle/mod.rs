@@ -1,204 +1,337 @@
-//! The flight computer around one simulated vehicle: phases, checks, controller ticks, touchdown.
+//! The simulated vehicle as it meets its crew: a flight that is stepped frame by frame, and what is told of it.
 //!
-//! Pure but for the stopwatch that its caller hands in to time the controller. Time is simulated and moves in
-//! frames ([`Vehicle::frame_s`], 20 ms for a 100 ms sample); a controller tick falls on every few frames.
-//! Its state estimate is the plant's true state and its accelerometer is perfect: sensors are a matter of their own.
+//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]). Both are
+//! flown by the same flight computer. What the run loop needs is here; the radio takes a [`Snapshot`] and the log its
+//! records ([`log`](self::log)).
+//!
+//! Pure but for the stopwatch that its caller hands in to time the flight computer. Time is simulated.
 
-mod craft;
-mod flight_loop;
+mod events;
+mod ground;
+mod log;
+mod sensed;
 mod snapshot;
 #[cfg(test)]
 mod tests;
 
-use flight::arming::{Check, Uplink};
-use flight::controller::{ControllerConfig, ControllerOutput, ControllerState};
-use flight::gate::{GateInput, gate_checks};
-use flight::phase::{Mode, StartPoint};
-use flight::profile::Profile;
-use flight::thrust_estimate::ThrustEstimate;
-use flight::verdict::TouchdownLimits;
+use std::time::Duration;
 
-pub use crate::craft::{Severity, Tick, VehicleEvent};
+use flight::computer::crew::{Answer, Request};
+use flight::computer::news::Severity;
+use flight::computer::{Commander, Computer, Input, LogState, Output};
+use flight::rules::arming::{Check, Uplink};
+use flight::rules::phase::{Mode, Phase};
+use flight::vehicle::profile::StateWeights;
+use protocol::log::computer_v1::ComputerFrame;
+use sim::outside::{Flown, Outside, Watch};
+use sim::plane::PlanarFlight;
+use sim::recipe::Recipe;
+use sim::sortie::{Radio, SetUpError, Sortie};
 
-use crate::craft::{ANSWERING_RAD, Judged, LogState, MotorWatch, Readiness, SelfTest};
-use crate::plant::{Impact, Plant, STEP_S};
-use crate::scatter::Draw;
+pub use self::events::{Tick, VehicleEvent};
+use self::ground::Ground;
+use self::sensed::SensorWatch;
+pub use self::snapshot::{
+    Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS, Path, Prediction,
+    SensorFacts, Snapshot,
+};
+use crate::streams::{FROM_APOGEE, STANDARD, Standard};
 
-/// Frames are at least this long.
-const FRAME_MIN_S: f64 = 0.02;
-/// The landing is rehearsed this often while the vehicle waits on the pad.
-const REHEARSAL_PERIOD_S: f64 = 1.0;
-/// Thrust is believed once it has been sensed for this long: one spike is not a burning motor.
-const THRUST_CONFIRM_S: f64 = 0.04;
-/// Time on the ground after which the flight is over and its controller stands still, s.
-const AT_REST_S: f64 = 1.0;
-
-/// Why a profile cannot be flown here.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum VehicleError {
-    /// The start is not simulated.
-    #[error("profile {profile}: start.at = {at:?} is not simulated; only \"ignition\" is")]
-    Start {
-        /// Profile.
-        profile: String,
-        /// What it asks for.
-        at: StartPoint,
-    },
-    /// The sample time does not fit the plant's step.
-    #[error(
-        "profile {profile}: nmpc.sample_time_s = {sample_time_s}: must be a whole number of milliseconds"
-    )]
-    SampleTime {
-        /// Profile.
-        profile: String,
-        /// What it asks for.
-        sample_time_s: f64,
-    },
+/// Which flight of a rocket in space is flown.
+#[derive(Debug, Clone)]
+pub struct RocketFlight {
+    /// What it is made from.
+    pub recipe: Recipe,
+    pub number: u64,
 }
 
-/// How late outputs are treated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum DeadlinePolicy {
-    /// Simulated time waits: the output is applied and the miss is counted.
-    #[default]
-    Observe,
-    /// As in hardware: a late output is not applied, the previous plan's next command is.
-    Enforce,
+/// The flight under way.
+enum Flight {
+    Space(Box<InSpace>),
+    Plane(Box<PlanarFlight>),
+}
+
+/// A rocket in space, and what its sensors said last.
+struct InSpace {
+    sortie: Sortie,
+    sensors: SensorWatch,
+    /// How long the last plan took, s.
+    took_s: f64,
+    /// A frame of the flight computer was flown in the air just now.
+    flown: bool,
 }
 
 /// One vehicle, one flight.
 pub struct Vehicle {
-    profile: Profile,
-    limits: TouchdownLimits,
-    draw: Draw,
-    plant: Plant,
-    mode: Mode,
-    controller: ControllerState,
-    policy: DeadlinePolicy,
+    flight: Flight,
+    pin_out: bool,
     log: LogState,
     uplink: Uplink,
-    motor_watch: MotorWatch,
-    frame: u64,
-    frames_per_sample: u64,
-    substeps_per_frame: u64,
-    tick: u64,
-    ignition_sample: Option<u64>,
-    output: Option<ControllerOutput>,
-    solve_time_s: f64,
-    thrust: ThrustEstimate,
-    self_test: SelfTest,
-    /// Since when thrust has been felt without a break.
-    thrust_felt_since_s: Option<f64>,
-    readiness: Readiness,
-    /// The gate check that was last complained of.
-    gate_complaint: Option<&'static str>,
-    /// The command that the actuators get at the next sample.
-    next_gimbal_rad: f64,
-    gimbal_applied_rad: f64,
-    fin_command_rad: [f64; 4],
-    /// The last output that came in time, and the ticks missed since.
-    in_time: Option<ControllerOutput>,
-    misses: usize,
-    impacts: Vec<Impact>,
-    verdict: Option<Judged>,
-    events: Vec<VehicleEvent>,
+    commander: Option<Commander>,
+    ground: Ground,
+    /// How long the last tick of the planar vehicle took, s.
+    tick_took_s: f64,
+    /// What the flight computer was given and decided in the last frame; `None` if it was dead.
+    computer_frame: Option<Box<ComputerFrame>>,
+    /// How many frames it has decided.
+    frames_decided: u64,
+    /// A frame that was recorded has what the rehearsal came to.
+    rehearsed: bool,
+}
+
+/// Times the flight computer, and takes down what it was given and decided.
+struct Watcher<'a> {
+    stopwatch: &'a mut dyn FnMut() -> Duration,
+    rehearsed_before: bool,
+    frame: Option<Box<ComputerFrame>>,
+}
+
+impl Watch for Watcher<'_> {
+    fn now(&mut self) -> Duration {
+        (self.stopwatch)()
+    }
+
+    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
+        let frame = tick_log::computer::frame_to_log(input, output, computer, self.rehearsed_before);
+        self.frame = Some(Box::new(frame));
+    }
+}
+
+/// What a frame has brought.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    /// What has happened, in order.
+    pub events: Vec<VehicleEvent>,
+    /// An answer to each request, in order; none while the flight computer is dead.
+    pub answers: Vec<Answer>,
 }
 
 impl Vehicle {
-    /// A vehicle powered up in its rig.
+    /// A rocket powered up on its pad.
     ///
     /// # Errors
-    /// The profile asks for something this simulation does not do.
-    pub fn new(
-        profile: &Profile,
-        draw: Draw,
-        policy: DeadlinePolicy,
-    ) -> std::result::Result<Self, VehicleError> {
-        if profile.start.at != StartPoint::Ignition {
-            return Err(VehicleError::Start { profile: profile.name.clone(), at: profile.start.at });
-        }
-        let sample_time_s = profile.nmpc.sample_time_s;
-        let substeps = (sample_time_s / STEP_S).round();
-        if substeps < 1.0 || (substeps * STEP_S - sample_time_s).abs() > 1e-9 {
-            return Err(VehicleError::SampleTime { profile: profile.name.clone(), sample_time_s });
-        }
-        let substeps = substeps as u64;
-        let shortest = (FRAME_MIN_S / STEP_S).round() as u64;
-        let substeps_per_frame =
-            (shortest..=substeps).find(|length| substeps.is_multiple_of(*length)).unwrap_or(substeps);
-        let config = ControllerConfig::from_profile(profile);
-        Ok(Self {
-            limits: TouchdownLimits::from_profile(profile),
-            plant: Plant::new(profile, &draw),
-            mode: Mode::power_up(0.0),
-            controller: ControllerState::new(&config),
-            policy,
-            log: LogState { running: false, space_bytes: 0 },
+    /// The flight cannot be set up.
+    pub fn in_space(flight: &RocketFlight) -> Result<Self, SetUpError> {
+        let sortie = Sortie::on_the_pad(&flight.recipe, flight.number)?;
+        let in_space = InSpace { sortie, sensors: SensorWatch::default(), took_s: 0.0, flown: false };
+        Ok(Self::of(Flight::Space(Box::new(in_space))))
+    }
+
+    /// The planar vehicle powered up in its rig.
+    pub fn in_plane(flight: PlanarFlight) -> Self {
+        Self::of(Flight::Plane(Box::new(flight)))
+    }
+
+    fn of(flight: Flight) -> Self {
+        Self {
+            flight,
+            pin_out: false,
+            log: LogState::NONE,
             uplink: Uplink::NotNeeded,
-            motor_watch: MotorWatch::default(),
-            frame: 0,
-            frames_per_sample: substeps / substeps_per_frame,
-            substeps_per_frame,
-            tick: 0,
-            ignition_sample: None,
-            output: None,
-            solve_time_s: 0.0,
-            thrust: ThrustEstimate::default(),
-            self_test: SelfTest::NotBegun,
-            thrust_felt_since_s: None,
-            readiness: Readiness::default(),
-            gate_complaint: None,
-            next_gimbal_rad: 0.0,
-            gimbal_applied_rad: 0.0,
-            fin_command_rad: [profile.fins.closed_rad(); 4],
-            in_time: None,
-            misses: 0,
-            impacts: Vec::new(),
-            verdict: None,
-            events: Vec::new(),
-            profile: profile.clone(),
-            draw,
-        })
+            commander: None,
+            ground: Ground::default(),
+            tick_took_s: 0.0,
+            computer_frame: None,
+            frames_decided: 0,
+            rehearsed: false,
+        }
+    }
+
+    /// Moves the pin that a crew moves by hand.
+    pub fn set_pin_out(&mut self, pin_out: bool) {
+        self.pin_out = pin_out;
+    }
+
+    /// Tells the vehicle how its log fares.
+    pub fn set_log_state(&mut self, log: LogState) {
+        self.log = log;
+    }
+
+    /// Tells the vehicle how well it hears, and the station that armed it, if one did.
+    pub fn set_uplink(&mut self, uplink: Uplink, commander: Option<Commander>) {
+        self.uplink = uplink;
+        self.commander = commander;
+    }
+
+    /// Advances by one frame, in which these requests are decided. `stopwatch` is any clock; only differences of it are
+    /// used, to time the flight computer.
+    pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> Frame {
+        let outside = Outside {
+            pin_out: self.pin_out,
+            log: self.log,
+            uplink: self.uplink,
+            commander: self.commander,
+            requests,
+        };
+        let mut watcher = Watcher { stopwatch, rehearsed_before: self.rehearsed, frame: None };
+        let Flown { output, took } = match &mut self.flight {
+            Flight::Space(space) => space.sortie.step_with(&outside, &mut watcher),
+            Flight::Plane(flight) => flight.step_with(&outside, &mut watcher),
+        };
+        self.computer_frame = watcher.frame;
+        self.frames_decided += u64::from(self.computer_frame.is_some());
+        self.rehearsed |= self.computer().rehearsed().is_some();
+        let mut events = Vec::new();
+        let (mut released, mut answers) = (false, Vec::new());
+        if let Some(output) = output {
+            events.extend(output.news.into_iter().map(VehicleEvent::from));
+            let took_s = took.as_secs_f64();
+            if let Some(tick) = output.tick {
+                self.tick_took_s = took_s;
+                events.push(VehicleEvent::Tick(Box::new(Tick {
+                    tick: *tick,
+                    solve_time_s: took_s,
+                    deadline_s: self.deadline_s(),
+                })));
+            } else if output.planned {
+                events.extend(self.planned(took_s));
+            }
+            (released, answers) = (output.released, output.answers);
+        }
+        if let Flight::Space(space) = &mut self.flight {
+            let flying = space.sortie.computer().released_at_s().is_some();
+            space.flown = flying && !released && !self.ground.is_over(space.sortie.computer());
+            if let Some(measured) = space.sortie.measured() {
+                space.sensors.take(measured, space.sortie.frame());
+            }
+        }
+        events.extend(self.told_by_the_simulation(released, took));
+        Frame { events, answers }
+    }
+
+    /// A frame of a rocket's pilot with a plan in it.
+    fn planned(&mut self, took_s: f64) -> Option<VehicleEvent> {
+        let Flight::Space(space) = &mut self.flight else { return None };
+        space.took_s = took_s;
+        let (input, _) = space.sortie.computer().piloted()?;
+        let (frame, time_s, deadline_s) = (input.frame, input.time_s, flight::computer::FRAME_S);
+        Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s })
+    }
+
+    /// What only the simulation knows: where a flight begins, contact with the ground, a late output, the verdict.
+    fn told_by_the_simulation(&mut self, released: bool, took: Duration) -> Vec<VehicleEvent> {
+        let mut said = Vec::new();
+        match &self.flight {
+            Flight::Space(space) if released => {
+                let height_m = space.sortie.world().height_m();
+                let words =
+                    format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
+                said.push(VehicleEvent::Text { severity: Severity::Notice, text: words });
+            }
+            Flight::Plane(flight)
+                if flight.was_late() && self.tick_took_s.to_bits() == took.as_secs_f64().to_bits() =>
+            {
+                let words = format!("deadline missed by {:.3} s", took.as_secs_f64() - flight.deadline_s());
+                said.push(VehicleEvent::Text { severity: Severity::Warning, text: words });
+            }
+            Flight::Space(_) | Flight::Plane(_) => {}
+        }
+        said.extend(match &self.flight {
+            Flight::Space(space) if !released => self.ground.watch_space(&space.sortie),
+            Flight::Space(_) => Vec::new(),
+            Flight::Plane(flight) => self.ground.watch_plane(flight),
+        });
+        said
+    }
+
+    /// Its flight computer.
+    pub fn computer(&self) -> &Computer {
+        match &self.flight {
+            Flight::Space(space) => space.sortie.computer(),
+            Flight::Plane(flight) => flight.computer(),
+        }
+    }
+
+    /// Simulated time since power-up, s.
+    pub fn time_s(&self) -> f64 {
+        match &self.flight {
+            Flight::Space(space) => flight::computer::flight_time_s(space.sortie.frame()),
+            Flight::Plane(flight) => flight.time_s(),
+        }
     }
 
     /// Length of a frame, s.
     pub fn frame_s(&self) -> f64 {
-        self.profile.nmpc.sample_time_s / self.frames_per_sample as f64
+        match &self.flight {
+            Flight::Space(_) => flight::computer::FRAME_S,
+            Flight::Plane(flight) => flight.frame_s(),
+        }
     }
 
-    /// The ignition gate's checks with the values found now.
-    pub fn gate_checks(&self) -> Vec<Check> {
-        let state = self.plant.state();
-        let predicted = self.output.as_ref();
-        let input = GateInput {
-            tilt_rad: state.theta_rad - core::f64::consts::FRAC_PI_2,
-            vertical_speed_m_s: state.ground_velocity_m_s().1,
-            pitch_rate_rad_s: state.q_rad_s,
-            speed_m_s: state.speed_m_s(),
-            predicted_speed_m_s: self.profile.start.planar_state().speed_m_s(),
-            // One height source: the truth.
-            height_disagreement_m: 0.0,
-            landing_feasible: predicted.is_some_and(|output| output.solver.landing_feasible),
-            predicted_touchdown_x_m: predicted
-                .map_or(f64::NAN, |output| output.predicted_touchdown.state.x_m),
-            // Released at ignition, the fins open with the release; their confirmation belongs to the descent.
-            fins_confirmed: true,
-            parachute_stowed: true,
-            igniter_continuity: self.ignition_sample.is_none(),
-            estimator_healthy: state.is_finite(),
-        };
-        gate_checks(&self.profile.gate, &input)
+    /// How long the flight computer may take over a plan or a tick, s.
+    fn deadline_s(&self) -> f64 {
+        match &self.flight {
+            Flight::Space(_) => flight::computer::FRAME_S,
+            Flight::Plane(flight) => flight.deadline_s(),
+        }
     }
 
-    /// Fins that have come to their commanded angle.
-    fn fins_answering(&self) -> [bool; 4] {
-        let (commanded, actual) = self.plant.fins_rad();
-        std::array::from_fn(|fin| (commanded[fin] - actual[fin]).abs() <= ANSWERING_RAD)
+    /// Phase, latches and countdown.
+    pub fn mode(&self) -> &Mode {
+        self.computer().mode()
     }
 
-    /// Whether gimbal and fins have come to their commanded angles.
-    fn actuators_answer(&self) -> bool {
-        let (commanded, actual) = self.plant.gimbal_rad();
-        (commanded - actual).abs() <= ANSWERING_RAD && self.fins_answering() == [true; 4]
+    pub fn phase(&self) -> Phase {
+        self.mode().phase
+    }
+
+    /// Whether an abort has been accepted.
+    pub fn aborted(&self) -> bool {
+        self.mode().interlocks.abort_latched
+    }
+
+    /// Whether nothing more will happen in this flight: it lies on the ground and is judged, or was aborted on the pad.
+    pub fn is_over(&self) -> bool {
+        self.ground.is_over(self.computer())
+    }
+
+    /// The arming checks with the values found now.
+    pub fn arming_checks(&self) -> Vec<Check> {
+        self.computer().arming_checks()
+    }
+
+    /// Arming checks pass after this long, s, or never will. The rehearsal of a long flight takes its time.
+    pub fn ready_within_s(&self) -> f64 {
+        match &self.flight {
+            Flight::Space(_) => 10.0,
+            Flight::Plane(_) => 3.0,
+        }
+    }
+
+    /// Every message that is sent unasked.
+    pub fn standard(&self) -> &'static [Standard] {
+        match &self.flight {
+            Flight::Space(_) => &FROM_APOGEE,
+            Flight::Plane(_) => &STANDARD,
+        }
+    }
+
+    /// Weights of the landing cost.
+    pub fn weights(&self) -> StateWeights {
+        match &self.flight {
+            Flight::Space(space) => space.sortie.mission().powered.weights,
+            Flight::Plane(flight) => flight.plane().profile().nmpc.weights,
+        }
+    }
+
+    /// The touchdown limits with the values found, once it is judged; of a rocket in space by what the legs take.
+    pub fn judged(&self) -> Option<Judged> {
+        self.ground.judged()
+    }
+
+    /// The landing by the landing paper's Table 2, where [`Vehicle::judged`] goes by what the legs take.
+    pub fn judged_by_table_2(&self) -> Option<Judged> {
+        self.ground.judged_by_table_2()
+    }
+
+    /// What the radio does to what is sent and heard.
+    pub fn radio(&self) -> Radio {
+        match &self.flight {
+            Flight::Space(space) => {
+                let radio = *space.sortie.radio();
+                Radio { silent: radio.silent || space.sortie.computer_is_dead(), ..radio }
+            }
+            Flight::Plane(_) => Radio::default(),
+        }
     }
 }

@@ -1,18 +1,23 @@
-//! Controller ticks between the flight code's types and the log's records, without losing a bit.
+//! Flights as log records, and back, without losing a bit.
 //!
-//! The flight code knows nothing of logs and the log nothing of the flight code; whoever writes or replays
-//! a log goes through here.
+//! The flight code knows nothing of logs and the log nothing of the flight code. Whoever writes or replays a log uses this
+//! crate.
 //!
-//! [`pilot`] does the same for the flight computer from apogee to touchdown.
-#![warn(missing_docs)]
+//! * [`computer`]: the flight computer's frames from power-up on, of both vehicles.
+//! * [`pilot`]: the frames of a rocket in space from its release on.
+//! * here: the ticks of the planar vehicle's landing controller, and its plant.
+//! * [`sortie`]: a simulated flight of a rocket as records, with the truth beside it.
 
+pub mod computer;
 pub mod pilot;
+pub mod sortie;
 
-use flight::controller::{ControllerInput, ControllerOutput, Plan};
-use flight::dynamics::PlanarState;
-use flight::phase::Phase;
-use flight::verdict::LandingVerdict;
+use flight::guidance::controller::{ControllerInput, ControllerOutput, Plan};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::LandingVerdict;
+use flight::vehicle::dynamics::PlanarState;
 use protocol::log::v1;
+use sim::plane::PlanarFlight;
 
 /// Why a recorded tick cannot be given to this build's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -20,7 +25,6 @@ pub enum TickLogError {
     /// The phase's number has no meaning in this build.
     #[error("tick {tick}: phase {phase} is unknown; this build knows 0 to {}", Phase::ALL.len() - 1)]
     UnknownPhase {
-        /// The tick.
         tick: u64,
         /// The number found.
         phase: u32,
@@ -117,7 +121,7 @@ pub fn output_to_log(output: &ControllerOutput) -> v1::ControllerOutput {
 }
 
 /// A whole tick as a record. `state_digest` is the controller's
-/// [digest](flight::controller::ControllerState::digest) after the tick; the two times are measurements.
+/// [digest](flight::guidance::controller::ControllerState::digest) after the tick; the two times are measurements.
 pub fn tick_to_log(
     input: &ControllerInput,
     output: &ControllerOutput,
@@ -158,6 +162,24 @@ fn plan_to_log(plan: &Plan) -> v1::Plan {
         gimbal_rad: plan.used_gimbal_rad().to_vec(),
         starts_in_s: plan.starts_in_s,
         step_s: plan.step_s,
+    }
+}
+
+/// The true planar vehicle after a frame, as a record.
+pub fn plant_truth(flight: &PlanarFlight) -> v1::PlantTruth {
+    let plant = flight.plant();
+    let (gimbal_rad, fins_rad) = (plant.gimbal_rad(), plant.fins_rad());
+    v1::PlantTruth {
+        time_s: flight.time_s(),
+        phase: u32::from(flight.computer().mode().phase.index()),
+        state: state_to_log(&plant.state()),
+        gimbal_commanded_rad: gimbal_rad.0,
+        gimbal_actual_rad: gimbal_rad.1,
+        fin_commanded_rad: fins_rad.0.to_vec(),
+        fin_actual_rad: fins_rad.1.to_vec(),
+        thrust_n: plant.thrust_n(),
+        mass_kg: plant.mass_kg(),
+        in_contact: plant.in_contact(),
     }
 }
 

@@ -1,10 +1,12 @@
 //! Frames of the flight computer between its own types and the log's records, bit for bit.
 
-use flight::controller::ControlLevel;
-use flight::estimator::{Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas};
-use flight::phase::Phase;
-use flight::pilot::{PilotInput, PilotOutput, Sensed};
-use flight::rigid::RigidState;
+use flight::computer::pilot::{PilotInput, PilotOutput, Sensed};
+use flight::estimation::estimator::{
+    Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
+};
+use flight::guidance::controller::ControlLevel;
+use flight::rules::phase::Phase;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use protocol::log::flight_v1 as v1;
 
@@ -14,7 +16,6 @@ pub enum PilotLogError {
     /// A number has no meaning in this build.
     #[error("frame {frame}: {what} {found} is unknown; this build knows 0 to {most}")]
     Unknown {
-        /// The frame.
         frame: u64,
         /// What it is a number of.
         what: &'static str,
@@ -26,9 +27,7 @@ pub enum PilotLogError {
     /// A list has the wrong length.
     #[error("frame {frame}: {what} has {found} values and should have {should}")]
     Length {
-        /// The frame.
         frame: u64,
-        /// What.
         what: &'static str,
         /// How many there are.
         found: usize,
@@ -36,11 +35,10 @@ pub enum PilotLogError {
         should: usize,
     },
     /// Neither measurements nor a known state, or both.
-    #[error("frame {frame}: needs either measurements or a known state")]
-    Sensed {
-        /// The frame.
-        frame: u64,
-    },
+    #[error(
+        "frame {frame}: needs measurements, a known state or what the planar vehicle senses, and one of them only"
+    )]
+    Sensed { frame: u64 },
 }
 
 const DOUBTS: [Doubt; 7] = [
@@ -258,12 +256,16 @@ pub fn output_from_log(output: &v1::PilotOutput, frame: u64) -> Result<PilotOutp
     })
 }
 
-fn list<const N: usize>(values: &[f64], frame: u64, what: &'static str) -> Result<[f64; N], PilotLogError> {
+pub(crate) fn list<const N: usize>(
+    values: &[f64],
+    frame: u64,
+    what: &'static str,
+) -> Result<[f64; N], PilotLogError> {
     let wrong = |_| PilotLogError::Length { frame, what, found: values.len(), should: N };
     values.try_into().map_err(wrong)
 }
 
-/// A whole frame as a record. `state_digest` is the pilot's [digest](flight::pilot::Pilot::digest) after it.
+/// A whole frame as a record. `state_digest` is the pilot's [digest](flight::computer::pilot::Pilot::digest) after it.
 pub fn tick_to_log(input: &PilotInput, output: &PilotOutput, state_digest: u64) -> v1::PilotTick {
     v1::PilotTick { input: input_to_log(input), output: output_to_log(output), state_digest }
 }

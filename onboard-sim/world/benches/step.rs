@@ -1,13 +1,12 @@
-//! What a millisecond of the world costs, and a whole fall with its landing burn.
+//! Times a millisecond of the world, and a whole fall with its landing burn.
 //!
 //! `cargo bench -p world`.
 #![expect(clippy::expect_used, reason = "a bench without its built-in vehicle cannot run")]
 
 use core::f64::consts::FRAC_PI_2;
 
-use flight::airframe::Airframe;
-use flight::motors;
-use flight::rigid::RigidState;
+use flight::vehicle::rigid::RigidState;
+use vehicles::motors;
 use world::{Actuators, Truth, World};
 
 fn main() {
@@ -15,7 +14,7 @@ fn main() {
 }
 
 fn windy(height_m: f64) -> World {
-    let airframe = Airframe::builtin("mk2").expect("built in");
+    let airframe = vehicles::airframe::builtin("mk2").expect("built in");
     let motor = motors::builtin(&airframe.motor).expect("built in");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
     World::new(&airframe, &motor, &truth, &RigidState::upright(height_m), 1)
@@ -26,7 +25,7 @@ fn windy(height_m: f64) -> World {
 const OPEN: Actuators =
     Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
 
-/// A thousand steps of the fall, in wind and gusts: a microsecond of the table is a nanosecond a step.
+/// A thousand steps of the fall, in wind and gusts: a microsecond in the table is a nanosecond per step.
 #[divan::bench]
 fn a_thousand_steps_in_the_air(bencher: divan::Bencher) {
     bencher.with_inputs(|| windy(500.0)).bench_refs(|world| world.advance(&OPEN, 1000));

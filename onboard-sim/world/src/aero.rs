@@ -1,12 +1,12 @@
-//! The air's force on body, fins and parachute, each from the air's own motion at the place where it acts.
+//! The force of the air on body, fins and parachute, each computed from the relative wind where it acts.
 //!
-//! Because rotation moves those places, damping comes out by itself, and so does static stability: the fins drag behind
-//! the centre of gravity of a vehicle that falls tail first. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
-//! (coefficients, areas, radius), with the force turned into the local wind; the body follows its Eq. 8 along the axis and
-//! the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3).
+//! Rotation changes the wind at those places, so the model contains damping. It contains static stability, too: in a
+//! tail-first fall the fins drag behind the centre of gravity. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
+//! (coefficients, areas, radius), with the force turned into the local wind. The body follows the paper's Eq. 8 along
+//! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3).
 
-use flight::airframe::Airframe;
-use flight::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
+use flight::vehicle::airframe::Airframe;
+use flight::vehicle::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
 use nalgebra::Vector3;
 
 /// Strips of the body's crossflow.
@@ -38,7 +38,7 @@ pub(crate) struct Flow {
     pub(crate) rate_rad_s: Vector3<f64>,
 }
 
-/// What of the shape moves.
+/// The parts of the shape that move.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Configuration {
     /// Sines of the fins' opening angles.
@@ -68,7 +68,7 @@ impl Load {
 }
 
 impl Shape {
-    /// The shape of an airframe, with all its forces scaled.
+    /// The shape of an airframe; all its forces are scaled.
     pub(crate) fn new(airframe: &Airframe, scale: f64) -> Self {
         let body = &airframe.body;
         let strip_m = body.length_m / STRIPS as f64;
@@ -84,7 +84,7 @@ impl Shape {
         }
     }
 
-    /// Everything the air does.
+    /// The total force and moment of the air.
     pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
         let half_density = 0.5 * self.scale * flow.density_kg_m3;
         let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;

@@ -1,6 +1,6 @@
 //! The rigid body: its equations of motion and their integrator.
 
-use flight::rigid::RigidState;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::aero::Load;
@@ -13,13 +13,13 @@ pub(crate) struct Inertia {
     pub(crate) roll_kg_m2: f64,
 }
 
-/// What acts on the body, by state and by share of the step (0, 1/2 or 1).
+/// The force and moment on the body at a state and a fraction of the step (0, 1/2 or 1).
 pub(crate) trait Loads {
     /// Force without gravity, and moment about the centre of gravity, in body axes.
     fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load;
 }
 
-/// The motion's rate of change.
+/// Time derivative of the state.
 #[derive(Clone, Copy)]
 struct Rates {
     velocity: Vector3<f64>,
@@ -29,8 +29,8 @@ struct Rates {
     specific_force: Vector3<f64>,
 }
 
-/// One classical Runge-Kutta step of a length, s, under gravity, m/s^2. Answers with the state after it and the mean
-/// specific force over it in body axes, m/s^2: what an ideal accelerometer at the centre of gravity gathers.
+/// One classical Runge-Kutta step of a length, s, under gravity, m/s^2. Returns the state after the step and the mean
+/// specific force over it in body axes, m/s^2, which is what an ideal accelerometer at the centre of gravity measures.
 pub(crate) fn rk4_step(
     state: &RigidState,
     inertia: &Inertia,
@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates turn at (1 - I_x/I) p.
+    /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates rotate at (1 - I_x/I) p.
     #[test]
     fn val_euler_torque_free_precession() {
         let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02 };

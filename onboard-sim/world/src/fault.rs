@@ -1,4 +1,4 @@
-//! What can break in flight. A fault acts from the step after it is injected, and stays.
+//! The faults that can occur in flight. A fault acts from the step after its injection and never ends.
 
 use serde::Deserialize;
 
@@ -8,14 +8,14 @@ use serde::Deserialize;
 pub enum Fault {
     /// The motor never lights.
     NoLight,
-    /// The motor lights later than it should.
+    /// The motor lights late.
     LateLight {
         /// Added to the ignition delay, s.
         delay_s: f64,
     },
     /// The motor has less impulse, in the same time.
     WeakMotor {
-        /// Thrust over what it would be.
+        /// Thrust, as a fraction of the thrust without the fault.
         scale: f64,
     },
     /// The motor goes out.
@@ -23,16 +23,16 @@ pub enum Fault {
         /// Time since the first thrust, s.
         after_s: f64,
     },
-    /// Both gimbal axes stay where they are.
+    /// Both gimbal axes are stuck.
     GimbalStuck,
     /// The gimbal servos turn slowly.
     GimbalSlow {
-        /// Rate over what it would be.
+        /// Rate, as a fraction of the rate without the fault.
         scale: f64,
     },
-    /// One fin stays where it is.
+    /// One fin is stuck.
     FinStuck {
-        /// Which, 0 to 3; another number breaks nothing.
+        /// The fin, 0 to 3; another number has no effect.
         fin: usize,
     },
 }

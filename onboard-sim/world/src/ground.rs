@@ -1,16 +1,17 @@
-//! The ground: flat, level, at height 0. Four legs, springs with dampers, whose feet rub; what else touches is broken.
+//! The ground: flat, level, at height 0. The four legs are springs with dampers, and their feet have friction. The
+//! vehicle is broken if any other part touches the ground.
 
-use flight::airframe::Airframe;
-use flight::rigid::RigidState;
+use flight::vehicle::airframe::Airframe;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
 
 use crate::aero::Load;
 
-/// Sliding speed below which friction fades out, m/s: a foot at rest rubs in no direction.
+/// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no direction.
 const SLIDING_M_S: f64 = 0.05;
-/// Tilt from which nothing comes back, rad: 45 degrees.
+/// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
 const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
-/// A vehicle slower than this, m/s and rad/s, with three feet down, for this time, s, has come to rest.
+/// A vehicle with three feet on the ground that is slower than this, m/s and rad/s, for this time, s, is at rest.
 const STILL_M_S: f64 = 0.03;
 const STILL_RAD_S: f64 = 0.05;
 const STILL_S: f64 = 0.3;
@@ -20,7 +21,7 @@ const STILL_S: f64 = 0.3;
 pub struct Touchdown {
     /// Time since the start, s.
     pub time_s: f64,
-    /// The last state free of contact, a quarter of a millisecond before at most.
+    /// The last state before contact, at most a quarter of a millisecond earlier.
     pub state: RigidState,
     /// Vertical velocity of the centre of gravity, up, m/s.
     pub vertical_m_s: f64,
@@ -32,24 +33,22 @@ pub struct Touchdown {
     pub rate_rad_s: f64,
     /// Size of the rotation rate across the axis (pitch and yaw), rad/s.
     pub cross_rate_rad_s: f64,
-    /// Thrust, N.
     pub thrust_n: f64,
-    /// Weight, N.
     pub weight_n: f64,
 }
 
-/// How a vehicle ended.
+/// How a vehicle came to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
     /// Time since the start, s.
     pub time_s: f64,
-    /// Upright, or how not.
+    /// Whether it stands, tipped over or struck the ground.
     pub outcome: RestOutcome,
     /// Angle between nose and vertical, rad.
     pub tilt_rad: f64,
 }
 
-/// Upright, or how not.
+/// How a vehicle comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestOutcome {
     /// Standing on its legs.
@@ -60,15 +59,15 @@ pub enum RestOutcome {
     BodyStrike,
 }
 
-/// The legs and hull of a vehicle, as places from its centre of gravity in body axes.
+/// Positions of a vehicle's legs and hull relative to its centre of gravity, in body axes.
 #[derive(Debug, Clone)]
 pub(crate) struct Ground {
     stiffness_n_m: f64,
     damping_n_s_m: f64,
     friction: f64,
-    /// Feet from the nozzle exit, m.
+    /// Positions of the feet relative to the nozzle exit, m.
     feet_m: [Vector3<f64>; 4],
-    /// Rims of nozzle end and nose from the nozzle exit, m.
+    /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
     hull_m: [Vector3<f64>; 8],
     still_s: f64,
 }
@@ -104,7 +103,7 @@ impl Ground {
         }
     }
 
-    /// Height of the lowest place of the vehicle above the ground, m.
+    /// Height of the vehicle's lowest point above the ground, m.
     pub(crate) fn clearance_m(&self, state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
         let up_in_body = state.world_from_body.inverse_transform_vector(&Vector3::z());
         let lowest = |places: &[Vector3<f64>]| {
@@ -123,7 +122,7 @@ impl Ground {
         }
     }
 
-    /// Adds what the ground does to the feet.
+    /// Adds the forces of the ground on the feet.
     pub(crate) fn add_load(
         &self,
         load: &mut Load,
@@ -147,8 +146,8 @@ impl Ground {
         }
     }
 
-    /// Whether the vehicle's way ends here, after another time on the ground, s. A motor that still carries half the
-    /// weight has not let go.
+    /// Takes a further time on the ground, s, and returns how the vehicle came to rest, if it has. It is not at rest
+    /// while the thrust still carries half the weight.
     pub(crate) fn outcome(
         &mut self,
         state: &RigidState,

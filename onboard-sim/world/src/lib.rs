@@ -1,15 +1,15 @@
-//! The simulated truth: a rigid rocket in wind, its actuators, its sensors and the ground.
+//! Simulates the physical truth: a rigid rocket in wind, its actuators, its sensors and the ground.
 //!
-//! Pure like `flight`: time is a count of steps, chance is a seed, and the same arguments give the same bits on any
-//! machine. The flight code sees of it only what `sensors` measures. Frames are those of [`flight::rigid`].
+//! The crate is pure, like `flight`: time is a count of steps, random numbers come from a seed, and the same arguments
+//! give the same bits on any machine. The flight code sees only what `sensors` measures. Frames are those of
+//! [`flight::vehicle::rigid`].
 //!
-//! * [`truth`]: how one true vehicle and its day differ from the data.
+//! * [`world`]: all parts together, one millisecond at a time.
+//! * `body`, `aero`, `motor`, `servo`, `parachute`, [`ground`]: the parts, one model each.
+//! * [`wind`]: the mean wind over height, and gusts.
+//! * [`sensors`]: the measurements that the flight computer gets.
+//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data.
 //! * [`fault`]: what can break in flight.
-//! * [`world`]: everything together, one millisecond at a time.
-//! * `body`, `aero`, `motor`, `servo`, `parachute`, `ground`: the parts, each on its own.
-//! * [`sensors`]: what the flight computer is given of it all.
-//! * [`wind`]: the mean wind over height and the gusts in it.
-#![warn(missing_docs)]
 
 mod aero;
 mod body;

@@ -1,6 +1,6 @@
-//! The landing motor as it truly burns: `T(t) = s/b T0(t/b)` for impulse scale s and burn-time scale b.
+//! The true landing motor: `T(t) = s/b T0(t/b)` for impulse scale s and burn-time scale b.
 
-use flight::thrust_curve::ThrustCurve;
+use flight::vehicle::thrust_curve::ThrustCurve;
 
 use crate::fault::Fault;
 use crate::truth::Truth;
@@ -12,7 +12,7 @@ pub(crate) struct Motor {
     impulse_scale: f64,
     burn_time_scale: f64,
     ignition_delay_s: f64,
-    /// When the ignition command came, s.
+    /// Time of the ignition command, s.
     commanded_s: Option<f64>,
     no_light: bool,
     out_after_s: f64,
@@ -31,10 +31,10 @@ impl Motor {
         }
     }
 
-    /// This motor with the curve and scales of `after`; `before` is the truth that its own came from. What broke it stays
-    /// broken, by the same share and delay.
+    /// This motor with the curve and scales of `after`; `before` is the truth that it was built from. Faults stay, with
+    /// the same factor and delay.
     pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
-        // What has not changed keeps its bits.
+        // Unchanged values keep their bits.
         let impulse_scale = if after.impulse_scale.to_bits() == before.impulse_scale.to_bits() {
             self.impulse_scale
         } else {
@@ -54,12 +54,12 @@ impl Motor {
         }
     }
 
-    /// The igniter is fired; only the first command counts.
+    /// Fires the igniter; only the first command counts.
     pub(crate) fn ignite(&mut self, time_s: f64) {
         self.commanded_s.get_or_insert(time_s);
     }
 
-    /// When the thrust begins, s; `None` as long as nothing was commanded, and for a motor that does not light.
+    /// When the thrust begins, s; `None` before the command, and for a motor that does not light.
     pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
         self.commanded_s.filter(|_| !self.no_light).map(|commanded_s| commanded_s + self.ignition_delay_s)
     }
@@ -78,12 +78,12 @@ impl Motor {
         self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s)
     }
 
-    /// Propellant burnt up to a time, kg: that which a motor gone out keeps is not counted.
+    /// Propellant burnt up to a time, kg. After an early burn-out the unburnt rest is not counted.
     pub(crate) fn burnt_kg(&self, time_s: f64) -> f64 {
         self.curve.propellant_burnt_kg(self.curve_time_s(time_s).min(self.out_after_s / self.burn_time_scale))
     }
 
-    /// Propellant burnt for each newton second, kg: mass flow over thrust.
+    /// Propellant burnt for each newton second, kg: the mass flow divided by the thrust.
     pub(crate) fn flow_kg_n_s(&self) -> f64 {
         self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
     }
@@ -105,7 +105,7 @@ mod tests {
 
     /// 1 s up to 40 N, 2 s level, 1 s down: 120 N s, 0.12 kg.
     fn curve() -> ThrustCurve {
-        ThrustCurve::from_rasp("T 38 200 0 0.12 0.3 M\n1 40\n3 40\n4 0").unwrap()
+        vehicles::thrust_curve::from_rasp("T 38 200 0 0.12 0.3 M\n1 40\n3 40\n4 0").unwrap()
     }
 
     fn motor(truth: &Truth) -> Motor {

@@ -1,6 +1,7 @@
-//! The parachute: ejected by command, taut after a delay, filling with the distance fallen through the air.
+//! The parachute: it is ejected by command, its lines are taut after a delay, and then it fills with the distance
+//! fallen through the air.
 
-use flight::airframe::Parachute as ParachuteData;
+use flight::vehicle::airframe::Parachute as ParachuteData;
 
 use crate::STEP_S;
 
@@ -16,7 +17,7 @@ impl Parachute {
         Self { data: *data, commanded_s: None, travelled_m: 0.0 }
     }
 
-    /// Throws the parachute out; only the first command counts.
+    /// Ejects the parachute; only the first command counts.
     pub(crate) fn eject(&mut self, time_s: f64) {
         self.commanded_s.get_or_insert(time_s);
     }
@@ -32,14 +33,13 @@ impl Parachute {
         }
     }
 
-    /// Share of the canopy that is open, 0 to 1. The area grows with the square of the distance: the canopy's mouth
-    /// widens evenly while it swallows a given length of air.
+    /// Fraction of the canopy that is open, 0 to 1. The area grows with the square of the distance, because the
+    /// diameter of the canopy grows linearly with it.
     pub(crate) fn open_share(&self) -> f64 {
         let filled = (self.travelled_m / self.data.inflation_distance_m).min(1.0);
         filled * filled
     }
 
-    /// Drag area, m^2.
     pub(crate) fn drag_area_m2(&self) -> f64 {
         self.data.area_m2 * self.data.drag_coefficient * self.open_share()
     }
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn opens_after_delay_and_distance() {
+    fn the_canopy_opens_after_delay_and_distance() {
         let data = ParachuteData {
             area_m2: 2.0,
             drag_coefficient: 0.8,

@@ -1,6 +1,6 @@
 //! A servo: a pure delay, a rate limit, stops, and play between horn and load.
 
-use flight::airframe::Servo as ServoData;
+use flight::vehicle::airframe::Servo as ServoData;
 
 use crate::STEP_S;
 
@@ -39,11 +39,11 @@ impl Servo {
         }
     }
 
-    /// This servo with the delay, rate, play and stops of `after`; `before` is what its own came from. What broke it stays
-    /// broken, what slowed it slows it by the same share.
+    /// This servo with the delay, rate, play and stops of `after`; `before` is the data that it was built from. A stuck
+    /// servo stays stuck, and a slow one stays slow by the same factor.
     pub(crate) fn changed(&self, before: &ServoData, after: &Self) -> Self {
         let was_rad = before.rate_rad_s() * STEP_S;
-        // What has not changed keeps its bits.
+        // Unchanged values keep their bits.
         let step_max_rad = if after.step_max_rad.to_bits() == was_rad.to_bits() {
             self.step_max_rad
         } else {
@@ -58,7 +58,7 @@ impl Servo {
         }
     }
 
-    /// Takes a command and turns for one step. A command that is no number is not taken.
+    /// Takes a command and moves for one step. A command that is not a number is ignored.
     pub(crate) fn step(&mut self, command_rad: f64) {
         let last_rad = self.line_rad[(self.next + LINE_STEPS - 1) % LINE_STEPS];
         self.line_rad[self.next] = if command_rad.is_nan() { last_rad } else { command_rad };
@@ -70,22 +70,22 @@ impl Servo {
         let (low_rad, high_rad) = self.stops_rad;
         let wanted_rad = delayed_rad.clamp(low_rad, high_rad);
         self.horn_rad += (wanted_rad - self.horn_rad).clamp(-self.step_max_rad, self.step_max_rad);
-        // The load stays where it is until the horn has taken up the play.
+        // The load does not move until the horn has taken up the play.
         self.load_rad =
             self.load_rad.clamp(self.horn_rad - self.half_slop_rad, self.horn_rad + self.half_slop_rad);
     }
 
-    /// Where the load is, rad.
+    /// Angle of the load, rad.
     pub(crate) fn load_rad(&self) -> f64 {
         self.load_rad
     }
 
-    /// Stays where it is from now on.
+    /// The servo is stuck from now on.
     pub(crate) fn stick(&mut self) {
         self.stuck = true;
     }
 
-    /// Turns at a share of its rate from now on.
+    /// The servo turns at a fraction of its rate from now on.
     pub(crate) fn slow(&mut self, scale: f64) {
         self.step_max_rad *= scale.clamp(0.0, 1.0);
     }

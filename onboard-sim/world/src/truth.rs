@@ -1,8 +1,9 @@
-//! How one true vehicle and its day differ from the data: what a campaign draws for each flight.
+//! How the true vehicle and the weather of one flight differ from the nominal data. A campaign draws these values for
+//! each flight.
 
 use serde::{Deserialize, Serialize};
 
-/// The true parameters of one flight. [`Truth::default`] is the data as they stand, in still air.
+/// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Truth {
@@ -10,21 +11,21 @@ pub struct Truth {
     pub impulse_scale: f64,
     /// True burn time over the motor file's.
     pub burn_time_scale: f64,
-    /// From the ignition command to the first thrust, s.
+    /// Time from the ignition command to the first thrust, s.
     pub ignition_delay_s: f64,
     /// Thrust direction with the gimbal at its centre, as gimbal angles (pitch, yaw), rad.
     pub thrust_misalignment_rad: [f64; 2],
-    /// Where the thrust acts off the axis, along body (y, z), m.
+    /// Offset of the thrust from the axis, along body (y, z), m.
     pub thrust_offset_m: [f64; 2],
     /// True mass and inertia over the data's.
     pub mass_scale: f64,
     /// True aerodynamic force over the model's.
     pub drag_scale: f64,
-    /// True centre of gravity from the data's, in body axes (x towards the nose), m.
+    /// Offset of the true centre of gravity from the nominal one, in body axes (x towards the nose), m.
     pub cg_offset_m: [f64; 3],
     /// Mean wind 10 m above the ground, m/s.
     pub wind_m_s: f64,
-    /// Where the wind blows to, from world x towards world y, rad.
+    /// Direction that the wind blows to, from world x towards world y, rad.
     pub wind_towards_rad: f64,
     /// Gust intensity over that of the military standard; 0 is none.
     pub gust_scale: f64,

@@ -3,14 +3,13 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use flight::airframe::Airframe;
-use flight::motors;
-use flight::rigid::RigidState;
+use flight::vehicle::rigid::RigidState;
+use vehicles::motors;
 use world::{Actuators, Truth, World};
 
 #[test]
 fn steps_do_not_allocate() {
-    let airframe = Airframe::builtin("mk2").expect("built in");
+    let airframe = vehicles::airframe::builtin("mk2").expect("built in");
     let motor = motors::builtin(&airframe.motor).expect("built in");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
     let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(60.0), 1).expect("sound");

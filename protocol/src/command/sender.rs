@@ -1,4 +1,5 @@
-//! The sender's side of the command protocol: when to send again, and which answer belongs to what.
+//! The sender's side of the command protocol: decides when to send a command again, and which answer belongs to which
+//! command.
 
 use std::time::Duration;
 
@@ -9,76 +10,62 @@ use crate::identity::Address;
 /// How often an unanswered command is sent again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resend {
-    /// Once. For arming: a late duplicate must never arm a vehicle that the crew believes safe.
+    /// Sent once. For arming: a late duplicate must never arm a vehicle that the crew takes for safe.
     Never,
-    /// This many further times.
+    /// Sent this many further times.
     Times(u8),
-    /// Until it is withdrawn, whatever is answered: twenty a second for the first second, then five. For aborting: of
-    /// twenty that each have one chance in two, all are lost once in a million times.
+    /// Sent until it is withdrawn, whatever the answer is: twenty times in the first second, then five times a
+    /// second. For aborting: if half of the frames are lost, all twenty are lost once in a million times.
     UntilWithdrawn,
 }
 
-/// An abort's first second, in which it is sent often.
-const HURRIED_FOR: Duration = Duration::from_secs(1);
-/// How often it is sent in that second.
-const HURRIED_EVERY: Duration = Duration::from_millis(50);
-/// How often it is sent after it.
-const STEADY_EVERY: Duration = Duration::from_millis(200);
+/// An abort is sent often for this time.
+const BURST_DURATION: Duration = Duration::from_secs(1);
+/// Interval between the abort's first sendings.
+const BURST_INTERVAL: Duration = Duration::from_millis(50);
+/// Interval between the abort's later sendings.
+const STEADY_INTERVAL: Duration = Duration::from_millis(200);
 
-/// What became of a command. Acknowledged is not observed: the vehicle's own state says that.
+/// What happened to a command. Acknowledged is not observed: only the vehicle's state shows that a command was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandEvent {
-    /// Sent for the n-th time (from 1).
     Sent {
-        /// MAV_CMD number.
         command: u16,
-        /// Which attempt.
+        /// Number of the attempt, from 1.
         attempt: u32,
     },
-    /// Answered: it is being done.
+    /// The answer says that it is being done.
     InProgress {
-        /// MAV_CMD number.
         command: u16,
-        /// Percent done; 255 unknown.
+        /// Percent done; 255 means unknown.
         progress: u8,
     },
-    /// Answered for good.
-    Answered {
-        /// MAV_CMD number.
-        command: u16,
-        /// MAV_RESULT number.
-        result: u8,
-    },
-    /// Answered for good, but no longer waited for: given up, or replaced by another of its number.
+    /// The final answer.
+    Answered { command: u16, result: u8 },
+    /// The final answer to a command that is no longer waited for, because it was given up or replaced by another
+    /// command with its number.
     AnsweredLate {
-        /// MAV_CMD number.
         command: u16,
-        /// MAV_RESULT number.
         result: u8,
-        /// Which one, as [`CommandSender::submit`] named it.
+        /// The ticket that [`CommandSender::submit`] returned.
         ticket: Ticket,
     },
-    /// Given up without an answer.
-    TimedOut {
-        /// MAV_CMD number.
-        command: u16,
-        /// How often it was sent.
-        attempts: u32,
-    },
+    /// It was given up without an answer.
+    TimedOut { command: u16, attempts: u32 },
 }
 
-/// Wait for an answer before sending again.
-pub const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
-/// Wait after an answer "in progress".
-pub const PROGRESS_TIMEOUT: Duration = Duration::from_secs(3);
-/// The answer to a command that was sent once may still be on its way for this long.
-pub const LATE_ANSWER_WITHIN: Duration = Duration::from_secs(10);
+/// An unanswered command is sent again after this time.
+const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
+/// After the answer "in progress" a command waits this long for the final answer.
+const PROGRESS_TIMEOUT: Duration = Duration::from_secs(3);
+/// The answer to a command that was sent once may arrive up to this much later.
+const LATE_ANSWER_WITHIN: Duration = Duration::from_secs(10);
 
-/// One submission, told apart from others of the same number.
+/// Identifies one submitted command among others with the same number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// An answer that may still come for a command that nobody waits for any more.
+/// A command that nobody waits for any more, but that may still be answered.
 #[derive(Debug)]
 struct Late {
     command: MavCmd,
@@ -95,25 +82,26 @@ struct Pending {
     submitted_at: Duration,
     due_at: Duration,
     in_progress: bool,
-    /// Of what is sent whatever is answered: the last answer.
+    /// The last answer to a command that is sent until it is withdrawn.
     answered: Option<u8>,
 }
 
 impl Pending {
-    /// When it is due again, once it was sent now.
+    /// Returns when it is due again after it was sent now.
     fn due_after(&self, now: Duration) -> Duration {
         match self.resend {
-            Resend::UntilWithdrawn if now < self.submitted_at + HURRIED_FOR => {
-                // From the time that it was due: a clock that looks late now and then makes it no rarer.
-                (self.due_at + HURRIED_EVERY).max(now + HURRIED_EVERY / 2)
+            Resend::UntilWithdrawn if now < self.submitted_at + BURST_DURATION => {
+                // Counted from the time at which it was due, so that a poll that comes late now and then does not
+                // lower the rate.
+                (self.due_at + BURST_INTERVAL).max(now + BURST_INTERVAL / 2)
             }
-            Resend::UntilWithdrawn => now + STEADY_EVERY,
+            Resend::UntilWithdrawn => now + STEADY_INTERVAL,
             Resend::Never | Resend::Times(_) => now + ANSWER_TIMEOUT,
         }
     }
 
-    /// The answer that is still to come when this is waited for no longer. Only of a command that is
-    /// sent once is it known how many answers are outstanding.
+    /// Returns the answer that may still come when this command is no longer waited for. Only for a command that is
+    /// sent once is the number of outstanding answers known.
     fn into_late(self, now: Duration) -> Option<Late> {
         let outstanding = self.resend == Resend::Never && self.attempts > 0;
         let late =
@@ -122,13 +110,14 @@ impl Pending {
     }
 }
 
-/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] says what to send.
+/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] returns what to send.
 ///
-/// What is sent until it is withdrawn may be answered many times; each answer that differs from the one before is told.
+/// A command that is sent until it is withdrawn may be answered many times; each answer that differs from the one
+/// before is reported.
 ///
-/// An answer names its command by number alone, and arming and disarming share one. So the late answer
-/// to an arming is waited for even after a disarming has replaced it, and is never taken for the
-/// disarming's own. If it was lost instead, the disarming is sent once more than needed.
+/// An answer names its command only by number, and arming and disarming share one. So a late answer to an arming is
+/// still expected after a disarming has replaced it, and is not taken for the answer to the disarming. If the late
+/// answer was lost instead, the disarming is sent once more than necessary.
 #[derive(Debug, Default)]
 pub struct CommandSender {
     pending: Vec<Pending>,
@@ -138,12 +127,11 @@ pub struct CommandSender {
 }
 
 impl CommandSender {
-    /// No command under way.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Queues a command. One of the same number that is still under way is replaced.
+    /// Queues a command. A pending command with the same number is replaced.
     pub fn submit(
         &mut self,
         target: Address,
@@ -181,17 +169,17 @@ impl CommandSender {
         ticket
     }
 
-    /// Stops sending this one.
+    /// Stops sending this command.
     pub fn withdraw_one(&mut self, ticket: Ticket, now: Duration) {
         self.withdraw(now, |pending| pending.ticket == ticket);
     }
 
-    /// When [`CommandSender::poll`] has something to do next; `None` while nothing is under way.
+    /// Returns when [`CommandSender::poll`] has something to do next; `None` while no command is pending.
     pub fn due_at(&self) -> Option<Duration> {
         self.pending.iter().map(|pending| pending.due_at).min()
     }
 
-    /// Stops sending whatever is under way. What was sent is sent: its answers may still come.
+    /// Stops sending all commands. Answers to what was sent may still come.
     pub fn withdraw_all(&mut self, now: Duration) {
         self.withdraw(now, |_| true);
     }
@@ -202,7 +190,7 @@ impl CommandSender {
         self.late.extend(withdrawn.filter_map(|pending| pending.into_late(now)));
     }
 
-    /// What is to be sent now; call it a few times a second.
+    /// Returns the messages to send now; call it a few times a second.
     pub fn poll(&mut self, now: Duration) -> Vec<MavMessage> {
         let mut messages = Vec::new();
         let events = &mut self.events;
@@ -234,12 +222,12 @@ impl CommandSender {
         messages
     }
 
-    /// Takes note of an answer. Returns whether any command could still be answered by it.
+    /// Notes an answer, and returns whether any command could still be answered by it.
     pub fn on_answer(&mut self, answer: &CommandAnswer, now: Duration) -> bool {
         let final_answer = answer.result != MavResult::MAV_RESULT_IN_PROGRESS as u8;
         let waiting = self.pending.iter().position(|p| p.message.command as u16 == answer.command);
-        // Answers come in the order of their commands. A second arming is the same question again: the
-        // first answer to come is its answer, too.
+        // Answers arrive in the order of their commands. A second arming repeats the same question, so the first
+        // answer that arrives answers it, too.
         let repeats = waiting.is_some_and(|index| self.pending[index].resend == Resend::Never);
         let late = self
             .late
@@ -267,8 +255,8 @@ impl CommandSender {
         true
     }
 
-    /// An answer to what goes on being sent: told when it differs from the one before. Once accepted it stays so: the
-    /// copies that arrive later find nothing left to do.
+    /// Notes an answer to a command that is sent until it is withdrawn, and reports it if it differs from the one
+    /// before. Once accepted it stays accepted: copies that arrive later find nothing left to do.
     fn note_answer(&mut self, index: usize, answer: CommandAnswer, final_answer: bool) {
         let known = &mut self.pending[index].answered;
         if *known == Some(answer.result) || *known == Some(MavResult::MAV_RESULT_ACCEPTED as u8) {
@@ -283,12 +271,12 @@ impl CommandSender {
         });
     }
 
-    /// Whether this command is still under way.
+    /// Returns whether this command is pending.
     pub fn is_pending(&self, command: MavCmd) -> bool {
         self.pending.iter().any(|pending| pending.message.command == command)
     }
 
-    /// What happened since the last call.
+    /// Returns the events since the last call.
     pub fn take_events(&mut self) -> Vec<CommandEvent> {
         std::mem::take(&mut self.events)
     }
@@ -305,7 +293,8 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// An arming at 0, whose answer does not come, and a disarming at `disarmed_ms`; answers at these times.
+    /// Submits an arming at 0 and a disarming at `disarmed_ms`; answers arrive at `answers_ms`. Returns the events
+    /// about answers.
     fn events(disarmed_ms: u64, answers_ms: &[u64]) -> Vec<CommandEvent> {
         let answer = CommandAnswer { command: ARM as u16, result: 0, progress: 0, target: GROUND };
         let mut sender = CommandSender::new();
@@ -325,7 +314,7 @@ mod tests {
         sender.take_events().into_iter().filter(is_answer).collect()
     }
 
-    /// Polled every 10 ms; the times of each sending, ms.
+    /// Polls every 10 ms; returns the time of each sending, ms, and the other events.
     fn aborts_ms(answered: &[(u64, MavResult)], withdrawn_ms: u64) -> (Vec<u64>, Vec<CommandEvent>) {
         let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
         let mut sender = CommandSender::new();
@@ -347,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_goes_out_twenty_times_in_its_first_second_and_five_times_in_each_after_it() {
+    fn an_abort_is_sent_twenty_times_in_its_first_second_and_then_five_times_a_second() {
         let (sent, events) = aborts_ms(&[], u64::MAX);
         let within = |from, to| sent.iter().filter(|at| (from..to).contains(*at)).count();
         assert_eq!((within(0, 1_000), within(1_000, 2_000), within(2_000, 3_000)), (20, 5, 5), "{sent:?}");
@@ -355,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_does_not_end_an_abort_and_its_copies_are_told_once() {
+    fn an_answer_does_not_end_an_abort_and_is_reported_once() {
         let accepted = MavResult::MAV_RESULT_ACCEPTED;
         let (sent, events) =
             aborts_ms(&[(100, accepted), (150, accepted), (160, MavResult::MAV_RESULT_FAILED)], 500);
@@ -365,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn the_answer_to_a_replaced_arming_is_its_own() {
+    fn a_late_answer_belongs_to_the_replaced_arming() {
         let (command, result) = (ARM as u16, 0);
         let late = CommandEvent::AnsweredLate { command, result, ticket: Ticket(1) };
         let answered = CommandEvent::Answered { command, result };
@@ -375,6 +364,6 @@ mod tests {
             let given_up = CommandEvent::TimedOut { command, attempts: 4 };
             assert_eq!(events(disarmed_ms, &[first]), [late, given_up]);
         }
-        assert_eq!(events(12_000, &[12_100]), [answered], "lost by then");
+        assert_eq!(events(12_000, &[12_100]), [answered], "the answer to the arming is lost by then");
     }
 }

@@ -1,4 +1,4 @@
-//! Messages to frames.
+//! Turns messages into frames.
 
 use mavlink::{MavlinkVersion, Message as _};
 
@@ -6,7 +6,7 @@ use super::{CRC_LEN, Frame, HEADER_LEN, MAGIC, crc_extra};
 use crate::dialect::MavMessage;
 use crate::identity::Address;
 
-/// Turns one component's messages into MAVLink 2 frames, numbering them.
+/// Turns one component's messages into MAVLink 2 frames and numbers them.
 #[derive(Debug, Clone)]
 pub struct Encoder {
     source: Address,
@@ -14,19 +14,19 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// An encoder for one component; every component numbers its own frames.
+    /// Creates the encoder of one component. Every component numbers its own frames.
     pub fn new(source: Address) -> Self {
         Self { source, sequence: 0 }
     }
 
-    /// The frame of a typed message.
+    /// Encodes a typed message.
     pub fn encode(&mut self, message: &MavMessage) -> Frame {
         let mut payload = [0; 255];
         let len = message.ser(MavlinkVersion::V2, &mut payload);
         self.frame(message.message_id(), MavMessage::extra_crc(message.message_id()), &payload[..len])
     }
 
-    /// The frame of a payload built by hand, for values that the typed messages cannot hold.
+    /// Encodes a payload that was built by hand, for values that the typed messages cannot hold.
     ///
     /// Returns `None` for a message id outside the dialect or more than 255 bytes.
     pub fn encode_payload(&mut self, message_id: u32, payload: &[u8]) -> Option<Frame> {
@@ -34,7 +34,7 @@ impl Encoder {
         if payload.len() > 255 {
             return None;
         }
-        // MAVLink 2 cuts trailing zeros, but never the first byte.
+        // MAVLink 2 cuts trailing zeros but always keeps the first byte.
         let len = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1).min(payload.len());
         Some(self.frame(message_id, extra, &payload[..len]))
     }

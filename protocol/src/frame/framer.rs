@@ -1,19 +1,19 @@
-//! Bytes in any chunking to checked frames.
+//! Finds frames with a correct checksum in bytes, however the bytes are split into pieces.
 
 use std::ops::Range;
 
 use super::{CRC_LEN, Frame, FrameView, HEADER_LEN, INCOMPAT_SIGNED, MAGIC, SIGNATURE_LEN, crc_extra};
 
-/// What a [`Framer`] has seen, kept and thrown away.
+/// What a [`Framer`] has accepted and rejected.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FramerCounters {
-    /// Frames with a right CRC.
+    /// Frames with a correct CRC.
     pub frames: u64,
     /// Candidates whose CRC was wrong.
     pub crc_errors: u64,
-    /// Candidates with a message id outside the dialect (their CRC cannot be checked).
+    /// Candidates with a message id outside the dialect; their CRC cannot be checked.
     pub unknown_ids: u64,
-    /// Candidates that ended before their length.
+    /// Candidates that ended before their stated length.
     pub cut_short: u64,
     /// Candidates with incompatibility flags that this implementation does not know.
     pub unknown_flags: u64,
@@ -34,25 +34,24 @@ impl std::ops::AddAssign for FramerCounters {
 
 /// Finds frames in a stream of bytes.
 ///
-/// A rejected candidate is retried from its second byte, so that a start marker inside garbage never hides the
-/// frame behind it. A candidate that waits for bytes is rejected too as soon as it is known that none will come:
-/// at the end of a datagram, and when a serial line falls silent. Holds at most one partial frame between calls.
+/// After a rejected candidate the search continues at its second byte, so that a start marker inside garbage never
+/// hides the frame behind it. A candidate that waits for bytes is rejected once no more bytes will come: at the end
+/// of a datagram, and when a serial line falls silent. The framer keeps at most one partial frame between calls.
 #[derive(Debug, Default)]
 pub struct Framer {
     buffer: Vec<u8>,
     start: usize,
-    /// No byte will follow what is in the buffer.
+    /// No more bytes will follow those in the buffer.
     ended: bool,
     counters: FramerCounters,
 }
 
 impl Framer {
-    /// An empty framer.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Appends bytes of a stream; call [`Framer::next_frame`] until it returns `None` afterwards.
+    /// Appends bytes of a stream. Call [`Framer::next_frame`] until it returns `None` afterwards.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.start);
         self.start = 0;
@@ -60,25 +59,25 @@ impl Framer {
         self.ended = false;
     }
 
-    /// Appends a whole datagram, whose end is the end of its frames; call [`Framer::next_frame`] until it returns
+    /// Appends a whole datagram; no frame continues in the next one. Call [`Framer::next_frame`] until it returns
     /// `None` afterwards.
     pub fn push_datagram(&mut self, bytes: &[u8]) {
         self.push(bytes);
         self.ended = true;
     }
 
-    /// The stream has fallen silent for longer than a frame may pause: what is incomplete will stay so. Call
-    /// [`Framer::next_frame`] until it returns `None` afterwards: a whole frame may stand behind it.
+    /// Notes that the stream has paused for longer than a frame may, so that an incomplete frame will stay
+    /// incomplete. Call [`Framer::next_frame`] until it returns `None` afterwards: a whole frame may follow the
+    /// incomplete one.
     pub fn on_silence(&mut self) {
         self.ended = true;
     }
 
-    /// Counters since the start.
     pub fn counters(&self) -> FramerCounters {
         self.counters
     }
 
-    /// The next whole frame, or `None` until more bytes arrive.
+    /// Returns the next whole frame, or `None` until more bytes arrive.
     pub fn next_frame(&mut self) -> Option<Frame> {
         self.next_view().map(|view| view.to_frame())
     }
@@ -90,12 +89,12 @@ impl Framer {
         Some(FrameView { bytes: &self.buffer[found] })
     }
 
-    /// Where the next whole frame stands; it counts as taken.
+    /// Returns where the next whole frame lies in the buffer, and counts it as taken.
     #[inline]
     fn find(&mut self) -> Option<Range<usize>> {
         loop {
             let candidate = &self.buffer[self.start..];
-            // A frame follows a frame, as a rule.
+            // Usually a frame follows directly after a frame.
             if candidate.first() != Some(&MAGIC) {
                 let Some(skipped) = candidate.iter().position(|byte| *byte == MAGIC) else {
                     self.counters.garbage_bytes += candidate.len() as u64;
@@ -132,7 +131,7 @@ enum Candidate {
     UnknownFlags,
 }
 
-/// Looks at bytes that begin with a start marker.
+/// Classifies bytes that begin with a start marker.
 #[inline]
 fn examine(candidate: &[u8]) -> Candidate {
     let signature_len = match candidate {

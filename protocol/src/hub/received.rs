@@ -1,40 +1,35 @@
-//! What a driver hands up.
+//! Defines what a transport hands to the hub.
 
 use std::net::SocketAddr;
 
-/// One of the streams of a link, as its driver numbers them: a server on TCP has one for each client. Numbers are not
-/// used twice.
-pub type Peer = u64;
+/// The number of one stream of a link. A TCP server has a stream for each client. Numbers are not used twice.
+pub type StreamId = u64;
 
-/// Who sent something over a link, as its driver tells its senders apart.
+/// The sender of some bytes, as a link tells its senders apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// The sender of a datagram.
     Datagram(SocketAddr),
-    /// One of the link's streams.
-    Stream(Peer),
+    Stream(StreamId),
 }
 
-/// What a link brings.
+/// What a link received.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Received {
-    /// One datagram: its end is the end of its frames.
+    /// One datagram. A frame never continues in the next datagram.
     Datagram {
-        /// Its sender, by its own word.
+        /// The address that the datagram names as its sender, which may be forged.
         from: SocketAddr,
-        /// What it holds.
         bytes: Vec<u8>,
     },
-    /// A piece of a stream.
-    Stream(Peer, Vec<u8>),
-    /// The stream has paused for longer than a frame may: what is incomplete will stay so.
-    Silence(Peer),
-    /// The stream has ended.
-    Gone(Peer),
-    /// Others have sent to it that are not answered; how many, in words. Said now and then.
+    /// A piece of a byte stream.
+    Stream(StreamId, Vec<u8>),
+    /// The stream has paused for longer than a frame may; an incomplete frame will stay incomplete.
+    Silence(StreamId),
+    Gone(StreamId),
+    /// The link does not answer some senders; the text says how many. It comes at most once in ten seconds.
     Strangers(String),
-    /// The link works; says with whom.
+    /// The link works; the text names the peer.
     Up(String),
-    /// The link does not work; says why. It is tried again.
+    /// The link does not work; the text says why. The transport tries again.
     Down(String),
 }

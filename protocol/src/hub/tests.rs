@@ -17,12 +17,12 @@ fn datagram(frame: &Frame) -> Received {
     datagram_of(frame.as_bytes().to_vec())
 }
 
-/// Whoever sends it.
+/// A datagram from a fixed address.
 fn datagram_of(bytes: Vec<u8>) -> Received {
     Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
 }
 
-/// What is said of frames, without who sent them.
+/// The news about frames, without the news about who sent them.
 fn of_frames(news: Vec<News>) -> Vec<News> {
     news.into_iter().filter(|news| !matches!(news, News::Believed(_))).collect()
 }
@@ -32,10 +32,10 @@ fn ms(milliseconds: u64) -> Duration {
 }
 
 #[test]
-fn over_two_lossy_links_everything_is_heard_once() {
+fn over_two_lossy_links_every_frame_is_passed_on_once() {
     let mut hub = Hub::new(2, None);
     let mut heard = Vec::new();
-    // Link 0 loses every third, link 1 every fifth and lags; 300 frames at 20 a second.
+    // Link 0 loses every third frame, link 1 loses every fifth and lags; there are 300 frames at 20 a second.
     let frames = beats(300);
     let mut arrivals: Vec<(u64, usize, &Frame)> = Vec::new();
     for (place, frame) in frames.iter().enumerate() {
@@ -55,14 +55,14 @@ fn over_two_lossy_links_everything_is_heard_once() {
             }
         }
     }
-    assert_eq!(heard.len(), 280, "only what both lost is missing");
+    assert_eq!(heard.len(), 280, "only frames that both links lost are missing");
     let loss = |link: usize| hub.links()[link].stats().figures(ms(15_300)).loss;
     assert!((loss(0) - 1.0 / 3.0).abs() < 0.02 && (loss(1) - 0.2).abs() < 0.02, "{} {}", loss(0), loss(1));
     assert_eq!(hub.links()[0].copies() + hub.links()[1].copies(), 200 + 240 - 280);
 }
 
 #[test]
-fn streams_of_one_link_are_framed_apart() {
+fn streams_of_one_link_are_framed_separately() {
     let frames = beats(2);
     let mut hub = Hub::new(1, None);
     let (head, tail) = frames[0].as_bytes().split_at(9);
@@ -72,19 +72,19 @@ fn streams_of_one_link_are_framed_apart() {
     let rest = hub.take(0, Received::Stream(1, tail.to_vec()), ms(2), 0);
     assert_eq!(of_frames(rest), [News::Frame(frames[0].clone())]);
     hub.take(0, Received::Gone(1), ms(3), 0);
-    assert_eq!(hub.links()[0].framing().frames, 2, "an ended stream keeps its counts");
-    for peer in 0..100 {
-        hub.take(0, Received::Stream(peer, vec![0xFD]), ms(4), 0);
+    assert_eq!(hub.links()[0].framing().frames, 2, "the frames of an ended stream still count");
+    for stream in 0..100 {
+        hub.take(0, Received::Stream(stream, vec![0xFD]), ms(4), 0);
     }
     assert!(hub.links()[0].streams.len() <= MAX_STREAMS);
 }
 
 #[test]
-fn a_forged_frame_does_not_shadow_the_true_one() {
+fn a_forged_frame_does_not_hide_the_true_one() {
     let side = || Some(Signing::new(Key::new([7; Key::LEN]), Memory::default()));
     let (mut near, mut far) = (Hub::new(2, side()), Hub::new(2, side()));
     let frame = &beats(1)[0];
-    // The forger knows number, message and checksum, but not the key.
+    // The forger knows sequence number, message and checksum, but not the key.
     let rejected = far.take(0, datagram(frame), ms(0), CLOCK);
     assert_eq!(rejected, [News::Rejected(frame.clone(), Rejection::Unsigned)]);
     let bytes: Vec<Vec<u8>> = (0..2).map(|link| near.bytes_for(link, frame, CLOCK)).collect();
@@ -93,20 +93,20 @@ fn a_forged_frame_does_not_shadow_the_true_one() {
     let second = far.take(1, datagram_of(bytes[1].clone()), ms(2), CLOCK);
     assert!(
         matches!(&second[..], [News::Believed(_), News::Copy(_)]),
-        "signed anew for its own link, and yet the same frame"
+        "it is signed for the other link and still the same frame"
     );
     assert_eq!(far.signing().map(|counters| (counters.accepted, counters.unsigned)), Some((2, 1)));
 }
 
 #[test]
-fn a_link_that_is_not_there_brings_nothing() {
+fn an_unknown_link_number_is_ignored() {
     let mut hub = Hub::new(1, None);
     assert!(hub.take(1, datagram(&beats(1)[0]), ms(0), 0).is_empty());
     hub.on_sent(1, 5, ms(0));
 }
 
 #[test]
-fn trouble_is_known_until_it_is_over() {
+fn trouble_is_reported_until_the_link_works_again() {
     let mut hub = Hub::new(1, None);
     hub.take(0, Received::Down("unplugged".to_owned()), ms(0), 0);
     assert_eq!(hub.links()[0].trouble(), Some("unplugged"));
@@ -114,7 +114,7 @@ fn trouble_is_known_until_it_is_over() {
     assert_eq!(hub.links()[0].trouble(), None);
 }
 
-/// Who is told to its link as believed after one datagram of this frame.
+/// Returns the senders that are accepted after one datagram with these bytes.
 fn believed(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
     let origin = |news| match news {
         News::Believed(origin) => Some(origin),
@@ -124,7 +124,7 @@ fn believed(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
 }
 
 #[test]
-fn a_sender_is_believed_for_a_valid_frame_and_for_nothing_less() {
+fn a_sender_is_accepted_only_for_a_valid_frame() {
     let sender = [Origin::Datagram(([127, 0, 0, 1], 1).into())];
     let plain = beats(1).remove(0);
     let mut hub = Hub::new(1, None);
@@ -138,7 +138,7 @@ fn a_sender_is_believed_for_a_valid_frame_and_for_nothing_less() {
     assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), []);
     assert_eq!(believed(&mut hub, signed_by(8)), []);
     let report = Encoder::new(VEHICLE).encode(&radio).as_bytes().to_vec();
-    assert_eq!(believed(&mut hub, report), [], "the one message that passes unsigned proves nobody");
+    assert_eq!(believed(&mut hub, report), [], "the message that may be unsigned does not prove its sender");
     assert_eq!(believed(&mut hub, signed_by(7)), sender);
     assert_eq!(believed(&mut hub, signed_by(7)), [], "replayed");
 }

@@ -1,8 +1,8 @@
-//! Which build wrote a log.
+//! Identifies the build that wrote a log.
 
 use std::collections::BTreeMap;
 
-/// Version, commit, compiler, target and lock file of this build, as written into every log.
+/// Returns version, commit, compiler, target and hash of the lock file of this build, as every log contains them.
 pub fn build_info() -> BTreeMap<String, String> {
     [
         ("version", env!("CARGO_PKG_VERSION")),

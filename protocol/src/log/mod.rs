@@ -1,8 +1,10 @@
-//! The flight log: an MCAP file of raw frames, controller ticks, truth, telemetry, operator and events.
+//! Writes and reads the flight log: an MCAP file of raw frames, controller ticks, simulated truth, telemetry,
+//! operator actions and events.
 //!
-//! The schemas are `proto/touchdown/log/v1.proto`, `proto/touchdown/flight/v1.proto` and, where one fits, Foxglove's own. The format is
-//! MCAP (<https://mcap.dev/spec>); every record is written so that a killed process loses a fraction
-//! of a second at most ([`recorder`]).
+//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `proto/touchdown/` (`log/v1.proto`,
+//! `flight/v1.proto`, `computer/v1.proto`) and, where one fits, Foxglove's own.
+//! [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a log's contents. Records are flushed so often that a
+//! killed process loses at most a fraction of a second ([`recorder`]).
 
 pub mod build;
 pub mod reader;
@@ -14,7 +16,6 @@ pub mod writer;
 /// The records of `proto/touchdown/log/v1.proto`, generated.
 pub mod v1 {
     #![allow(
-        missing_docs,
         unreachable_pub,
         clippy::pedantic,
         clippy::allow_attributes_without_reason,
@@ -26,7 +27,6 @@ pub mod v1 {
 /// The records of `proto/touchdown/flight/v1.proto`, generated.
 pub mod flight_v1 {
     #![allow(
-        missing_docs,
         unreachable_pub,
         clippy::pedantic,
         clippy::allow_attributes_without_reason,
@@ -34,6 +34,20 @@ pub mod flight_v1 {
     )]
     include!(concat!(env!("OUT_DIR"), "/touchdown.flight.v1.rs"));
 }
+
+/// The records of `proto/touchdown/computer/v1.proto`, generated.
+pub mod computer_v1 {
+    #![allow(
+        unreachable_pub,
+        clippy::pedantic,
+        clippy::allow_attributes_without_reason,
+        reason = "generated code; its documentation is in the .proto"
+    )]
+    include!(concat!(env!("OUT_DIR"), "/touchdown.computer.v1.rs"));
+}
+
+/// Serialised `google.protobuf.FileDescriptorSet` of [`computer_v1`] and what it imports.
+pub const DESCRIPTORS_COMPUTER_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/computer_v1.fds"));
 
 /// Serialised `google.protobuf.FileDescriptorSet` of [`flight_v1`].
 pub const DESCRIPTORS_FLIGHT_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/flight_v1.fds"));

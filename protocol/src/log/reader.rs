@@ -1,7 +1,7 @@
-//! MCAP to messages: everything before the first damage, then what the damage was.
+//! Reads a log: everything before the first damage, and a description of the damage.
 //!
-//! Reads from front to back with bounded memory, needs no summary and no footer, and so reads the log
-//! of a recorder that was killed. A chunk is handed out only if its checksum holds.
+//! The reader goes from front to back with bounded memory. It needs no summary and no footer, so it reads the log of
+//! a recorder that was killed. It returns the content of a chunk only if the chunk's checksum is right.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -10,76 +10,62 @@ use std::sync::Arc;
 use mcap::records::Record as McapRecord;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// A record or chunk larger than this is taken for damage.
-const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
+/// A record or chunk larger than this is treated as damage.
+pub const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
 
-/// A channel of the log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogChannel {
-    /// Topic.
     pub topic: String,
-    /// How messages are encoded: `protobuf`, `mavlink2`.
+    /// How messages are encoded: `protobuf` or `mavlink2`.
     pub message_encoding: String,
-    /// Name of the schema; empty without one.
+    /// Name of the schema; empty if there is none.
     pub schema_name: String,
-    /// The schema itself; of a `protobuf` channel a serialised `google.protobuf.FileDescriptorSet`.
+    /// The schema itself; for a `protobuf` channel it is a serialised `google.protobuf.FileDescriptorSet`.
     pub schema: Arc<[u8]>,
-    /// For raw frames: `link`, `endpoint`, `dialect`.
+    /// The channel's metadata; for raw frames `link`, `endpoint` and `dialect`.
     pub metadata: BTreeMap<String, String>,
 }
 
-/// One item of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LogItem {
-    /// The file's header: which library wrote it.
+    /// The file's header, which names the library that wrote it.
     Library(String),
-    /// A metadata record.
     Metadata {
-        /// Its name.
         name: String,
-        /// Its entries.
         entries: BTreeMap<String, String>,
     },
-    /// An attachment.
     Attachment {
-        /// Its name.
         name: String,
-        /// Its content.
         data: Vec<u8>,
     },
-    /// A message.
     Message {
-        /// Its channel; see [`LogReader::channel`].
+        /// See [`LogReader::channel`].
         channel_id: u16,
         /// Nanoseconds since the Unix epoch.
         log_time_ns: u64,
-        /// Its number within its channel.
+        /// The number of the message within its channel.
         sequence: u32,
-        /// Its content.
         data: Vec<u8>,
     },
-    /// The end of the data, properly written.
+    /// The end mark of the data.
     DataEnd,
 }
 
 /// Where a log stops being readable.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Damage {
-    /// Not an MCAP file at all.
+    /// The file is not an MCAP file.
     #[error("not an MCAP file: its first bytes are not the MCAP magic")]
     NotMcap,
-    /// The file ends before its data do: its recorder was killed, or it was cut.
+    /// The file ends without an end mark: its recorder was killed, or it was cut.
     #[error("ends after {bytes} bytes without an end mark: the recorder was stopped, or the file was cut")]
-    Truncated {
-        /// Bytes read.
-        bytes: u64,
-    },
-    /// A record is broken.
+    Truncated { bytes: u64 },
+    /// A record cannot be parsed.
     #[error("unreadable near byte {near_byte}: {reason}")]
     Corrupt {
-        /// Bytes read when it was noticed.
+        /// How many bytes had been read when it was noticed.
         near_byte: u64,
-        /// What the parser said.
+        /// The parser's message.
         reason: String,
     },
 }
@@ -97,12 +83,13 @@ pub struct LogReader<R: Read> {
 }
 
 impl<R: Read> LogReader<R> {
-    /// A reader at the start of `input`.
+    /// Starts reading at the beginning of `input`.
     pub fn new(input: R) -> Self {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
-            // A record between two chunks, or a whole chunk, may be unrecognisable: only this sum tells.
+            // A record between two chunks, or a whole chunk, may be damaged beyond recognition; only this checksum
+            // shows that.
             .with_validate_data_section_crc(true)
             .with_record_length_limit(RECORD_LIMIT_BYTES);
         Self {
@@ -117,30 +104,30 @@ impl<R: Read> LogReader<R> {
         }
     }
 
-    /// The channel of a message that was handed out.
+    /// Returns the channel of a message that was returned before.
     pub fn channel(&self, id: u16) -> Option<&LogChannel> {
         self.channels.get(&id)
     }
 
-    /// Every channel seen so far.
+    /// Returns every channel seen so far.
     pub fn channels(&self) -> impl Iterator<Item = (u16, &LogChannel)> {
         self.channels.iter().map(|(id, channel)| (*id, channel))
     }
 
-    /// Bytes read from the input so far: how far the reading is.
+    /// Returns how many bytes have been read so far.
     pub fn bytes_read(&self) -> u64 {
         self.bytes_read
     }
 
-    /// What ended the reading early; `None` for a whole log, once the items are exhausted.
+    /// Returns what ended the reading early; `None` for an undamaged log that was read to its end.
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
     }
 
-    /// The next item.
+    /// Returns the next item; `None` at the end or at the first damage.
     ///
     /// # Errors
-    /// Reading the input itself failed. Damage is not an error: see [`LogReader::damage`].
+    /// Reading the input failed. Damage is not an error: see [`LogReader::damage`].
     pub fn next_item(&mut self) -> std::io::Result<Option<LogItem>> {
         while !self.ended {
             let parsed = match self.parser.next_event() {
@@ -160,7 +147,7 @@ impl<R: Read> LogReader<R> {
                     self.bytes_read += count as u64;
                     continue;
                 }
-                // A hole in a file reads as an endless row of such records.
+                // A hole in a file is read as an endless row of such records.
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
                     let reason = "a record of type 0, which does not exist".to_owned();
                     self.finish(Some(Damage::Corrupt { near_byte: self.bytes_read, reason }));
@@ -185,13 +172,13 @@ impl<R: Read> LogReader<R> {
 
     fn finish(&mut self, damage: Option<Damage>) {
         self.ended = true;
-        // Damage in the summary behind the data costs nothing that we read.
+        // Damage in the summary after the data does not affect what was read.
         if !self.saw_data_end {
             self.damage = Some(damage.unwrap_or_else(|| self.cut()));
         }
     }
 
-    /// The input ended too early; with less than the magic read, it was no log in the first place.
+    /// The input ended too early. If it is shorter than the magic, it was not a log in the first place.
     fn cut(&self) -> Damage {
         let shorter_than_magic = self.bytes_read < mcap::MAGIC.len() as u64;
         if shorter_than_magic { Damage::NotMcap } else { Damage::Truncated { bytes: self.bytes_read } }
@@ -209,7 +196,7 @@ impl<R: Read> LogReader<R> {
         match record {
             McapRecord::Header(header) => Some(LogItem::Library(header.library)),
             McapRecord::Schema { header, data } => {
-                // Every chunk may repeat it; what is known is kept.
+                // Chunks may repeat a schema; the known one is kept.
                 let known = self.schemas.get(&header.id);
                 if known.is_none_or(|(name, known)| *name != header.name || **known != *data) {
                     self.schemas.insert(header.id, (header.name, Arc::from(data.as_ref())));
@@ -249,7 +236,7 @@ impl<R: Read> LogReader<R> {
     }
 }
 
-/// An error and what caused it: the parser's own words often name only the place.
+/// Joins an error and its causes: the parser's own text often names only the place.
 fn with_causes(error: &mcap::McapError) -> String {
     let mut words = error.to_string();
     let mut cause = std::error::Error::source(error);
@@ -260,19 +247,20 @@ fn with_causes(error: &mcap::McapError) -> String {
     words
 }
 
-/// One record of an MCAP file, from its type and its body; never panics, whatever the body is.
+/// Parses one record of an MCAP file from its type and its body; it never panics, whatever the body is.
 ///
 /// # Errors
-/// The body is not of this type.
+/// The body does not fit the type.
 pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
-    // The parser trusts an attachment to be long enough for its own fields.
+    // The parser of the crate `mcap` panics if an attachment is too short for its own fields.
     if opcode == mcap::records::op::ATTACHMENT && !attachment_fits(data) {
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
     mcap::parse_record(opcode, data).map(McapRecord::into_owned)
 }
 
-/// Whether an attachment has room for two times, two length-prefixed strings, the length of its data and a checksum.
+/// Returns whether an attachment has room for two times, two length-prefixed strings, the length of its data and a
+/// checksum.
 fn attachment_fits(data: &[u8]) -> bool {
     const TIMES_BYTES: usize = 16;
     const DATA_LENGTH_AND_CHECKSUM_BYTES: usize = 12;

@@ -1,56 +1,50 @@
-//! What can be written into a log, and on which topic it goes.
+//! Defines the records of a log and their topics.
 
 use foxglove::messages::{FrameTransform, Log};
 
-use super::{flight_v1, v1};
+use super::{computer_v1, flight_v1, v1};
 
-/// Which way a raw frame went, seen from the program that wrote the log.
+/// The direction of a raw frame, as seen from the program that wrote the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Direction {
-    /// Received.
     Rx,
-    /// Sent.
     Tx,
 }
 
-/// A raw MAVLink frame and where it passed.
+/// A raw MAVLink frame, with its link and direction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RawFrame {
-    /// Which way.
     pub direction: Direction,
-    /// Who wrote it down: `vehicle` or `ground`.
+    /// The program that logged it: `vehicle` or `ground`.
     pub endpoint: &'static str,
-    /// The link it crossed, as in `udpin:0.0.0.0:14550`.
+    /// The link that carried it, for example `udpin:0.0.0.0:14550`.
     pub link: String,
     /// One whole frame.
     pub bytes: Vec<u8>,
 }
 
-/// Something that happened, for a person to read.
+/// An event, for a person to read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Event {
-    /// How grave.
     pub level: EventLevel,
-    /// Who says so: `vehicle`, `ground`, `recorder`.
+    /// The source: `vehicle`, `ground` or `recorder`.
     pub name: String,
-    /// What happened.
     pub message: String,
 }
 
-/// Gravity of an [`Event`].
+/// The severity of an [`Event`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventLevel {
-    /// As planned.
+    /// It went as planned.
     Info,
-    /// Worth a look.
+    /// It may need attention.
     Warning,
     /// Something failed.
     Error,
-    /// The flight is at stake.
+    /// The flight is in danger.
     Fatal,
 }
 
-/// One record of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
     /// `/controller/tick`.
@@ -67,6 +61,10 @@ pub enum Record {
     RawFrame(RawFrame),
     /// `/events`.
     Event(Event),
+    /// `/computer/start`.
+    ComputerStart(Box<computer_v1::ComputerStart>),
+    /// `/computer/frame`.
+    ComputerFrame(Box<computer_v1::ComputerFrame>),
     /// `/pilot/start`.
     PilotStart(Box<flight_v1::PilotStart>),
     /// `/pilot/tick`.
@@ -79,7 +77,6 @@ pub enum Record {
     TruthSample(Box<flight_v1::TruthSample>),
 }
 
-/// Topic of the controller's ticks.
 pub const TOPIC_CONTROLLER_TICK: &str = "/controller/tick";
 /// Topic of the simulated plant's truth.
 pub const TOPIC_PLANT_TRUTH: &str = "/vehicle/truth";
@@ -93,36 +90,44 @@ pub const TOPIC_OPERATOR: &str = "/operator";
 pub const TOPIC_RAW_RX: &str = "/mavlink/rx/raw";
 /// Topic of raw frames sent.
 pub const TOPIC_RAW_TX: &str = "/mavlink/tx/raw";
-/// Topic of events.
 pub const TOPIC_EVENTS: &str = "/events";
-/// Topic of what the flight computer believed at the start.
+/// Topic of the data from which the flight computer is built at power-up.
+pub const TOPIC_COMPUTER_START: &str = "/computer/start";
+/// Topic of the flight computer's frames from power-up on.
+pub const TOPIC_COMPUTER_FRAME: &str = "/computer/frame";
+/// Topic of the state that the flight computer started from.
 pub const TOPIC_PILOT_START: &str = "/pilot/start";
 /// Topic of the flight computer's frames.
 pub const TOPIC_PILOT_TICK: &str = "/pilot/tick";
-/// Topic of how long its frames with a plan took.
+/// Topic of the computing times of the flight computer's frames with a plan.
 pub const TOPIC_PILOT_TIMING: &str = "/pilot/timing";
-/// Topic of its estimates.
 pub const TOPIC_ESTIMATE: &str = "/pilot/estimate";
 /// Topic of the simulated vehicle in space.
 pub const TOPIC_TRUTH_SAMPLE: &str = "/vehicle/truth3d";
-/// Topic of transforms.
 pub const TOPIC_TRANSFORM: &str = "/tf";
 /// Message encoding of the raw frames.
 pub const ENCODING_MAVLINK: &str = "mavlink2";
 
-/// Name of the metadata record that says which build wrote the log.
+/// Name of the metadata record that identifies the build which wrote the log.
 pub const METADATA_BUILD: &str = "build";
-/// Name of the metadata record that says which run this is (profile, seed, start).
+/// The version of a log's contents. Version 1 (such logs do not state it) has the ticks of the landing controller and
+/// the flight computer's frames from its release on. Version 2 also has the flight computer's frames from power-up on.
+pub const SCHEMA_VERSION: u32 = 2;
+/// Name of the metadata record with [`SCHEMA_VERSION`].
+pub const METADATA_SCHEMA: &str = "schema";
+/// The entry with the version.
+pub const SCHEMA_VERSION_ENTRY: &str = "version";
+/// Name of the metadata record that describes the run (profile, seed, start).
 pub const METADATA_RUN: &str = "run";
-/// Name of the attachment that holds the profile's whole text.
+/// Name of the attachment with the profile's text.
 pub const ATTACHMENT_PROFILE: &str = "profile.toml";
-/// Name of the attachment that holds the whole text of what chance was drawn from.
+/// Name of the attachment with the scenario: the text that the random draws are made from.
 pub const ATTACHMENT_SCENARIO: &str = "scenario.toml";
-/// Name of the attachment that holds the dialect.
+/// Name of the attachment with the dialect.
 pub const ATTACHMENT_DIALECT: &str = "touchdown.xml";
 
-/// The pose of the plant as a Foxglove transform. World: x north, y west, z up; the rocket's x axis is
-/// its nose. Pitch `theta` from the horizontal is a rotation of `-theta` about y.
+/// Converts the pose of the plant into a Foxglove transform. World: x north, y west, z up; the rocket's x axis points
+/// to its nose. A pitch of `theta` from the horizontal is a rotation of `-theta` about y.
 pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform {
     let half = -truth.state.theta_rad / 2.0;
     FrameTransform {
@@ -139,7 +144,7 @@ pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform 
     }
 }
 
-/// The pose of the vehicle in space as a Foxglove transform, in the same frames.
+/// Converts the pose of the vehicle in space into a Foxglove transform, in the same frames.
 pub(super) fn transform_in_space(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTransform {
     let (place, turn) = (&truth.state.position_m, &truth.state.world_from_body);
     FrameTransform {
@@ -151,7 +156,7 @@ pub(super) fn transform_in_space(truth: &flight_v1::TruthSample, time_ns: u64) -
     }
 }
 
-/// An event as a Foxglove log message.
+/// Converts an event into a Foxglove log message.
 pub(super) fn log_message(event: &Event, time_ns: u64) -> Log {
     let level = match event.level {
         EventLevel::Info => foxglove::messages::log::Level::Info,

@@ -1,9 +1,9 @@
-//! A thread that writes a log file, so that neither the control loop nor the screen waits for a disk.
+//! Writes a log file in a thread of its own, so that neither the control loop nor the screen waits for a disk.
 //!
 //! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can wait);
-//! [`Recorder::try_record`] never waits and counts what did not fit. The open chunk is ended and handed to
-//! the system at least every 200 ms and at every [`Recorder::sync_soon`], so a killed process loses no more
-//! than that; a second thread puts it on the disk, so that a slow disk does not stretch the 200 ms.
+//! [`Recorder::try_record`] never waits and counts what it drops. At least every 200 ms and at every
+//! [`Recorder::sync_soon`] the open chunk is ended and written to the operating system, so a killed process loses no
+//! more than that. A second thread syncs the file to the disk, so that a slow disk does not lengthen the 200 ms.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -21,31 +21,26 @@ use super::writer::{LogHeader, LogWriteError, LogWriter};
 const QUEUE_RECORDS: usize = 8192;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Why recording could not begin or did not end well.
+/// Why recording could not start or did not end well.
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
-    /// The file could not be made.
+    /// The file could not be created.
     #[error("cannot create the log {}", path.display())]
     Create {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// Writing failed; what was synced before can still be read.
     #[error("cannot write the log {}", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// The writer's error.
         source: LogWriteError,
     },
-    /// The writing thread is gone.
+    /// The writing thread has panicked.
     #[error("the log writer of {} stopped unexpectedly", path.display())]
-    Gone {
-        /// The file.
-        path: PathBuf,
-    },
+    Gone { path: PathBuf },
 }
 
 enum Order {
@@ -54,7 +49,7 @@ enum Order {
     Finish,
 }
 
-/// A handle to a log that is being written; clones write into the same log.
+/// A handle to a log that is being written. Clones write into the same log.
 #[derive(Clone)]
 pub struct Recorder {
     orders: SyncSender<Order>,
@@ -70,18 +65,18 @@ struct Shared {
 }
 
 impl Recorder {
-    /// Creates the file and starts writing. An existing file is never overwritten.
+    /// Creates the file and starts the writing thread. An existing file is never overwritten.
     ///
     /// # Errors
-    /// The file exists or cannot be made, or its header cannot be written.
+    /// The file exists or cannot be created, or its header cannot be written.
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
         Self::create_with_tlog(path, None, header)
     }
 
-    /// As [`Recorder::create`], and writes the ground's raw frames into a `.tlog` beside it.
+    /// As [`Recorder::create`]; also writes the ground's raw frames into a `.tlog` file.
     ///
     /// # Errors
-    /// A file exists or cannot be made, or the header cannot be written.
+    /// A file exists or cannot be created, or the header cannot be written.
     pub fn create_with_tlog(
         path: &Path,
         tlog: Option<&Path>,
@@ -95,7 +90,7 @@ impl Recorder {
             None => None,
             Some((_, Ok(made))) => Some(TlogWriter::new(BufWriter::new(made), header.start_unix_ns)),
             Some((refused, Err(source))) => {
-                // Made a moment ago, and empty: it would only stand in the way of the next attempt.
+                // The log file was created a moment ago and is empty; if it stayed, the next attempt would fail.
                 let _ = std::fs::remove_file(path);
                 return Err(RecorderError::Create { path: refused.to_owned(), source });
             }
@@ -118,7 +113,7 @@ impl Recorder {
             .name("log sync".to_owned())
             .spawn(move || {
                 while wishes.recv().is_ok() {
-                    // A disk that fails shows in the writes and in the last sync, which are looked at.
+                    // If the disk fails, the writes or the last sync report it.
                     let _ = syncing.sync_data();
                 }
             })
@@ -137,57 +132,57 @@ impl Recorder {
         Ok(Self { orders, shared })
     }
 
-    /// The file.
     pub fn path(&self) -> &Path {
         &self.shared.path
     }
 
-    /// The `.tlog` beside it, if there is one.
+    /// Path of the `.tlog` file, if one is written.
     pub fn tlog_path(&self) -> Option<&Path> {
         self.shared.tlog_path.as_deref()
     }
 
-    /// Records that found no room, or came after the writer had stopped.
+    /// Returns how many records were dropped because the queue was full or the writer had stopped.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Whether the writer still takes records.
+    /// Returns whether the writer still takes records.
     pub fn is_running(&self) -> bool {
         !self.shared.failed.load(Ordering::Acquire)
     }
 
-    /// Writes a record, waiting for room; `time_ns` counts from the start of the run.
+    /// Writes a record and waits for room in the queue; `time_ns` counts from the start of the run.
     pub fn record(&self, record: Record, time_ns: u64) {
         if self.orders.send(Order::Write(Box::new(record), time_ns)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Writes a record if there is room, else counts it as dropped.
+    /// Writes a record if there is room, and otherwise counts it as dropped.
     pub fn try_record(&self, record: Record, time_ns: u64) {
         if self.orders.try_send(Order::Write(Box::new(record), time_ns)).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Asks for everything up to here to be put on the disk now: at every change of phase.
+    /// Asks that everything up to here is synced to the disk now; called at every change of phase.
     pub fn sync_soon(&self) {
-        // A full queue is being written anyway, and the timer syncs it.
+        // If the queue is full, it is being written anyway, and the timer syncs it.
         let _ = self.orders.try_send(Order::SyncSoon);
     }
 
-    /// Ends the log with its summary and waits for it. Later records of other handles count as dropped.
+    /// Ends the log with its summary and waits until it is written. Records that other handles send later count as
+    /// dropped.
     ///
     /// # Errors
-    /// Some record could not be written; everything synced before it can still be read.
+    /// A record could not be written; everything synced before it can still be read.
     pub fn finish(&self) -> Result<PathBuf, RecorderError> {
         let path = self.shared.path.clone();
         let thread = self.shared.thread.lock().ok().and_then(|mut slot| slot.take());
         let Some(thread) = thread else {
             return Ok(path);
         };
-        // If the thread is gone already, joining it says why.
+        // If the thread has ended already, joining it returns its error.
         let _ = self.orders.send(Order::Finish);
         match thread.join() {
             Ok(Ok(())) => Ok(path),
@@ -218,7 +213,7 @@ fn write_until_finished(
                     tlog.write(&record, time_ns).map_err(mcap::McapError::from)?;
                 }
                 let due = *flush_due.get_or_insert_with(|| Instant::now() + FLUSH_INTERVAL);
-                // Under a steady stream the receive never times out.
+                // Under a steady stream of records the receive never times out.
                 if Instant::now() >= due {
                     hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                     flush_due = None;
@@ -240,8 +235,8 @@ fn write_until_finished(
     }
 }
 
-/// Hands everything to the system, which keeps it whatever becomes of this process, and asks for it to be put on
-/// the disk, which may take longer than the next flush can wait.
+/// Writes everything to the operating system, which keeps it even if this process is killed, and asks the other
+/// thread to sync it to the disk, which may take longer than one flush interval.
 fn hand_over(
     writer: &mut LogWriter<BufWriter<File>>,
     tlog: Option<&mut TlogWriter<BufWriter<File>>>,
@@ -251,7 +246,7 @@ fn hand_over(
     if let Some(tlog) = tlog {
         tlog.flush().map_err(mcap::McapError::from)?;
     }
-    // Full means that a sync is wanted already.
+    // A full queue means that a sync is already requested.
     let _ = sync_wanted.try_send(());
     Ok(())
 }

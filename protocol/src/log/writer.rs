@@ -1,4 +1,4 @@
-//! Records to MCAP, without threads or clocks.
+//! Writes records as MCAP, without threads or clocks.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -10,18 +10,22 @@ use mcap::records::MessageHeader;
 use super::build::build_info;
 use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
-    METADATA_RUN, RawFrame, Record, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_OPERATOR,
-    TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX,
-    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
-    transform_in_space,
+    METADATA_RUN, METADATA_SCHEMA, RawFrame, Record, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY,
+    TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS,
+    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
+    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message,
+    transform, transform_in_space,
 };
-use super::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
+use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
 
-/// The log's own messages.
+/// The messages of `touchdown/log/v1.proto`.
 const LOG: Package = Package { name: "touchdown.log.v1", descriptors: DESCRIPTORS_V1 };
-/// The flight computer's.
+/// The messages of `touchdown/flight/v1.proto`.
 const FLIGHT: Package = Package { name: "touchdown.flight.v1", descriptors: DESCRIPTORS_FLIGHT_V1 };
+
+/// The messages of `touchdown/computer/v1.proto`.
+const COMPUTER: Package = Package { name: "touchdown.computer.v1", descriptors: DESCRIPTORS_COMPUTER_V1 };
 
 /// A protobuf package and the descriptors of its messages.
 #[derive(Clone, Copy)]
@@ -30,41 +34,39 @@ struct Package {
     descriptors: &'static [u8],
 }
 
-/// Small chunks lose little when the process is killed.
+/// A killed process loses its open chunk, so chunks are small.
 const CHUNK_BYTES: u64 = 64 * 1024;
 
-/// What a log says about itself at its start.
+/// The facts about a run that a log begins with.
 #[derive(Debug, Clone, Default)]
 pub struct LogHeader {
-    /// The program that writes it.
+    /// The program that writes the log.
     pub writer: String,
-    /// Start of the run, nanoseconds since the Unix epoch; record times count from here.
+    /// Start of the run, nanoseconds since the Unix epoch; the times of records count from here.
     pub start_unix_ns: u64,
-    /// Run facts: profile, seed, start and so on.
+    /// Facts about the run: profile, seed, start and so on.
     pub run: BTreeMap<String, String>,
-    /// The profile's whole text, when the program knows it.
+    /// The profile's text, if the program knows it.
     pub profile_toml: Option<String>,
-    /// The whole text of what chance was drawn from, when there is one.
+    /// The scenario's text, which the random draws are made from, if there is one.
     pub scenario_toml: Option<String>,
 }
 
-/// Why a log could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum LogWriteError {
-    /// The MCAP writer refused or the file failed.
+    /// The MCAP writer reported an error, or the file could not be written.
     #[error("the MCAP writer failed")]
     Mcap(#[from] mcap::McapError),
     /// A Foxglove message could not be encoded.
     #[error("encoding {topic}: {reason}")]
     Encode {
-        /// The topic.
         topic: &'static str,
-        /// What the encoder said.
+        /// The encoder's message.
         reason: String,
     },
 }
 
-/// Writes records as MCAP messages, opening channels as they are needed.
+/// Writes records as MCAP messages and opens channels as they are needed.
 pub struct LogWriter<W: Write + Seek> {
     writer: mcap::Writer<W>,
     start_unix_ns: u64,
@@ -73,7 +75,7 @@ pub struct LogWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> LogWriter<W> {
-    /// Starts a log: header, build and run metadata, profile, scenario and dialect attachments.
+    /// Starts a log with its header, the metadata of build and run, and the attached profile, scenario and dialect.
     ///
     /// # Errors
     /// The underlying writer failed.
@@ -86,6 +88,10 @@ impl<W: Write + Seek> LogWriter<W> {
         writer.write_metadata(&mcap::records::Metadata {
             name: METADATA_BUILD.to_owned(),
             metadata: build_info(),
+        })?;
+        writer.write_metadata(&mcap::records::Metadata {
+            name: METADATA_SCHEMA.to_owned(),
+            metadata: BTreeMap::from([(SCHEMA_VERSION_ENTRY.to_owned(), SCHEMA_VERSION.to_string())]),
         })?;
         writer.write_metadata(&mcap::records::Metadata {
             name: METADATA_RUN.to_owned(),
@@ -143,6 +149,18 @@ impl<W: Write + Seek> LogWriter<W> {
             Record::OperatorAction(action) => {
                 self.write_message(TOPIC_OPERATOR, (LOG, "OperatorAction"), action, log_time)
             }
+            Record::ComputerStart(start) => self.write_message(
+                TOPIC_COMPUTER_START,
+                (COMPUTER, "ComputerStart"),
+                start.as_ref(),
+                log_time,
+            ),
+            Record::ComputerFrame(frame) => self.write_message(
+                TOPIC_COMPUTER_FRAME,
+                (COMPUTER, "ComputerFrame"),
+                frame.as_ref(),
+                log_time,
+            ),
             Record::PilotStart(start) => {
                 self.write_message(TOPIC_PILOT_START, (FLIGHT, "PilotStart"), start.as_ref(), log_time)
             }
@@ -246,7 +264,7 @@ impl<W: Write + Seek> LogWriter<W> {
             ("endpoint".to_owned(), frame.endpoint.to_owned()),
             ("link".to_owned(), frame.link.clone()),
         ]);
-        // A described schema on every channel: some readers refuse a file that has a channel without one.
+        // Every channel has a schema: some readers refuse a file with a channel that has none.
         let schema = ("mavlink2.Frame", RAW_FRAME_SCHEMA);
         let channel = self.channel(topic, ENCODING_MAVLINK, Some(schema), &metadata)?;
         self.put(channel, log_time, &frame.bytes)
@@ -283,7 +301,7 @@ impl<W: Write + Seek> LogWriter<W> {
         log_time: u64,
         data: &[u8],
     ) -> Result<(), LogWriteError> {
-        // publish_time equals log_time: one known reader takes only that.
+        // publish_time equals log_time because PlotJuggler requires it.
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }

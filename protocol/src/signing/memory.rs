@@ -1,39 +1,43 @@
-//! What must outlive a restart: the last timestamps, as lines of text to which further lines may be appended.
+//! The timestamps that must survive a restart, as lines of text to which further lines may be appended.
 
 use std::collections::BTreeMap;
 
-use super::{LEAD, MAX_STAMP, MAX_STREAMS};
+use super::timestamp::{MAX_STAMP, STAMPS_PER_S};
 use crate::identity::Address;
 
-/// Why remembered timestamps are of no use.
+/// Stored timestamps are this far ahead of the ones in use, so that no timestamp is used twice after a restart.
+pub(super) const LEAD: u64 = 5 * STAMPS_PER_S;
+/// At most this many streams are remembered. Only holders of the key can begin one.
+pub(super) const MAX_STREAMS: usize = 64;
+
+/// Why remembered timestamps cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MemoryError {
-    /// A line makes no sense.
+    /// A line cannot be parsed.
     #[error("`{0}` is neither `ours STAMP`, `clock STAMP` nor `heard SYSTEM COMPONENT LINK STAMP`")]
     Line(String),
-    /// There is not even the timestamp of what was sent last.
-    #[error("it does not say what was sent last (`ours STAMP`): what was heard before could be replayed")]
-    Nothing,
+    /// The timestamp of the last frame that was sent is missing.
+    #[error("the line `ours STAMP` is missing, so recorded frames could be replayed")]
+    NoOwnStamp,
 }
 
-/// What must outlive a restart: the last timestamps.
+/// The timestamps that must survive a restart: our own, our clock's, and those of each stream that was heard.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Memory {
-    /// What was signed last, and ahead of it: see [`super::Signing::memory`].
+    /// The last timestamp that was used for signing, plus a margin: see [`super::Signing::memory`].
     pub(super) ours: u64,
-    /// The latest time that our own clock showed.
+    /// The latest time that our own clock has shown.
     pub(super) clock: u64,
     pub(super) streams: BTreeMap<(Address, u8), u64>,
 }
 
 impl Memory {
-    /// As lines of text.
     pub fn to_text(&self) -> String {
         [self.own_lines()].into_iter().chain(self.streams.iter().map(heard)).collect()
     }
 
-    /// The lines that bring another memory, which is not newer, up to this one. Nothing while the timestamps of what is
-    /// sent are covered for half of their lead.
+    /// Returns the lines that update `other`, an older memory, to this one. While the margin of the own timestamps is
+    /// at least half left, they are not written again.
     pub fn lines_since(&self, other: &Self) -> String {
         let news = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
         let own = (self.ours > other.ours + LEAD / 2).then(|| self.own_lines());
@@ -44,7 +48,7 @@ impl Memory {
         format!("ours {}\nclock {}\n", self.ours, self.clock)
     }
 
-    /// Takes over what [`Memory::lines_since`] wrote down, so that it is not written again.
+    /// Notes that what [`Memory::lines_since`] returned was written, so that it is not written again.
     pub fn catch_up(&mut self, with: &Self) {
         if with.ours > self.ours + LEAD / 2 {
             (self.ours, self.clock) = (with.ours, with.clock);
@@ -52,25 +56,25 @@ impl Memory {
         self.streams.clone_from(&with.streams);
     }
 
-    /// Reads those lines; later ones count. A last line without its end was cut off while it was written, and what it
-    /// was to remember was not acted on.
+    /// Parses the lines of a timestamp file; later lines override earlier ones. An incomplete last line was cut off
+    /// while it was written. Its frame was not acted on, so the line is ignored.
     ///
     /// # Errors
-    /// A line makes no sense, or there is none.
+    /// A line cannot be parsed, or the own timestamp is missing.
     pub fn from_text(text: &str) -> Result<Self, MemoryError> {
         let mut memory = Self::default();
-        let mut knows_ours = false;
+        let mut has_ours = false;
         for line in text.split_inclusive('\n') {
             match line.strip_suffix('\n') {
                 Some(line) => {
                     memory.read_line(line).ok_or_else(|| MemoryError::Line(line.to_owned()))?;
-                    knows_ours |= line.starts_with("ours ");
+                    has_ours |= line.starts_with("ours ");
                 }
-                None if knows_ours => {}
+                None if has_ours => {}
                 None => return Err(MemoryError::Line(line.to_owned())),
             }
         }
-        if knows_ours { Ok(memory) } else { Err(MemoryError::Nothing) }
+        if has_ours { Ok(memory) } else { Err(MemoryError::NoOwnStamp) }
     }
 
     fn read_line(&mut self, line: &str) -> Option<()> {

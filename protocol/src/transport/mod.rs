@@ -1,11 +1,10 @@
-//! Thin drivers: bytes between this process and a link. Framing, numbering, signing and statistics are
-//! the callers'.
+//! Moves bytes between this process and a link. Framing, signing and statistics are the caller's ([`crate::hub`]).
 //!
-//! A [`Transport`] is two bounded queues and a task. The task outlives trouble: a serial line that goes
-//! away and a connection that breaks are tried again twice a second, and a UDP peer that restarts on another port is
-//! picked up. A link that anybody can send to answers only those of whom its owner says that it believed a frame.
+//! A [`Transport`] is two bounded queues and a task. The task survives failures: it tries twice a second to reopen a
+//! serial line or a connection that broke, and it finds a UDP peer that restarts on another port. A link that anybody
+//! can send to answers only those senders of which its owner has accepted a frame.
 
-mod endpoint;
+mod address;
 mod serial;
 mod stream;
 mod tcp;
@@ -14,23 +13,21 @@ mod udp;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-pub use crate::hub::{Origin, Received};
-pub use endpoint::{Endpoint, EndpointError};
+use crate::hub::{Origin, Received};
 
-const QUEUE: usize = 1024;
-/// Senders that were believed and that the link has not taken note of yet; the next frame of one says it again.
-const BELIEVED: usize = 256;
-/// What does not work is tried again after this long.
-const REOPEN_AFTER: Duration = Duration::from_millis(500);
+pub use address::{LinkAddress, LinkAddressError};
 
-/// An open link.
+const QUEUE_LEN: usize = 1024;
+/// This many notices of accepted senders may wait for the link. If the queue is full, a notice is dropped, and the
+/// sender's next frame repeats it.
+const BELIEVED_QUEUE_LEN: usize = 256;
+
 #[derive(Debug)]
 pub struct Transport {
-    endpoint: Endpoint,
+    address: LinkAddress,
     received: mpsc::Receiver<Received>,
     sender: TransportSender,
 }
@@ -44,7 +41,8 @@ pub struct TransportSender {
 }
 
 impl TransportSender {
-    /// Queues bytes; says whether there was room. A link that is too slow to take them drops and counts them.
+    /// Queues bytes to be sent and returns whether there was room. A link that is too slow drops bytes and counts the
+    /// drops.
     pub fn send(&self, bytes: Vec<u8>) -> bool {
         let queued = self.queue.try_send(bytes).is_ok();
         if !queued {
@@ -53,66 +51,67 @@ impl TransportSender {
         queued
     }
 
-    /// Tells the link that a frame of this sender was believed ([`crate::hub::News::Believed`]): only then is it
-    /// answered, and only such a sender keeps its place against others.
+    /// Tells the link that a frame of this sender was accepted ([`crate::hub::News::Believed`]). Only then is the
+    /// sender answered and protected from being displaced by other senders.
     pub fn believe(&self, origin: Origin) {
-        // Where there is no room its next frame says it again.
+        // When the queue is full, the sender's next frame repeats this.
         let _ = self.believed.try_send(origin);
     }
 
-    /// Writes that found no room.
+    /// Returns how many writes were dropped because the queue was full.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 }
 
 impl Transport {
-    /// Opens a link. Must be called within a tokio runtime.
+    /// Opens a link. It must be called within a tokio runtime.
     ///
     /// # Errors
-    /// An address cannot be bound or, for UDP, resolved. A serial device that is not there and a TCP server that does
-    /// not answer are no error: they may come later, and [`Received::Down`] says so until then.
-    pub async fn open(mut endpoint: Endpoint) -> io::Result<Self> {
-        let is_udp = matches!(endpoint, Endpoint::UdpIn(_) | Endpoint::UdpOut(_));
-        let (inbox, received) = mpsc::channel(if is_udp { udp::AHEAD } else { QUEUE });
-        let (queue, outbox) = mpsc::channel(QUEUE);
-        let (believed, believed_by_owner) = mpsc::channel(BELIEVED);
-        match &mut endpoint {
-            Endpoint::UdpIn(address) => {
-                let bound =
-                    udp::listen(address, udp::Ends { inbox, outbox, believed: believed_by_owner }).await?;
-                // Port 0 lets the system choose; the endpoint then names its choice.
-                if address.ends_with(":0") {
-                    *address = bound.to_string();
+    /// The address cannot be bound or, for UDP, resolved. A missing serial device and a TCP server that does not
+    /// answer are no errors, because they may appear later; until then the link reports [`Received::Down`].
+    pub async fn open(mut address: LinkAddress) -> io::Result<Self> {
+        let is_udp = matches!(address, LinkAddress::UdpIn(_) | LinkAddress::UdpOut(_));
+        let (inbox, received) = mpsc::channel(if is_udp { udp::INBOX_LEN } else { QUEUE_LEN });
+        let (queue, outbox) = mpsc::channel(QUEUE_LEN);
+        let (believed, believed_by_owner) = mpsc::channel(BELIEVED_QUEUE_LEN);
+        match &mut address {
+            LinkAddress::UdpIn(local) => {
+                let queues = udp::Queues { inbox, outbox, believed: believed_by_owner };
+                let bound = udp::listen(local, queues).await?;
+                // With port 0 the system chooses a port, and the address then names it.
+                if local.ends_with(":0") {
+                    *local = bound.to_string();
                 }
             }
-            Endpoint::UdpOut(address) => {
-                udp::connect(address, udp::Ends { inbox, outbox, believed: believed_by_owner }).await?;
+            LinkAddress::UdpOut(remote) => {
+                let queues = udp::Queues { inbox, outbox, believed: believed_by_owner };
+                udp::connect(remote, queues).await?;
             }
-            Endpoint::TcpIn(address) => {
-                let bound = tcp::listen(address, inbox, outbox).await?;
-                if address.ends_with(":0") {
-                    *address = bound.to_string();
+            LinkAddress::TcpIn(local) => {
+                let bound = tcp::listen(local, inbox, outbox).await?;
+                if local.ends_with(":0") {
+                    *local = bound.to_string();
                 }
             }
-            Endpoint::TcpOut(address) => tcp::connect(address.clone(), inbox, outbox),
-            Endpoint::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
+            LinkAddress::TcpOut(remote) => tcp::connect(remote.clone(), inbox, outbox),
+            LinkAddress::Serial { path, baud } => serial::open(path.clone(), *baud, inbox, outbox),
         }
         let sender = TransportSender { queue, believed, dropped: Arc::new(AtomicU64::new(0)) };
-        Ok(Self { endpoint, received, sender })
+        Ok(Self { address, received, sender })
     }
 
-    /// Where it leads; for `udpin` and `tcpin` with port 0, with the port that the system chose.
-    pub fn endpoint(&self) -> &Endpoint {
-        &self.endpoint
+    /// Returns the link's address. For `udpin` and `tcpin` with port 0 it names the port that the system chose.
+    pub fn address(&self) -> &LinkAddress {
+        &self.address
     }
 
-    /// The next thing the link brings; `None` once its task has ended.
+    /// Waits for what the link brings next; `None` once its task has ended.
     pub async fn receive(&mut self) -> Option<Received> {
         self.received.recv().await
     }
 
-    /// As [`Transport::receive`], to wait for several links at once.
+    /// As [`Transport::receive`], for an owner that waits for several links at once.
     pub fn poll_receive(
         &mut self,
         context: &mut std::task::Context<'_>,
@@ -120,12 +119,11 @@ impl Transport {
         self.received.poll_recv(context)
     }
 
-    /// What is waiting already, without waiting for more.
+    /// Returns what has arrived already, without waiting.
     pub fn try_receive(&mut self) -> Option<Received> {
         self.received.try_recv().ok()
     }
 
-    /// A handle to send with.
     pub fn sender(&self) -> TransportSender {
         self.sender.clone()
     }

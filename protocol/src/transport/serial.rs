@@ -1,12 +1,12 @@
-//! Serial lines, reopened when they come back.
+//! Opens a serial line, and opens it again when its device comes back.
 
 use std::time::Duration;
 
 use tokio::sync::mpsc::{Receiver, Sender};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
-use super::Received;
 use super::stream::{Line, keep_open};
+use crate::hub::Received;
 
 pub(super) fn open(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
     tokio::spawn(keep_open(Port { path, baud }, inbox, outbox));
@@ -19,10 +19,10 @@ struct Port {
 
 impl Line for Port {
     type Io = SerialStream;
-    /// Longer than any within a frame: at 9,600 baud the longest frame takes 0.3 s, but without pauses.
+    /// Bytes of one frame follow each other without a pause: at 9,600 baud the longest frame takes 0.3 s.
     const SILENCE: Duration = Duration::from_millis(100);
     const ENDED: &str = "the line was closed";
-    /// A serial line is one stream, however often it is reopened.
+    /// A serial line stays one stream however often it is reopened.
     const BEGINS_ANEW: bool = false;
 
     fn name(&self) -> &str {

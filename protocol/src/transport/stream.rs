@@ -1,47 +1,47 @@
-//! Byte streams: read with an eye on pauses, and opened again when they fail.
+//! Carries bytes over a serial line or a TCP connection, and opens it again when it fails.
 
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::sync::mpsc::{Receiver, Sender};
 
-use super::{REOPEN_AFTER, Received};
-use crate::hub::Peer;
+use crate::hub::{Received, StreamId};
 
-/// How much is read in one go.
 const READ_LEN: usize = 4096;
+/// A failed stream is opened again after this time.
+pub(super) const REOPEN_AFTER: Duration = Duration::from_millis(500);
 
-/// A link of which this side is to open one end, again whenever it fails.
+/// A byte stream that this side opens, and opens again whenever it fails.
 pub(super) trait Line: Send + 'static {
-    /// What carries bytes while it is open.
+    /// The open stream.
     type Io: AsyncRead + AsyncWrite + Send;
-    /// A pause longer than a frame's pieces may be apart.
+    /// A pause this long means that no more bytes of a begun frame will follow.
     const SILENCE: Duration;
-    /// Why it has ended, when nothing more comes.
+    /// The reason that is reported when the other side ends the stream.
     const ENDED: &str;
-    /// Whether each opening begins a stream of its own, rather than going on with the one there was.
+    /// Whether each opening begins a new stream, instead of continuing the previous one.
     const BEGINS_ANEW: bool;
 
-    /// Its name, for a person.
+    /// Its name in messages to the crew.
     fn name(&self) -> &str;
 
-    /// Opens it, or says why it cannot be opened.
+    /// Opens the stream; the error says why that failed.
     fn open(&self) -> impl Future<Output = Result<Self::Io, String>> + Send;
 }
 
-/// Opens a line, carries bytes over it, and opens it again when it fails, until nobody wants it any more.
+/// Keeps a stream open and carries bytes over it until the owner drops the link.
 pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Vec<u8>>) {
     let mut last_trouble = String::new();
     for opening in 0.. {
-        let peer: Peer = if L::BEGINS_ANEW { opening } else { 0 };
+        let stream_id: StreamId = if L::BEGINS_ANEW { opening } else { 0 };
         let trouble = match line.open().await {
             Ok(io) => {
                 last_trouble.clear();
                 if inbox.send(Received::Up(line.name().to_owned())).await.is_err() {
                     return;
                 }
-                let trouble = carry::<L>(io, peer, &inbox, &mut outbox).await;
-                if L::BEGINS_ANEW && inbox.send(Received::Gone(peer)).await.is_err() {
+                let trouble = carry::<L>(io, stream_id, &inbox, &mut outbox).await;
+                if L::BEGINS_ANEW && inbox.send(Received::Gone(stream_id)).await.is_err() {
                     return;
                 }
                 match trouble {
@@ -51,7 +51,7 @@ pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut out
             }
             Err(trouble) => trouble,
         };
-        // Said once, not twice a second.
+        // The same trouble is reported once, not twice a second.
         if trouble != last_trouble {
             if inbox.send(Received::Down(format!("{}: {trouble}", line.name()))).await.is_err() {
                 return;
@@ -59,7 +59,7 @@ pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut out
             last_trouble = trouble;
         }
         tokio::time::sleep(REOPEN_AFTER).await;
-        // What was queued for a dead line is stale.
+        // Bytes that were queued while the stream was down are out of date.
         while outbox.try_recv().is_ok() {}
         if inbox.is_closed() || outbox.is_closed() {
             return;
@@ -67,11 +67,11 @@ pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut out
     }
 }
 
-/// Carries bytes until the line fails (says why) or nobody wants it any more (`None`). Reading and writing do
-/// not wait for each other: an end that takes nothing must still be heard, and may still deliver an abort.
+/// Carries bytes until the stream fails, and returns why; returns `None` once the owner has dropped the link. Reading
+/// does not wait for writing: a peer that takes no bytes may still deliver an abort.
 async fn carry<L: Line>(
     io: L::Io,
-    peer: Peer,
+    stream_id: StreamId,
     inbox: &Sender<Received>,
     outbox: &mut Receiver<Vec<u8>>,
 ) -> Option<String> {
@@ -84,17 +84,18 @@ async fn carry<L: Line>(
         }
     };
     tokio::select! {
-        ended = read_all(reader, peer, L::SILENCE, inbox) => ended.map(|error| {
+        ended = read_all(reader, stream_id, L::SILENCE, inbox) => ended.map(|error| {
             error.map_or_else(|| L::ENDED.to_owned(), |error| error.to_string())
         }),
         ended = write => ended,
     }
 }
 
-/// Reads until the stream ends; returns the error that ended it, if one did. `None`: nobody wants the link any more.
+/// Reads until the stream ends, and returns the error that ended it, if any. Returns `None` once the owner has
+/// dropped the link.
 pub(super) async fn read_all(
     mut reader: impl AsyncRead + Unpin,
-    peer: Peer,
+    stream_id: StreamId,
     silence: Duration,
     inbox: &Sender<Received>,
 ) -> Option<Option<std::io::Error>> {
@@ -106,14 +107,14 @@ pub(super) async fn read_all(
             Ok(Ok(count)) => count,
             Ok(Err(error)) => return Some(Some(error)),
             Err(_elapsed) => {
-                // Said once a burst, not again and again.
+                // A silence is reported once after each burst.
                 if std::mem::take(&mut in_burst) {
-                    inbox.send(Received::Silence(peer)).await.ok()?;
+                    inbox.send(Received::Silence(stream_id)).await.ok()?;
                 }
                 continue;
             }
         };
         in_burst = true;
-        inbox.send(Received::Stream(peer, buffer[..count].to_vec())).await.ok()?;
+        inbox.send(Received::Stream(stream_id, buffer[..count].to_vec())).await.ok()?;
     }
 }

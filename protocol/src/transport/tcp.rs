@@ -1,4 +1,4 @@
-//! TCP: `tcpin` serves a few clients, `tcpout` connects and connects again.
+//! TCP links: `tcpin` serves a few clients; `tcpout` connects, and reconnects after a failure.
 
 use std::io;
 use std::net::SocketAddr;
@@ -9,20 +9,19 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::broadcast;
 use tokio::sync::mpsc::{Receiver, Sender};
 
-use super::stream::{Line, keep_open, read_all};
-use super::{REOPEN_AFTER, Received};
-use crate::hub::Peer;
+use super::stream::{Line, REOPEN_AFTER, keep_open, read_all};
+use crate::hub::{Received, StreamId};
 
-/// Clients served at the same time; more are turned away.
+/// This many clients are served at the same time; further ones are disconnected.
 const MAX_CLIENTS: usize = 4;
-/// Writes that may wait for a client; one that takes nothing loses the oldest.
+/// This many writes wait for each client; a slow client loses the oldest ones.
 const CLIENT_QUEUE: usize = 256;
-/// A connection attempt is given up after this long.
+/// A connection attempt fails after this time.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);
-/// A pause longer than a frame's pieces may be apart.
+/// A pause this long means that no more bytes of a begun frame will follow.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Binds and serves; returns the address that was bound, which names the port if `address` left it open.
+/// Binds and serves. Returns the bound address, which names the port that the system chose if `address` has port 0.
 pub(super) async fn listen(
     address: &str,
     inbox: Sender<Received>,
@@ -36,7 +35,7 @@ pub(super) async fn listen(
 
 async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Receiver<Vec<u8>>) {
     let (all, _) = broadcast::channel::<Vec<u8>>(CLIENT_QUEUE);
-    let mut peer: Peer = 0;
+    let mut stream_id: StreamId = 0;
     loop {
         tokio::select! {
             accepted = listener.accept() => match accepted {
@@ -44,31 +43,32 @@ async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Recei
                     if inbox.send(Received::Up(from.to_string())).await.is_err() {
                         return;
                     }
-                    tokio::spawn(attend(stream, peer, inbox.clone(), all.subscribe()));
-                    peer += 1;
+                    tokio::spawn(serve_client(stream, stream_id, inbox.clone(), all.subscribe()));
+                    stream_id += 1;
                 }
-                // One client too many; dropping it closes it.
+                // There are too many clients; dropping this one closes its connection.
                 Ok(_) => {}
-                // No descriptor left, for instance: not a reason to run hot.
+                // This happens when no file descriptor is left, for instance. Trying again at once would use a whole
+                // core.
                 Err(_) => tokio::time::sleep(REOPEN_AFTER).await,
             },
             bytes = outbox.recv() => {
                 let Some(bytes) = bytes else { return };
-                // Nobody listening is no error.
+                // It fails when no client is connected, which is no error.
                 let _ = all.send(bytes);
             }
         }
     }
 }
 
-/// One client until it goes.
-async fn attend(
+/// Serves one client until it disconnects.
+async fn serve_client(
     stream: TcpStream,
-    peer: Peer,
+    stream_id: StreamId,
     inbox: Sender<Received>,
     mut all: broadcast::Receiver<Vec<u8>>,
 ) {
-    // Telemetry of now must not wait for more bytes to come; where it cannot be set, it waits a moment.
+    // Without this, TCP delays telemetry to collect more bytes. If the option cannot be set, the delay is accepted.
     let _ = stream.set_nodelay(true);
     let (reader, mut writer) = stream.into_split();
     let write = async {
@@ -79,18 +79,18 @@ async fn attend(
                         return;
                     }
                 }
-                // A slow client has lost frames; its sequence numbers show it how many.
+                // A slow client has lost frames; the sequence numbers tell it how many.
                 Err(broadcast::error::RecvError::Lagged(_)) => {}
                 Err(broadcast::error::RecvError::Closed) => return,
             }
         }
     };
     tokio::select! {
-        _ = read_all(reader, peer, SILENCE, &inbox) => {}
+        _ = read_all(reader, stream_id, SILENCE, &inbox) => {}
         () = write => {}
     }
-    // Fails only when nobody wants the link any more.
-    let _ = inbox.send(Received::Gone(peer)).await;
+    // It fails only when the owner has dropped the link.
+    let _ = inbox.send(Received::Gone(stream_id)).await;
 }
 
 pub(super) fn connect(address: String, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
@@ -116,7 +116,8 @@ impl Line for Connection {
             .await
             .map_err(|_elapsed| format!("no answer within {CONNECT_WITHIN:?}"))?
             .map_err(|error| error.to_string())?;
-        // A command must not wait for more bytes to come; where it cannot be set, it waits a moment.
+        // Without this, TCP delays commands to collect more bytes. If the option cannot be set, the delay is
+        // accepted.
         let _ = stream.set_nodelay(true);
         Ok(stream)
     }

@@ -1,11 +1,9 @@
-//! The log's own controller, run again on its inputs beside the record.
+//! Runs the controller of the log again on its recorded inputs and compares it with the record.
 
 use prost::Message as _;
 use protocol::log::flight_v1::{PilotStart, PilotTick};
 use protocol::log::v1::ControllerTick;
-use replay::controller::{
-    LoggedController, LoggedPilot, NewPlans, Replayed as _, path_in_world_m, settings_in_flight,
-};
+use replay::controller::{LoggedController, LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
 use replay::log::{FrameOrder, Gap};
 
 use crate::survey::Survey;
@@ -14,12 +12,12 @@ use crate::survey::Survey;
 #[derive(Default)]
 pub(crate) struct Again {
     controller: Controller,
-    /// The first tick that came out otherwise.
+    /// The first tick with a different result.
     pub(crate) first_different: Option<u64>,
-    /// Ticks run again, and how many of them came out bit for bit.
+    /// Ticks run again, and how many of them were identical bit for bit.
     pub(crate) ticks: u64,
     pub(crate) identical: u64,
-    /// Why it was not run to the end.
+    /// Why it was not run to the end, if so.
     pub(crate) obstacle: Option<String>,
 }
 
@@ -41,7 +39,7 @@ enum Controller {
 /// A frame of a flight computer, run again.
 pub(crate) struct FrameAgain {
     pub(crate) tick: PilotTick,
-    /// A plan that it made in this frame: where it leads, m, and the iterations it took.
+    /// A plan made in this frame: its path, m, and the iterations it took.
     pub(crate) plan: Option<(Vec<[f32; 3]>, usize)>,
 }
 
@@ -60,21 +58,17 @@ impl Again {
         again
     }
 
-    /// The flight computer, let go.
+    /// Starts the flight computer.
     pub(crate) fn let_go(&mut self, survey: &Survey, start: &PilotStart) {
         let Some(mission_toml) = &survey.profile_toml else {
             return self.give_up("the log has no mission to build the flight computer from".to_owned());
         };
-        let settings = settings_in_flight(&survey.run).map_err(|error| error.to_string());
-        let pilot = settings.and_then(|settings| {
-            LoggedPilot::new(mission_toml, start, &settings).map_err(|error| error.to_string())
-        });
-        match pilot {
+        match LoggedPilot::recorded(mission_toml, start, &survey.run, &[]) {
             Ok(pilot) => {
                 let (plans, order) = (NewPlans::default(), FrameOrder::default());
                 self.controller = Controller::Pilot { pilot: Box::new(pilot), plans, order };
             }
-            Err(reason) => self.give_up(reason),
+            Err(error) => self.give_up(error.to_string()),
         }
     }
 
@@ -100,7 +94,7 @@ impl Again {
         }
     }
 
-    /// Runs a frame of a flight computer again; `record` is its record's number within its channel.
+    /// Runs a frame of a flight computer again; `record` is the sequence number of its record in the channel.
     pub(crate) fn frame(&mut self, recorded: &PilotTick, record: u32) -> Option<FrameAgain> {
         let Controller::Pilot { pilot, plans, order } = &mut self.controller else { return None };
         let number = recorded.input.frame;
@@ -126,7 +120,7 @@ impl Again {
         }
     }
 
-    /// What came of it, in words; `None` if there was nothing to run again.
+    /// The result in words; `None` if there was nothing to run again.
     pub(crate) fn words(&self) -> Option<String> {
         let Self { ticks, identical, obstacle, .. } = self;
         let ended =

@@ -1,4 +1,4 @@
-//! Where in the recording what is: entity paths. Plots carry their unit in their name.
+//! The entity paths of the recording. Names of plots contain their unit.
 
 /// The space: x as in the log, y to the left of it, z up, in metres; the origin is at altitude 0.
 pub const WORLD: &str = "world";
@@ -10,7 +10,7 @@ pub const PAD_LIMIT: &str = "world/pad/limit";
 pub const ROCKET: &str = "world/rocket";
 /// A dot on the rocket, which is small in a view of the whole flight.
 pub const MARKER: &str = "world/rocket/marker";
-/// Where the rocket is, without its attitude: what the close-up follows.
+/// The position of the rocket without its attitude; the camera of the close-up follows it.
 pub const FOLLOWED: &str = "world/followed";
 /// The shape of the rocket.
 pub const BODY: &str = "world/rocket/body";
@@ -24,24 +24,23 @@ pub const BELL: &str = "world/rocket/nozzle/bell";
 pub const THRUST: &str = "world/rocket/nozzle/thrust";
 /// The whole path that was flown, at all times.
 pub const FLOWN: &str = "world/path/flown";
-/// The path up to now, a piece at each record.
+/// The path up to now, one piece for each record.
 pub const TRAIL: &str = "world/path/trail";
-/// The path the controller plans at each tick. A flight computer's plans are not in its log: these are made by running it
-/// again.
+/// The path the controller plans at each tick. A flight computer's plans are not in its log: these are made by running
+/// it again.
 pub const PREDICTED: &str = "world/path/predicted";
-/// Where that path ends.
+/// The end of that path.
 pub const PREDICTED_TOUCHDOWN: &str = "world/path/predicted_touchdown";
 /// The path that the controller of a planar landing, run again on the recorded inputs, plans at each tick.
 pub const PREDICTED_REPLAYED: &str = "world/path/predicted_replayed";
-/// The first plan under thrust, at all times: what the flight was meant to be.
+/// The first plan under thrust, at all times: the intended flight.
 pub const FIRST_PLAN: &str = "world/path/first_plan";
 
-/// Everything that is plotted. A line `replayed` is what the controller, run again on the recorded inputs, decides beside
-/// what is recorded.
+/// All plots. A line `replayed` is the decision of the controller when it is run again on the recorded inputs.
 pub const PLOTS: &str = "plots";
 /// The flight phase, as states.
 pub const PHASE: &str = "states/phase";
-/// What decides the gimbal command, as states.
+/// The control level that decides the gimbal command, as states.
 pub const LEVEL: &str = "states/level";
 /// The same, run again on the recorded inputs.
 pub const LEVEL_REPLAYED: &str = "states/level_replayed";
@@ -54,7 +53,7 @@ pub const PHASES: &str = "log/phases";
 pub const REPLAY: &str = "log/replay";
 /// The landing verdict, as text.
 pub const VERDICT: &str = "log/verdict";
-/// What flight this is and how it ended, as a document.
+/// A document that says which flight this is and how it ended.
 pub const REPORT: &str = "report";
 
 /// Name of the timeline of vehicle time.

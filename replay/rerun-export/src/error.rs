@@ -5,28 +5,21 @@ use std::path::PathBuf;
 use re_sdk::RecordingStreamError;
 use replay::log::LogError;
 
-/// Why a log could not be exported. Damage inside a log is not among the reasons.
+/// Why a log could not be exported. Damage inside a log is not a reason.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The log cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The recording's file is there already.
-    #[error("{}: is there already; --force overwrites it", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    /// The recording's file already exists.
+    #[error("{}: already exists; --force overwrites it", path.display())]
+    Exists { path: PathBuf },
     /// The recording would overwrite the log.
     #[error("{}: is the log itself; name another file for the recording", path.display())]
-    IsTheLog {
-        /// The file.
-        path: PathBuf,
-    },
+    IsTheLog { path: PathBuf },
     /// The recording's file cannot be written.
     #[error("{}: cannot be written", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
@@ -38,6 +31,6 @@ pub enum ExportError {
         reason: String,
     },
     /// Rerun refuses a record.
-    #[error("the recording cannot take a record")]
+    #[error("Rerun refused a record")]
     Record(#[from] RecordingStreamError),
 }

@@ -1,8 +1,8 @@
-//! A log into a recording, record by record.
+//! Exports a log into a recording, record by record.
 
 use std::io::{Read, Write};
 
-use flight::controller::ControlLevel;
+use flight::guidance::controller::ControlLevel;
 use protocol::log::flight_v1::{PilotTick, TruthSample};
 use protocol::log::v1::{
     ControllerTick, LandingVerdict as RecordedVerdict, PlanarState, PlantTruth, Telemetry,
@@ -25,14 +25,13 @@ use crate::survey::{PoseSource, StampedEvent, Survey};
 use crate::times::Times;
 use crate::words;
 
-/// What was exported.
+/// Summary of an export.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Exported {
     /// Controller ticks.
     pub ticks: u64,
     /// Records that carry the pose of the rocket.
     pub poses: u64,
-    /// Events.
     pub events: u64,
     /// Events that were left out: unreadable, or too many.
     pub events_left_out: u64,
@@ -40,13 +39,13 @@ pub struct Exported {
     pub unreadable: u64,
     /// Why the first of them cannot be read.
     pub first_unreadable: Option<String>,
-    /// What keeps this build from using the log's profile.
+    /// Why this build cannot use the log's profile, if so.
     pub profile_problem: Option<String>,
     /// What ended the reading early.
     pub damage: Option<String>,
 }
 
-/// Writes the recording of a log to anywhere.
+/// Writes the recording of a log to any output.
 ///
 /// # Errors
 /// The log cannot be used, or the recording cannot be written.
@@ -60,7 +59,7 @@ pub fn export<R: Read, W: Write + Send + 'static>(
     Ok((exported, writer.finish()?))
 }
 
-/// An export under way.
+/// An export in progress.
 struct Export<'a> {
     recording: &'a RecordingStream,
     survey: &'a Survey,
@@ -69,7 +68,7 @@ struct Export<'a> {
     scene: Scene<'a>,
     plots: Plots<'a>,
     again: Again,
-    /// The flight computer, run again, flies by a plan.
+    /// Whether the flight computer, run again, currently follows a plan.
     planning: bool,
     verdict: Option<RecordedVerdict>,
     done: Exported,
@@ -121,7 +120,12 @@ impl<'a> Export<'a> {
                     self.plots.timing(&timing)?;
                 }
                 Entry::World(truth) => self.world(&truth, log_time_ns)?,
-                Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
+                Entry::ComputerStart(_)
+                | Entry::ComputerFrame(_)
+                | Entry::RawFrame
+                | Entry::Operator
+                | Entry::Event(_)
+                | Entry::Other => {}
             }
         }
         self.events_until(u64::MAX)?;
@@ -169,7 +173,7 @@ impl<'a> Export<'a> {
         self.planar_rocket(&truth.state, Some(truth.gimbal_actual_rad), Some(weights))
     }
 
-    /// A frame of a flight from apogee; its numbers stand beside the truth.
+    /// A frame of a flight from apogee; its values are plotted with the truth.
     fn frame(&mut self, tick: &PilotTick, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
         self.times.learn(tick.input.time_s, log_time_ns);
         self.times.tick(tick.input.frame);
@@ -185,7 +189,7 @@ impl<'a> Export<'a> {
         let planning = again.output.level != u32::from(ControlLevel::Idle.index());
         match plan {
             Some((path_m, _)) => self.scene.path(path_m, again.output.phase, false)?,
-            // What is planned no more is shown no more.
+            // A plan that is no longer followed is no longer shown.
             None if self.planning && !planning => self.scene.path(Vec::new(), again.output.phase, false)?,
             None => {}
         }
@@ -193,7 +197,7 @@ impl<'a> Export<'a> {
         Ok(())
     }
 
-    /// Runs the controller again, and says so where that differs for the first time or ends.
+    /// Runs the controller again, and records where it first differs or ends.
     fn run_again<T>(
         &mut self,
         run: impl FnOnce(&mut Again) -> Option<T>,
@@ -267,7 +271,7 @@ impl<'a> Export<'a> {
         }
     }
 
-    /// Events carry the log's time only, so they wait until that can be told in vehicle time.
+    /// Events have log time only, so they wait until log time can be converted to vehicle time.
     fn events_until(&mut self, log_time_ns: u64) -> RecordingStreamResult<()> {
         while let Some(event) = self.waiting.next_if(|event| event.log_time_ns <= log_time_ns) {
             self.times.at_log_time(self.recording, event.log_time_ns);

@@ -1,4 +1,4 @@
-//! A log file into a recording file, without losing what is there.
+//! Exports a log file into a recording file without losing existing files.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter};
@@ -10,7 +10,7 @@ use crate::ExportError;
 use crate::export::{Exported, export};
 use crate::survey::Survey;
 
-/// What to do with a recording that is there already.
+/// What to do with an existing recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Overwrite {
     /// Keep it and fail.
@@ -19,7 +19,7 @@ pub enum Overwrite {
     Always,
 }
 
-/// Writes the recording of a log file. The file appears once it is whole.
+/// Writes the recording of a log file. The file appears when it is complete.
 ///
 /// # Errors
 /// The log cannot be used, or the recording cannot be written.

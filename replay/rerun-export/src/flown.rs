@@ -20,7 +20,7 @@ impl FlownPath {
         Self { points_m: Vec::new(), spacing_m: SPACING_M, last_m: None }
     }
 
-    /// Adds a point and says from where the path came, if it moved on.
+    /// Adds a point; returns the previous point if the path moved on.
     pub(crate) fn push(&mut self, point_m: [f32; 3]) -> Option<[f32; 3]> {
         if !point_m.iter().all(|value| value.is_finite()) {
             return None;
@@ -41,7 +41,7 @@ impl FlownPath {
         Some(previous_m)
     }
 
-    /// The whole path, with its very last point.
+    /// The whole path, including the last point.
     pub(crate) fn into_points_m(mut self) -> Vec<[f32; 3]> {
         if self.points_m.last() != self.last_m.as_ref() {
             self.points_m.extend(self.last_m);

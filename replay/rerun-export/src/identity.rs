@@ -1,4 +1,4 @@
-//! Which recording it is among those that the viewer holds.
+//! Identifies a recording among those in the viewer.
 
 use std::path::Path;
 
@@ -6,8 +6,8 @@ use re_sdk::RecordingStreamBuilder;
 
 use crate::survey::Survey;
 
-/// Recordings of one application share a layout in the viewer: a flight and the same flight flown again stand side by
-/// side.
+/// Recordings of one application share a layout in the viewer, so that a flight and its re-flown version can be
+/// compared.
 pub(crate) const APPLICATION: &str = "touchdown";
 
 /// The recording's identity: a log gives the same one every time, and two runs never share one.

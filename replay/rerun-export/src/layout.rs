@@ -57,7 +57,7 @@ struct Layout<'a> {
     made: u64,
 }
 
-/// A view or a container that was made.
+/// A view or a container of the layout.
 struct Part {
     path: String,
     id: Uuid,
@@ -117,14 +117,14 @@ impl Layout<'_> {
         self.space("Flight", entity::WORLD, &["+ /world/**"], &eye, &grid)
     }
 
-    /// The rocket, followed but not turned with.
+    /// The camera follows the rocket but does not turn with it.
     fn close_up(&mut self, extent: &Extent) -> RecordingStreamResult<Part> {
         let eye = EyeControls3D::new()
             .with_kind(Eye3DKind::Orbital)
             .with_position([0.8 * extent.rocket_m, -3.4 * extent.rocket_m, 0.5 * extent.rocket_m])
             .with_look_target([0.0, 0.0, -0.5 * extent.rocket_m])
             .with_eye_up([0.0, 0.0, 1.0]);
-        // A grid would follow too.
+        // A grid would move with the camera, so there is none.
         let grid = LineGrid3D::new().with_visible(false);
         let contents = ["+ /world/**".to_owned(), format!("- /{}", entity::MARKER)];
         let contents = contents.each_ref().map(String::as_str);
@@ -192,7 +192,7 @@ impl Layout<'_> {
         Ok(part)
     }
 
-    /// A place in the layout that nothing else has.
+    /// A unique id in the layout.
     fn part(&mut self, kind: &str) -> Part {
         self.made += 1;
         let mut bytes = [0; 16];

@@ -1,15 +1,17 @@
-//! Flight logs as recordings for the Rerun viewer (<https://rerun.io>): the flight in space, what the controller
-//! planned at every tick, plots with their limits, and the events.
+//! Exports flight logs as recordings for the Rerun viewer (<https://rerun.io>): the flight in space, the path that the
+//! controller planned at every tick, plots with their limits, and the events.
 //!
-//! * [`export`]: a log into a recording; [`export_file`] into an `.rrd` file.
-//! * [`pose`]: the planar state in the viewer's space.
-//! * [`survey`]: what has to be known of a log before its first record is exported.
+//! In reading order:
 //!
-//! What the recording holds, with its entity paths and units, is listed in [`entity`]. Its two timelines are
-//! `flight_time` (a duration, vehicle time) and `tick` (a sequence, the controller's tick that was running).
+//! * [`export`]: writes a log into a recording; [`export_file`] writes it into an `.rrd` file.
+//! * [`survey`]: reads the log once before the export, for facts that the first record already needs.
+//! * [`entity`]: the entity paths of the recording, with their units.
+//! * [`pose`]: converts the planar state to the viewer's space.
 //!
-//! This is a crate of its own because Rerun costs more to compile than everything else here together.
-#![warn(missing_docs)]
+//! The recording has two timelines: `flight_time` (a duration, vehicle time) and `tick` (a sequence, the number of the
+//! controller's current tick).
+//!
+//! This is a separate crate because Rerun costs more to compile than everything else here together.
 
 mod again;
 pub mod entity;

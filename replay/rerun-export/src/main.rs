@@ -24,7 +24,7 @@ struct Cli {
     /// The recording [default: the log's name with .rrd].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Overwrite the recording if it is there already.
+    /// Overwrite an existing recording.
     #[arg(long)]
     force: bool,
 }
@@ -77,7 +77,7 @@ fn warn(log: &str, exported: &Exported) {
     }
 }
 
-/// Says something to the user; if nobody can hear it, nothing is lost.
+/// Writes a line to standard error; a closed standard error is ignored.
 fn say(text: &str) {
     let _ = writeln!(std::io::stderr(), "replay-rerun: {text}");
 }

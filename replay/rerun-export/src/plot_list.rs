@@ -1,7 +1,7 @@
-//! Which plots there are, and the limits their numbers are held against.
+//! The list of plots, and the limits of their values.
 
-use flight::dynamics::PlanarState as FlightState;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::dynamics::PlanarState as FlightState;
 use protocol::log::v1::LandingVerdict as RecordedVerdict;
 
 use crate::survey::Survey;
@@ -10,7 +10,7 @@ use crate::survey::Survey;
 pub(crate) struct Plot {
     pub(crate) name: &'static str,
     pub(crate) title: &'static str,
-    /// A legend covers much of a plot; the colours mean the same in all of them.
+    /// Whether to show a legend: it covers much of a plot, and the colours mean the same in all plots.
     pub(crate) legend: bool,
 }
 
@@ -47,7 +47,7 @@ pub(crate) const FROM_APOGEE: [Plot; 12] = [
 /// The plots of a gimbal with two axes.
 pub(crate) const GIMBAL_IN_SPACE: [&str; 2] = ["gimbal_pitch_deg", "gimbal_yaw_deg"];
 
-/// A range that a plot's number should stay in.
+/// A range that a plotted value should stay in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlotLimit {
     /// The plot's name.
@@ -74,7 +74,7 @@ pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
     })
 }
 
-/// The limits a landing is judged by, as recorded with the verdict or else by the profile, and the gimbal's.
+/// The limits of the landing, from the recorded verdict or else from the profile, and those of the gimbal.
 pub(crate) fn limits_of(survey: &Survey, verdict: Option<&RecordedVerdict>) -> Vec<PlotLimit> {
     let profile = survey.profile.as_ref();
     let limit =
@@ -112,11 +112,10 @@ pub(crate) fn limits_of(survey: &Survey, verdict: Option<&RecordedVerdict>) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::profile::Profile;
 
     #[test]
     fn every_number_of_the_verdict_has_a_plot() {
-        let limits = TouchdownLimits::from_profile(&Profile::builtin("paper-calibrated").unwrap());
+        let limits = TouchdownLimits::from_profile(&vehicles::profile::builtin("paper-calibrated").unwrap());
         for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
             let plot = plot_of_verdict(result.name).unwrap();
             assert!(PLANAR.iter().any(|known| known.name == plot), "{plot}");

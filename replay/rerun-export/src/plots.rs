@@ -1,9 +1,9 @@
-//! Numbers over time, with the limits they are held against.
+//! Records values over time, with their limits.
 
 use std::collections::BTreeSet;
 
-use flight::controller::ControlLevel;
-use flight::phase::Phase;
+use flight::guidance::controller::ControlLevel;
+use flight::rules::phase::Phase;
 use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
 use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
 use re_sdk::{RecordingStream, RecordingStreamResult};
@@ -23,7 +23,7 @@ const GREEN: Rgba32 = Rgba32::from_rgb(120, 200, 130);
 const VIOLET: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const RED: Rgba32 = Rgba32::from_rgb(200, 70, 70);
 
-/// Whose number it is, or what else a line shows.
+/// The source of a line in a plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Line {
     Truth,
@@ -63,7 +63,7 @@ impl Line {
             Self::Deadline | Self::Lowest | Self::Highest => (RED, 0.75),
         };
         let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([self.name()]);
-        // What a tick decides holds until the next one.
+        // The decision of a tick holds until the next tick.
         let steps = matches!(self, Self::Commanded | Self::Measured | Self::Replayed);
         if steps { style.with_interpolation_mode(InterpolationMode::StepAfter) } else { style }
     }
@@ -83,14 +83,14 @@ impl<'a> Plots<'a> {
         Self { recording, styled: BTreeSet::new(), level: None, level_replayed: None, phase: None }
     }
 
-    /// What the plant really does.
+    /// Records the true state of the plant.
     pub(crate) fn truth(&mut self, truth: &PlantTruth) -> RecordingStreamResult<()> {
         self.state(&truth.state, Line::Truth)?;
         self.draw("gimbal_deg", Line::Commanded, truth.gimbal_commanded_rad.to_degrees())?;
         self.draw("gimbal_deg", Line::Actual, truth.gimbal_actual_rad.to_degrees())
     }
 
-    /// What really happens on a flight from apogee, and what its servos were told.
+    /// Records the true state of a flight from apogee, and the commands to its servos.
     pub(crate) fn in_space(&mut self, truth: &TruthSample) -> RecordingStreamResult<()> {
         let (at, moving) = (&truth.state.position_m, &truth.state.velocity_m_s);
         let degrees = |angles_rad: &[f64], axis: usize| angles_rad.get(axis).copied().map(f64::to_degrees);
@@ -109,7 +109,7 @@ impl<'a> Plots<'a> {
         self.maybe("fins_mean_deg", Line::Actual, mean_deg(&truth.fins_actual_rad))
     }
 
-    /// What the controller sees and does. `alone`: nobody else tells the gimbal angles.
+    /// Records the controller's input and output. `alone`: no other source has the gimbal angles.
     pub(crate) fn tick(&mut self, tick: &ControllerTick, alone: bool) -> RecordingStreamResult<()> {
         self.state(&tick.input.state, Line::Estimate)?;
         if alone {
@@ -123,7 +123,7 @@ impl<'a> Plots<'a> {
         self.level(tick.output.level)
     }
 
-    /// What the ground station knows. `alone`: the log has nothing better.
+    /// Records what the ground station knows. `alone`: the log has no better source.
     pub(crate) fn telemetry(&mut self, telemetry: &Telemetry, alone: bool) -> RecordingStreamResult<()> {
         let degrees = |angle: Option<f64>| angle.map(f64::to_degrees);
         let line = Line::Telemetry;
@@ -146,7 +146,7 @@ impl<'a> Plots<'a> {
         Ok(())
     }
 
-    /// The phase now; says its name if it changed.
+    /// Records the current phase; returns its name if it changed.
     pub(crate) fn phase(&mut self, phase: u32) -> RecordingStreamResult<Option<String>> {
         if self.phase == Some(phase) {
             return Ok(None);
@@ -183,7 +183,7 @@ impl<'a> Plots<'a> {
         self.draw("q_deg_s", line, state.q_rad_s.to_degrees())
     }
 
-    /// The control level now.
+    /// Records the current control level.
     pub(crate) fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
         if self.level.replace(level) == Some(level) {
             return Ok(());
@@ -198,7 +198,7 @@ impl<'a> Plots<'a> {
         self.recording.log(entity::LEVEL_REPLAYED, &level_state(level))
     }
 
-    /// What a tick of a planar landing decides, run again.
+    /// Records the decision of a re-run tick of a planar landing.
     pub(crate) fn tick_again(&mut self, again: &ControllerTick) -> RecordingStreamResult<()> {
         let output = &again.output;
         self.draw("gimbal_deg", Line::Replayed, output.gimbal_command_rad.to_degrees())?;
@@ -206,7 +206,7 @@ impl<'a> Plots<'a> {
         self.replayed_level(output.level)
     }
 
-    /// What a frame of a flight computer decides, run again, and the iterations of a plan that it made.
+    /// Records the decision of a re-run frame of a flight computer, and the iterations of its plan.
     pub(crate) fn frame_again(
         &mut self,
         again: &PilotTick,
@@ -221,7 +221,7 @@ impl<'a> Plots<'a> {
         self.replayed_level(output.level)
     }
 
-    /// How long a frame took that plans.
+    /// Records the solve time of a planning frame.
     pub(crate) fn timing(&mut self, timing: &PilotTiming) -> RecordingStreamResult<()> {
         self.draw("solve_time_ms", Line::Measured, 1e3 * timing.solve_time_s)?;
         self.draw("solve_time_ms", Line::Deadline, 1e3 * timing.deadline_s)

@@ -74,7 +74,7 @@ fn about_y_xyzw(angle_rad: f64) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::dynamics::PlanarState as FlightState;
+    use flight::vehicle::dynamics::PlanarState as FlightState;
     use protocol::log::flight_v1::{Quaternion, Vector3};
 
     /// `v + 2 q x (q x v + w v)`.

@@ -34,24 +34,24 @@ impl<W: Write + Send + 'static> RrdWriter<W> {
         )
         .map_err(encode_error)?;
         let output = Arc::new(Mutex::new(Output { encoder: Some(encoder), failure: None }));
-        // Nobody watches while this is written: few, large chunks.
+        // Few, large chunks, because nobody watches while this is written.
         let batches =
             ChunkBatcherConfig { flush_tick: Duration::from_hours(1), ..ChunkBatcherConfig::DEFAULT };
         let (_, store, properties, batches, hooks, _) = builder.batcher_config(batches).into_args();
         let sink = Box::new(Sink(Arc::clone(&output)));
         let recording = RecordingStream::new(store, properties, batches, hooks, sink)?;
-        // When this program wrote a record says nothing about the flight.
+        // The time at which this program wrote a record is not of interest.
         recording.set_log_tick_enabled(false);
         recording.set_log_time_enabled(false);
         Ok(Self { recording, output })
     }
 
-    /// What is written.
+    /// The stream to record into.
     pub(crate) fn recording(&self) -> &RecordingStream {
         &self.recording
     }
 
-    /// Writes what is left and the footer.
+    /// Writes the remaining records and the footer.
     pub(crate) fn finish(self) -> Result<W, ExportError> {
         let flushed = self.recording.flush_blocking();
         let mut output = locked(&self.output);

@@ -1,7 +1,8 @@
 //! The flight in space: rocket, nozzle, thrust, paths, pad.
 
-use flight::controller::ControlLevel;
-use flight::phase::Phase;
+use flight::guidance::controller::ControlLevel;
+use flight::rules::phase::Phase;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use protocol::log::v1::ControllerTick;
 use re_sdk::{RecordingStream, RecordingStreamResult};
 use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
@@ -25,13 +26,9 @@ const REPLAYED: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const REHEARSED: Rgba32 = Rgba32::from_rgb(150, 140, 90);
 const FIRST_PLAN: Rgba32 = Rgba32::from_rgb(120, 95, 40);
 
-/// Gravity if the log does not say, m/s^2.
-const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
-
-/// Where the rocket is and what drives it.
+/// Pose and thrust of the rocket.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
-    /// The rocket in the world.
     pub(crate) rocket: Pose,
     /// The nozzle in the rocket.
     pub(crate) nozzle: Pose,
@@ -39,7 +36,7 @@ pub(crate) struct Seen {
     pub(crate) thrust_in_weights: Option<f64>,
 }
 
-/// What the layout has to know of the space.
+/// The size of the space, for the layout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
 pub(crate) struct Extent {
@@ -64,14 +61,13 @@ pub(crate) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Records what never moves.
+    /// Records the objects that never move.
     pub(crate) fn new(recording: &'a RecordingStream, survey: &Survey) -> RecordingStreamResult<Self> {
         let profile = survey.profile.as_ref();
         let shape = match (profile, &survey.mission) {
             (Some(profile), _) => RocketShape::of(&profile.vehicle),
             (None, Some(mission)) => {
-                let propellant_mass_kg = mission.motor().map_or(0.0, |motor| motor.propellant_mass_kg());
-                RocketShape::of_airframe(&mission.airframe, propellant_mass_kg)
+                RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
             }
             (None, None) => RocketShape::unknown(),
         };
@@ -138,7 +134,7 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// Records what a tick plans, and what it plans when it is run again.
+    /// Records the plan of a tick, and its plan when it is run again.
     pub(crate) fn plan(
         &mut self,
         tick: &ControllerTick,
@@ -152,7 +148,7 @@ impl<'a> Scene<'a> {
         self.path(path_in_world_m(&tick.output.plan.states), tick.input.phase, rehearsed)
     }
 
-    /// Records a path that is planned in a phase; none clears the one before.
+    /// Records a path planned in a phase; `None` clears the previous path.
     pub(crate) fn path(
         &mut self,
         points_m: Vec<[f32; 3]>,
@@ -174,7 +170,7 @@ impl<'a> Scene<'a> {
         self.recording.log(entity::PREDICTED, &strip(points_m, color, 1.5))
     }
 
-    /// Records the whole path, and says how much space it took.
+    /// Records the whole path, and returns its extent.
     pub(crate) fn finish(self) -> RecordingStreamResult<Extent> {
         let points_m = self.flown.into_points_m();
         let all_x_m = || points_m.iter().map(|[x, _, _]| *x).chain([0.0]);
@@ -191,7 +187,7 @@ impl<'a> Scene<'a> {
         Ok(extent)
     }
 
-    /// An arrow that pushes the nozzle; where it begins, the flame ends.
+    /// An arrow that ends at the nozzle and begins at the end of the flame.
     fn thrust_arrow(&self, weights: f64) -> Arrows3D {
         let length_m = weights as f32 * self.shape.length_m();
         let visible = length_m.is_finite() && length_m > 0.0;
@@ -203,7 +199,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// A path, or nothing without a point.
+/// A path, or nothing if it has no points.
 fn strip(points_m: Vec<[f32; 3]>, color: Rgba32, radius: f32) -> LineStrips3D {
     let strips = if points_m.is_empty() { vec![] } else { vec![points_m] };
     LineStrips3D::new(strips).with_colors([color]).with_radii([Radius::new_ui_points(radius)])

@@ -1,15 +1,15 @@
-//! What the rocket looks like: bodies of revolution about its x axis, which points to the nose.
+//! The shape of the rocket: bodies of revolution about its x axis, which points to the nose.
 
-use flight::airframe::{Airframe, MassModel};
-use flight::profile::Vehicle;
+use flight::vehicle::airframe::{Airframe, MassModel};
+use flight::vehicle::profile::Vehicle;
 use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
 use re_sdk_types::components::Color;
 use re_sdk_types::datatypes::{Rgba32, UVec3D, Vec3D};
 
-/// Edges of what is round.
+/// Number of edges of a circle.
 const SEGMENTS: u32 = 32;
 
-/// Rings along the nose.
+/// Number of rings along the nose.
 const NOSE_RINGS: u8 = 8;
 
 const WHITE: Rgba32 = Rgba32::from_rgb(236, 238, 240);
@@ -20,9 +20,9 @@ const METAL: Rgba32 = Rgba32::from_rgb(120, 126, 134);
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
 pub(crate) struct RocketShape {
-    /// Where the body ends in front, m.
+    /// Front end of the body, m.
     pub(crate) nose_x_m: f32,
-    /// Where the body ends behind, m.
+    /// Rear end of the body, m.
     pub(crate) tail_x_m: f32,
     /// Where the nozzle turns, m.
     pub(crate) pivot_x_m: f32,
@@ -63,7 +63,7 @@ impl RocketShape {
         }
     }
 
-    /// For logs that do not say: a metre long.
+    /// For logs without this data: one metre long.
     pub(crate) fn unknown() -> Self {
         Self {
             nose_x_m: 0.5,
@@ -138,7 +138,7 @@ impl RocketShape {
     }
 }
 
-/// Where the feet of a rocket stand whose legs nobody describes, m: clear of the bell.
+/// Position of the feet of a rocket without data about its legs, m: clear of the bell.
 fn below_the_bell_m(tail_x_m: f32, pivot_x_m: f32, radius_m: f32) -> f32 {
     tail_x_m.min(pivot_x_m) - 1.4 * BELL_RADII * radius_m
 }
@@ -185,12 +185,10 @@ fn body_of_revolution(rings: &[Ring]) -> Mesh3D {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::mission::Mission;
-    use flight::profile::Profile;
 
     #[test]
     fn the_rocket_stands_on_its_feet_below_its_nozzle() {
-        let shape = RocketShape::of(&Profile::builtin("paper-calibrated").unwrap().vehicle);
+        let shape = RocketShape::of(&vehicles::profile::builtin("paper-calibrated").unwrap().vehicle);
         assert!((shape.length_m() - 0.7).abs() < 1e-6);
         assert!((shape.tail_x_m + 0.52).abs() < 1e-6 && (shape.pivot_x_m + 0.52).abs() < 1e-6);
         assert!(shape.standing_height_m() > 0.52 + shape.bell_m());
@@ -198,8 +196,8 @@ mod tests {
 
     #[test]
     fn an_airframe_stands_on_its_own_feet() {
-        let mission = Mission::builtin("mk2").unwrap().unwrap();
-        let propellant_kg = mission.motor().unwrap().propellant_mass_kg();
+        let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let propellant_kg = mission.motor_curve.propellant_mass_kg();
         let shape = RocketShape::of_airframe(&mission.airframe, propellant_kg);
         let airframe = &mission.airframe;
         assert!((f64::from(shape.length_m()) - airframe.body.length_m).abs() < 1e-6);

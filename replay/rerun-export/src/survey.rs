@@ -1,11 +1,11 @@
-//! What has to be known of a log before its first record is exported: which records it has, and its events, which
-//! the stream of flight records does not carry.
+//! Collects what the export must know before its first record: which records the log has, and its events, which the
+//! stream of flight records does not contain.
 
 use std::collections::BTreeMap;
 use std::io::Read;
 
-use flight::mission::Mission;
-use flight::profile::Profile;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::Profile;
 use foxglove::messages::Log;
 use foxglove::messages::log::Level;
 use prost::Message as _;
@@ -19,32 +19,31 @@ use protocol::text::printable;
 /// Most events kept; a flight has dozens.
 const EVENTS_KEPT: usize = 100_000;
 
-/// Whose word the pose of the rocket is, best last.
+/// The source of the rocket's pose, the best last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum PoseSource {
-    /// Nobody's: the log has no poses.
+    /// No source: the log has no poses.
     #[default]
     None,
-    /// The ground station's, from telemetry.
+    /// The ground station's telemetry.
     Telemetry,
-    /// The vehicle's own, from its controller's input.
+    /// The input of the vehicle's controller.
     Estimate,
-    /// The simulated plant's.
+    /// The simulated plant.
     Truth,
 }
 
-/// An event, fit for a screen.
+/// An event as text for a screen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StampedEvent {
     /// Nanoseconds since the Unix epoch.
     pub log_time_ns: u64,
-    /// How grave.
     pub level: EventLevel,
-    /// Who says so, and what.
+    /// Source and text.
     pub text: String,
 }
 
-/// What a log has.
+/// Facts about a log.
 #[derive(Debug, Clone, Default)]
 pub struct Survey {
     /// Which run it is: profile, seed and so on.
@@ -59,13 +58,13 @@ pub struct Survey {
     pub mission: Option<Mission>,
     /// Whether it is a flight from apogee.
     pub from_apogee: bool,
-    /// What keeps this build from using the profile.
+    /// Why this build cannot use the profile, if so.
     pub profile_problem: Option<String>,
-    /// Whose word the pose of the rocket is.
+    /// The source of the rocket's pose.
     pub pose_source: PoseSource,
     /// The events, by time.
     pub events: Vec<StampedEvent>,
-    /// Events that cannot be read, or were more than are kept.
+    /// Number of events that cannot be read or exceed the limit.
     pub events_left_out: u64,
     /// Time of the first record, ns since the Unix epoch.
     pub first_log_time_ns: Option<u64>,
@@ -115,10 +114,10 @@ impl Survey {
             }
         };
         let problem = if self.from_apogee {
-            let parsed = Mission::from_toml(&text, ATTACHMENT_PROFILE);
+            let parsed = vehicles::mission::from_toml(&text, ATTACHMENT_PROFILE);
             parsed.map(|mission| self.mission = Some(mission)).map_err(|error| error.to_string())
         } else {
-            let parsed = Profile::from_toml(&text, ATTACHMENT_PROFILE);
+            let parsed = vehicles::profile::from_toml(&text, ATTACHMENT_PROFILE);
             parsed.map(|profile| self.profile = Some(profile)).map_err(|error| error.to_string())
         };
         self.profile_problem = problem.err();

@@ -4,7 +4,7 @@ use re_sdk::{RecordingStream, TimeCell};
 
 use crate::entity::{TIMELINE_FLIGHT_TIME, TIMELINE_TICK};
 
-/// Where on the timelines the export stands.
+/// The current position of the export on the timelines.
 #[derive(Debug, Default)]
 pub(crate) struct Times {
     /// Log time of vehicle time 0, ns since the Unix epoch.
@@ -14,7 +14,7 @@ pub(crate) struct Times {
     span: Option<(Instant, Instant)>,
 }
 
-/// A place on both timelines.
+/// A position on both timelines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant {
     flight_ns: i64,
@@ -22,41 +22,41 @@ pub(crate) struct Instant {
 }
 
 impl Times {
-    /// Whether log times can be told in vehicle time yet.
+    /// Whether log times can be converted to vehicle time yet.
     pub(crate) fn known(&self) -> bool {
         self.zero_log_ns.is_some()
     }
 
-    /// Learns how vehicle time and log time belong together, from the first record that has both.
+    /// Learns the offset between vehicle time and log time from the first record that has both.
     pub(crate) fn learn(&mut self, vehicle_time_s: f64, log_time_ns: u64) {
         self.zero_log_ns.get_or_insert(i128::from(log_time_ns) - i128::from(nanoseconds(vehicle_time_s)));
     }
 
-    /// A new tick is running.
+    /// Sets the number of the current tick.
     pub(crate) fn tick(&mut self, tick: u64) {
         self.tick = Some(tick);
         self.first_tick.get_or_insert(tick);
     }
 
-    /// Puts what is recorded next at a vehicle time, s.
+    /// Sets the position of the next record to a vehicle time, s.
     pub(crate) fn at_vehicle_time(&mut self, recording: &RecordingStream, time_s: f64) {
         self.at(recording, nanoseconds(time_s));
     }
 
-    /// Puts what is recorded next at a log time, ns since the Unix epoch.
+    /// Sets the position of the next record to a log time, ns since the Unix epoch.
     pub(crate) fn at_log_time(&mut self, recording: &RecordingStream, log_time_ns: u64) {
         let zero_ns = *self.zero_log_ns.get_or_insert(i128::from(log_time_ns));
         let flight_ns = i128::from(log_time_ns) - zero_ns;
         self.at(recording, i64::try_from(flight_ns).unwrap_or(i64::MAX));
     }
 
-    /// The first and the last place used. The first counts for the first tick, which may have come after it.
+    /// The first and the last position used. The first one counts as part of the first tick, which may come later.
     pub(crate) fn span(&self) -> Option<(Instant, Instant)> {
         let (first, last) = self.span?;
         Some((Instant { tick: first.tick.or(self.first_tick), ..first }, last))
     }
 
-    /// Puts what is recorded next at a place.
+    /// Sets the position of the next record.
     pub(crate) fn at_instant(recording: &RecordingStream, instant: Instant) {
         recording.set_time(TIMELINE_FLIGHT_TIME, TimeCell::from_duration_nanos(instant.flight_ns));
         match instant.tick.and_then(|tick| i64::try_from(tick).ok()) {
@@ -78,7 +78,7 @@ impl Times {
     }
 }
 
-/// A time in whole nanoseconds. What is no time at all becomes 0 or an end of the range.
+/// A time in whole nanoseconds. NaN becomes 0; values out of range become an end of the range.
 fn nanoseconds(time_s: f64) -> i64 {
     (time_s * 1e9).round() as i64
 }

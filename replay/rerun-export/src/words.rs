@@ -1,4 +1,4 @@
-//! Events, phases and the verdict, in words.
+//! Records events, phases and the verdict as text.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ pub(crate) fn phase(recording: &RecordingStream, name: &str) -> RecordingStreamR
     recording.log(entity::PHASES, &TextLog::new(format!("phase {name}")).with_level(TextLogLevel::INFO))
 }
 
-/// Records the verdict where it fell.
+/// Records the verdict at its time.
 pub(crate) fn verdict(recording: &RecordingStream, verdict: &LandingVerdict) -> RecordingStreamResult<()> {
     let broken: Vec<String> = verdict
         .limits
@@ -44,17 +44,17 @@ pub(crate) fn verdict(recording: &RecordingStream, verdict: &LandingVerdict) -> 
     recording.log(entity::VERDICT, &TextLog::new(text).with_level(level))
 }
 
-/// Records what came of running the controller again.
+/// Records the result of running the controller again.
 pub(crate) fn replay(recording: &RecordingStream, text: &str) -> RecordingStreamResult<()> {
     recording.log(entity::REPLAY, &TextLog::new(text).with_level(TextLogLevel::WARN))
 }
 
-/// What is to be said of a log besides.
+/// Further facts about a log.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Remarks<'a> {
     /// What ended the reading early.
     pub(crate) damage: Option<&'a str>,
-    /// What came of running the controller again.
+    /// The result of running the controller again.
     pub(crate) again: Option<&'a str>,
 }
 
@@ -121,7 +121,7 @@ fn report_text(
     text
 }
 
-/// Text from a log, fit for a cell of a table.
+/// Escapes text from a log for a table cell.
 fn cell(text: &str) -> String {
     printable(text.as_bytes()).replace('|', "/")
 }

@@ -24,10 +24,10 @@ pub(super) struct Ask {
     /// Highest value tried.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     highest: f64,
-    /// Where to begin, if not with the profile's own value.
+    /// Value to begin with [default: the profile's value].
     #[arg(long, allow_negative_numbers = true)]
     value: Option<f64>,
-    /// Change the plant alone, which the controller does not know of.
+    /// Change the plant only; the controller does not know about the change.
     #[arg(long)]
     of_plant: bool,
     /// Values tried on either side before the change is narrowed down.

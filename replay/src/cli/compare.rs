@@ -16,16 +16,16 @@ pub(super) struct Ask {
     /// The other flights.
     #[arg(required = true)]
     others: Vec<PathBuf>,
-    /// What falls together; on ignition if both flights have one and this is left out, else on vehicle time.
+    /// The event on which the flights are aligned [default: ignition if both flights have one, else vehicle time].
     #[arg(long, value_enum)]
     align: Option<AlignOn>,
     /// Tolerances, a TOML file.
     ///
-    /// [signals."NAME"] with rms and max in the signal's own unit, where a * at the end of NAME fits any rest; and
-    /// before that `verdict = false` to let the verdicts differ, `missing = N` and `added = N` for how many signals only
-    /// one flight may have, `samples_missing = SHARE` and `samples_added = SHARE` for the samples of each signal (also of
-    /// one, behind its max), and `damaged = true` for logs that are damaged or end before their flight did. What is left
-    /// out is not tolerated.
+    /// [signals."NAME"] with rms and max in the signal's own unit; a * at the end of NAME matches any rest. Before
+    /// that: `verdict = false` lets the verdicts differ; `missing = N` and `added = N` allow this many signals that
+    /// only one flight has; `samples_missing = SHARE` and `samples_added = SHARE` allow this share of each signal's
+    /// samples (also possible for one signal, after its max); `damaged = true` allows logs that are damaged or end
+    /// before their flight did. Anything left out is not tolerated.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.

@@ -18,13 +18,13 @@ pub(super) struct Ask {
     /// The format.
     #[arg(long, value_enum)]
     to: Format,
-    /// Where to: a directory for csv and parquet (one file a table), a file for tlog.
+    /// Output: a directory for csv and parquet (one file for each table), a file for tlog.
     #[arg(long, short, value_name = "PATH")]
     output: PathBuf,
-    /// For tlog: whose frames, if the log has those of several; the ground's unless this says otherwise.
+    /// For tlog: the endpoint whose frames are written, if the log has several [default: ground].
     #[arg(long, value_name = "vehicle|ground")]
     endpoint: Option<String>,
-    /// Replace files that are there.
+    /// Replace existing files.
     #[arg(long)]
     force: bool,
 }
@@ -37,7 +37,7 @@ enum Format {
     Parquet,
     /// Raw MAVLink frames, for ground stations.
     Tlog,
-    /// Rerun: a program of its own does it.
+    /// Rerun; a separate program writes it.
     Rrd,
 }
 
@@ -61,8 +61,8 @@ impl Ask {
         Ok(Answer::Given)
     }
 
-    /// Rerun costs more to compile than all the rest, so a program of its own does it; if it was built, it lies beside
-    /// this one.
+    /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
+    /// beside this one.
     fn rerun(&self) -> Result<Answer> {
         let program =
             std::env::current_exe().context("where this program lies")?.with_file_name("replay-rerun");

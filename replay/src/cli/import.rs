@@ -17,7 +17,7 @@ pub(super) struct Ask {
     file: PathBuf,
     /// The flight log to write; the .tlog's name with .mcap if left out.
     output: Option<PathBuf>,
-    /// Replace a file that is there.
+    /// Replace an existing file.
     #[arg(long)]
     force: bool,
     /// Answer in JSON.
@@ -50,7 +50,7 @@ impl Ask {
     }
 }
 
-/// Of a file that takes more than a moment says at every tenth how far the import is.
+/// Reports every tenth of the progress of a long import.
 fn tell(ImportProgress { read, total }: ImportProgress, told: &mut u64) {
     const LARGE_BYTES: u64 = 32_000_000;
     const MEGABYTE: u64 = 1_000_000;

@@ -1,4 +1,4 @@
-//! The command line: what is asked, and how the answer leaves the program. One file a subcommand.
+//! The command line: parses the question and prints the answer. One file for each subcommand.
 
 mod bisect;
 mod compare;
@@ -20,27 +20,27 @@ use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
 use replay::info::Completeness;
 use replay::log::{Cut, Gap, Recording};
-use replay::verify::Outcome;
+use replay::verify::Verification;
 
-/// The answer is no: the controller decides otherwise than recorded, or flights differ by more than is tolerated.
+/// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
 pub(crate) const EXIT_NO: u8 = 1;
 /// There is no answer: wrong usage, an unreadable file, not a flight log, or not replayable.
 pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 
-/// What is in a flight log, does the controller decide again what it decided then, and what would it have done?
+/// Describes flight logs, runs their flights again, and compares them.
 ///
 /// Answers go to standard output, warnings and errors to standard error.
 ///
 /// Exit codes:
-///   0  the question is answered: the log is described, or every tick that could be read is identical
+///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
-///      compare: more is apart or missing than is tolerated, or the verdicts differ
+///      compare: more differs or is missing than is tolerated, or the verdicts differ
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
-///      some tick (no ticks, no profile, ticks missing) and none that it could differs;
+///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
 ///
-/// A damaged log is used up to the damage, with a warning and exit code 0, but for verify --strict (which --junit
-/// is by itself) and for compare.
+/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict (implied by
+/// --junit) and by compare.
 #[derive(Debug, Parser)]
 #[command(name = "replay", version, about, long_about, verbatim_doc_comment)]
 pub(crate) struct Cli {
@@ -50,23 +50,24 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Question {
-    /// Says what is in a log: grade, run, build, phases, verdict, ticks, channels, damage.
+    /// Describes a log: grade, run, build, phases, verdict, ticks, channels, damage.
     Info(info::Ask),
-    /// Re-executes every recorded controller tick and compares what it decides bit for bit.
+    /// Runs the flight computer of a log again and compares its decisions bit for bit.
     ///
-    /// The controller is built from the profile in the log and starts before tick 0. All fields of its output and
-    /// the digest of what it remembers are compared; measured times are not. Of a divergence it says how it grows,
-    /// and whether the landing would end otherwise (flown on in simulation from the first tick that differs).
+    /// The flight computer is built from the profile in the log and run on the recorded inputs from power-up on. If the
+    /// log has no frames from power-up, only the controller ticks are compared. All fields of the output and the digest
+    /// of the memory are compared; measured times are not. For a divergence the report says how it grows, and whether
+    /// the landing would end differently (simulated from the first tick that differs).
     Verify(verify::Ask),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
     Evaluate(evaluate::Ask),
     /// Closed loop: flies the flight again in simulation from a chosen moment, with other settings.
     ///
-    /// The plant starts in the recorded state of that moment and the controller with what it remembered; nothing of
-    /// the record is used afterwards. With nothing changed, a simulated flight comes out the same bit for bit.
+    /// The plant starts in the recorded state of that moment and the controller with its memory; the record is not used
+    /// afterwards. With nothing changed, a simulated flight is reproduced bit for bit.
     ///
-    /// A flight from apogee is flown again from apogee with the recorded draw up to that moment, since a log does not
-    /// hold the memory of gusts, servos and sensors; the answer says how many recorded frames came out the same.
+    /// A flight from apogee is flown again from apogee with the recorded draw up to that moment, because a log does not
+    /// hold the internal states of gusts, servos and sensors. The answer says how many recorded frames were reproduced.
     Refly(refly::Ask),
     /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.
     Sweep(sweep::Ask),
@@ -80,20 +81,19 @@ enum Question {
     Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
     Export(export::Ask),
-    /// Makes a flight log of a ground station's .tlog: telemetry only, nothing can be re-executed.
+    /// Converts a ground station's .tlog to a flight log: telemetry only, nothing can be re-executed.
     Import(import::Ask),
-    /// Makes a whole log of a damaged one, and says what was kept and what span is lost.
+    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
     Recover(recover::Ask),
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
     Tick(tick::Ask),
 }
 
-/// How a question was answered.
 pub(crate) enum Answer {
     /// There is an answer.
     Given,
-    /// A comparison by bits. If `strict`, it must be of the whole flight.
-    Verified { outcome: Outcome, strict: bool },
+    /// A bit-for-bit comparison. If `strict`, it must cover the whole flight.
+    Verified { outcome: Verification, strict: bool },
     /// A comparison within tolerances.
     Compared { within: bool },
 }
@@ -104,10 +104,10 @@ impl Answer {
             Self::Given | Self::Compared { within: true } => 0,
             Self::Compared { within: false } => EXIT_NO,
             Self::Verified { outcome, strict } => match outcome {
-                Outcome::Identical => 0,
-                Outcome::IdenticalReadablePart if !strict => 0,
-                Outcome::IdenticalReadablePart | Outcome::Diverged => EXIT_NO,
-                Outcome::NotReplayable => EXIT_NO_ANSWER,
+                Verification::Identical => 0,
+                Verification::IdenticalReadablePart if !strict => 0,
+                Verification::IdenticalReadablePart | Verification::Diverged => EXIT_NO,
+                Verification::NotReplayable => EXIT_NO_ANSWER,
             },
         }
     }
@@ -133,7 +133,7 @@ impl Cli {
     }
 }
 
-/// Writes an answer to standard output. A reader that has heard enough is no failure.
+/// Writes an answer to standard output. A reader that closes the pipe early is not an error.
 fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::Result<()>) -> Result<()> {
     let mut output = io::BufWriter::new(io::stdout().lock());
     match write(&mut output).and_then(|()| output.flush()) {
@@ -142,30 +142,30 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
     }
 }
 
-/// Says something beside the answer; if nobody can hear it, nothing is lost.
+/// Writes a line to standard error; a closed standard error is ignored.
 fn say(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {text}");
 }
 
-/// Warns that a log is used up to its damage only, that its flight's end is missing, or ticks on the way.
+/// Warns about damage, a missing end of the flight and missing ticks.
 fn warn_of_what_is_missing(recording: &Recording) {
     if let Some(Gap { after, before }) = recording.gap() {
         let name = &recording.name;
         say(&format!(
-            "warning: {name}: after tick {after} comes tick {before}; nothing behind the gap was run again"
+            "warning: {name}: after tick {after} comes tick {before}; nothing after the gap was run again"
         ));
     }
     warn_of_damage(&recording.name, recording.damage.as_deref());
     warn_of_cut(&recording.name, recording.cut.as_ref());
 }
 
-/// The same of a log that was described.
+/// Warns about the damage and the missing end of a log that was described.
 fn warn_of_completeness(name: &str, found: &Completeness) {
     warn_of_damage(name, found.damage.as_deref());
     warn_of_cut(name, found.cut.as_ref());
 }
 
-/// Warns that a log is used up to its damage only.
+/// Warns that only the part of a log before its damage is used.
 fn warn_of_damage(file: &str, damage: Option<&str>) {
     if let Some(damage) = damage {
         say(&format!("warning: {file} is damaged: {damage}; everything before was used"));

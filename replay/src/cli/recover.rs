@@ -16,7 +16,7 @@ pub(super) struct Ask {
     file: PathBuf,
     /// The log to write.
     output: PathBuf,
-    /// Replace a file that is there; never the damaged log itself.
+    /// Replace an existing file, but never the damaged log itself.
     #[arg(long)]
     force: bool,
     /// Answer in JSON.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow};
 use clap::{Args, ValueEnum};
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use replay::log::Recording;
 use replay::output::{Destination, Overwrite};
 use replay::print::{print_json, print_refly};
@@ -20,19 +20,19 @@ pub(super) struct Ask {
     file: PathBuf,
     #[command(flatten)]
     how: FlownHow,
-    /// Begin at this tick (of a flight from apogee this frame) instead of the landing's first.
+    /// Begin at this tick (for a flight from apogee: this frame) instead of the landing's first.
     #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase"])]
     tick: Option<u64>,
     /// Begin at this vehicle time, s.
     #[arg(long, value_name = "SECONDS", conflicts_with = "phase")]
     at: Option<f64>,
-    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; of a flight from apogee any.
+    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; for a flight from apogee any phase.
     #[arg(long, value_name = "PHASE", value_parser = phase_named)]
     phase: Option<Phase>,
-    /// Write the flight as a log of its own.
+    /// Write the flight as a new log.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// Replace a file that is there; never the log that is flown again.
+    /// Replace an existing file, but never the log that is flown again.
     #[arg(long, requires = "log")]
     force: bool,
     /// Answer in JSON.
@@ -45,15 +45,15 @@ pub(super) struct Ask {
 pub(super) struct FlownHow {
     #[command(flatten)]
     pub(super) settings: SettingArguments,
-    /// Another setting of the plant alone, which the controller does not know of. Of a planar landing motor.thrust_n=31,
-    /// plant.thrust_scale=0.97 (it has no wind); of a flight from apogee airframe.motor=G33,
+    /// Another setting of the plant only, which the controller does not know about. For a planar landing for example
+    /// motor.thrust_n=31, plant.thrust_scale=0.97 (it has no wind); for a flight from apogee airframe.motor=G33,
     /// truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     plant: Vec<Setting>,
     /// The recorded state to begin from.
     #[arg(long, value_enum, default_value_t = Origin::Truth)]
     from: Origin,
-    /// Which law flies.
+    /// The controller that flies.
     #[arg(long, value_enum, default_value_t = Controller::AsRecorded)]
     controller: Controller,
     /// Seed of the plant's dispersions instead of the recorded one.
@@ -63,23 +63,23 @@ pub(super) struct FlownHow {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Origin {
-    /// The simulated plant's, where the log has it.
+    /// The simulated plant's state, if the log has it.
     Truth,
-    /// What the controller believed: with it the plant begins where the estimate was.
+    /// The controller's estimate: the plant begins where the estimate was.
     Estimate,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Controller {
-    /// The landing controller, with an abort that was latched; the upright law if it flew alone.
+    /// The landing controller, with a latched abort if there was one; the upright law if it flew alone.
     AsRecorded,
-    /// The upright law alone; of planar landings.
+    /// The upright law alone; for planar landings only.
     Stabiliser,
-    /// The pilot itself; of flights from apogee, as those below.
+    /// The pilot itself; this one and those below are for flights from apogee only.
     Nmpc,
-    /// Ignition and fins timed beforehand.
+    /// Ignition and fins at times fixed in advance.
     OpenLoop,
-    /// A nose that swings to waste thrust.
+    /// The nose swings to waste thrust.
     Oscillating,
 }
 

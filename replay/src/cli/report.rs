@@ -16,7 +16,7 @@ pub(super) struct Ask {
     /// The page to write, or - for standard output; the log's name with .html if left out.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Replace a file that is there; never the log.
+    /// Replace an existing file, but never the log.
     #[arg(long)]
     force: bool,
 }

@@ -26,7 +26,7 @@ pub(super) struct Ask {
     /// A setting of the plant alone to vary, in the same form.
     #[arg(long, value_name = "PATH=VALUES")]
     vary_plant: Vec<Vary>,
-    /// This many points at random in the ranges instead of a grid.
+    /// Use this many random points in the ranges instead of a grid.
     #[arg(long, value_name = "POINTS")]
     random: Option<usize>,
     /// Seed of the random points.
@@ -34,10 +34,10 @@ pub(super) struct Ask {
     random_seed: u64,
     #[command(flatten)]
     how: FlownHow,
-    /// Flights flown at the same time; the answer does not depend on it. All processors if left out.
+    /// Flights flown at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Keep every finished flight in this file, and go on from it if it is there.
+    /// Keep every finished flight in this file, and continue from it if it exists.
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
     /// Points to show.
@@ -85,7 +85,7 @@ impl Ask {
         Ok(Answer::Given)
     }
 
-    /// Which sweep it is: flights by content, points, how they are flown, and the build that flies them.
+    /// Identifies the sweep: content of the flights, points, options, and the build.
     fn identity(&self, points: &[Choice]) -> Result<String> {
         let mut facts = format!("{:?} {points:?} {:?}", self.how, protocol::log::build::build_info());
         for path in self.how.settings.settings.iter().chain(&self.files) {
@@ -101,18 +101,18 @@ impl Ask {
     }
 }
 
-/// On a terminal some twenty times in all; elsewhere only at the end.
+/// Shows progress about twenty times on a terminal, elsewhere only at the end.
 fn show(Progress { done, jobs }: Progress) {
     let mut output = std::io::stderr();
     let ended = done == jobs;
     if ended || (output.is_terminal() && done.is_multiple_of((jobs / 20).max(1))) {
         let end = if ended { "\n" } else { "" };
-        // Talk goes to standard error; nobody may be listening.
+        // Progress goes to standard error, which may be closed.
         let _ = write!(output, "\rreplay: {done} of {jobs} flights{end}");
     }
 }
 
-/// FNV-1a, 64 bits: tells files apart, and is no protection against forgery.
+/// FNV-1a, 64 bits: tells files apart, but does not protect against forgery.
 fn fnv(bytes: &[u8]) -> u64 {
     bytes
         .iter()

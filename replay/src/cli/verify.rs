@@ -8,7 +8,7 @@ use anyhow::Result;
 use clap::Args;
 use replay::log::LogError;
 use replay::print::{JunitCase, JunitOutcome, print_json, print_junit, print_verify, verify_case};
-use replay::verify::{Outcome, VerifyReport, verify};
+use replay::verify::{Verification, VerifyReport, verify};
 
 use super::{Answer, answer, say, warn_of_cut, warn_of_damage};
 
@@ -17,20 +17,21 @@ pub(super) struct Ask {
     /// The logs, MCAP files.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Answer in JSON: a report, or of several logs a list of them.
+    /// Answer in JSON: a report, or a list of reports for several logs.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
     /// Answer in JUnit XML; strict unless --strict=false.
     #[arg(long)]
     junit: bool,
-    /// Exit code 1 unless all of each flight was compared: a damaged log fails, and one that ends before its flight did.
+    /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
+    /// flight did.
     #[arg(
         long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
     )]
     strict: Option<bool>,
 }
 
-/// What became of one log.
+/// The result for one log.
 type Verified<'a> = (&'a Path, Result<Vec<VerifyReport>, LogError>);
 
 impl Ask {
@@ -50,7 +51,7 @@ impl Ask {
                     }
                     say_speed(reports, took);
                 }
-                // One log that cannot be read must not hide what the others say.
+                // One unreadable log must not hide the results of the others.
                 Err(error) if self.files.len() > 1 => say(&format!("{error}")),
                 Err(_) => {}
             }
@@ -65,7 +66,7 @@ impl Ask {
         Ok(Answer::Verified { outcome: worst(&answers), strict: self.is_strict() })
     }
 
-    /// A build server looks at nothing but the colour.
+    /// A build server only looks at pass or fail.
     fn is_strict(&self) -> bool {
         self.strict.unwrap_or(self.junit)
     }
@@ -95,24 +96,24 @@ fn cases((path, verified): &Verified, strict: bool) -> Vec<JunitCase> {
     }
 }
 
-/// A difference found outweighs a flight of which there is no answer, and that an identical one.
-fn worst(answers: &[Verified]) -> Outcome {
-    let rank = |outcome: Outcome| match outcome {
-        Outcome::Identical => 0,
-        Outcome::IdenticalReadablePart => 1,
-        Outcome::NotReplayable => 2,
-        Outcome::Diverged => 3,
+/// The worst result decides: a difference, then no answer, then identical.
+fn worst(answers: &[Verified]) -> Verification {
+    let rank = |outcome: Verification| match outcome {
+        Verification::Identical => 0,
+        Verification::IdenticalReadablePart => 1,
+        Verification::NotReplayable => 2,
+        Verification::Diverged => 3,
     };
     let outcomes = answers.iter().flat_map(|(_, verified)| match verified {
         Ok(reports) => reports.iter().map(|report| report.outcome).collect(),
-        Err(_) => vec![Outcome::NotReplayable],
+        Err(_) => vec![Verification::NotReplayable],
     });
-    outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Outcome::NotReplayable)
+    outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Verification::NotReplayable)
 }
 
 fn warn_of_build(report: &VerifyReport) {
     let differences = &report.build.differences;
-    if report.outcome == Outcome::Diverged && !differences.is_empty() {
+    if report.outcome == Verification::Diverged && !differences.is_empty() {
         let facts: Vec<&str> = differences.iter().map(|difference| difference.fact.as_str()).collect();
         say(&format!("note: another build wrote {}; it differs in {}", report.file, facts.join(", ")));
     }

@@ -1,18 +1,18 @@
-//! What falls together when two flights are compared.
+//! The event on which two flights are aligned for a comparison.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use super::{CompareError, Flown};
 use crate::log::Entry;
 
-/// What falls together.
+/// The event on which the flights are aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Align {
     /// Ignition of the landing motor.
     Ignition,
-    /// Touchdown, as the verdict says it.
+    /// Touchdown, from the verdict.
     Touchdown,
     /// Vehicle time itself.
     Time,
@@ -23,7 +23,6 @@ pub enum Align {
 pub struct Anchors {
     /// Ignition of the landing motor.
     pub ignition_s: Option<f64>,
-    /// Touchdown.
     pub touchdown_s: Option<f64>,
 }
 
@@ -37,7 +36,7 @@ impl Anchors {
             u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn)
         };
         match entry {
-            // A tick knows the moment itself; what else is in the phase says only that it has passed.
+            // A tick records the moment of ignition; other records in the phase only show that it has passed.
             Entry::Tick(tick) if lit(tick.input.phase) => {
                 self.ignition_s = Some(tick.input.time_s - tick.input.time_since_ignition_s);
             }

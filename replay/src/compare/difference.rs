@@ -1,13 +1,12 @@
-//! How far two signals are apart.
+//! The difference between two signals.
 
 use serde::Serialize;
 
 use super::{Samples, Series, Tolerance};
 
-/// How far a signal of two flights is apart.
+/// The difference of one signal between two flights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SignalDifference {
-    /// The signal.
     pub signal: String,
     /// Times compared.
     pub samples: usize,
@@ -20,13 +19,13 @@ pub struct SignalDifference {
     pub rms: f64,
     /// The largest difference.
     pub max: f64,
-    /// When that is, the baseline's vehicle time, s.
+    /// When the largest difference occurs, vehicle time of the baseline, s.
     pub max_at_s: Option<f64>,
-    /// Somewhere one of the two is not a number and the other is.
+    /// At some time one of the two is NaN and the other is not.
     pub not_comparable: bool,
-    /// What is tolerated.
+    /// The tolerance of this signal.
     pub tolerance: Option<Tolerance>,
-    /// Whether it is within that.
+    /// Whether the difference is within the tolerance.
     pub passed: bool,
 }
 
@@ -59,7 +58,7 @@ impl SignalDifference {
             found.samples += 1;
             let difference = (value - other).abs();
             if difference.is_nan() {
-                // Two that are both no numbers, or the same infinity, agree.
+                // Two NaNs agree, and so do two equal infinities.
                 let agree = value.to_bits() == other.to_bits() || (value.is_nan() && other.is_nan());
                 found.not_comparable |= !agree;
                 continue;
@@ -83,7 +82,7 @@ impl SignalDifference {
         found
     }
 
-    /// Why it is not tolerated, in words.
+    /// Why the difference is not tolerated, in words.
     pub(super) fn failure(&self) -> Option<String> {
         if self.passed {
             return None;

@@ -1,9 +1,9 @@
-//! Two flights, signal by signal.
+//! Compares two flights signal by signal.
 //!
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`controller_tick.output.…`). The
-//! second flight is shifted so that an event falls together with the first's, and read at the first's times: linearly
-//! between its samples, whole numbers held. Measured solve times are no signals. Samples that only one of the two has are
-//! counted by themselves, because what is read between its neighbours does not show that a record is lost.
+//! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
+//! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
+//! one flight has are counted separately, because interpolation would hide a lost record.
 
 mod align;
 mod difference;
@@ -30,7 +30,7 @@ pub enum CompareError {
     /// A log cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Nothing to align on.
+    /// A log has no event to align on.
     #[error("{name}: has no {event} to align on; --align time needs none")]
     NoAnchor {
         /// The log.
@@ -46,28 +46,28 @@ pub enum CompareError {
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The flight compared with.
+    /// The baseline.
     pub baseline: String,
     /// The other flight.
     pub other: String,
-    /// What falls together.
+    /// The event on which the flights are aligned.
     pub align: Align,
-    /// What was added to the other's times, s.
+    /// Offset added to the times of the other flight, s.
     pub shift_s: f64,
     /// The two verdicts.
     pub verdicts: (Option<VerdictFacts>, Option<VerdictFacts>),
-    /// Signals of both, those that exceed their tolerance first, then by name.
+    /// Signals that both flights have; those that exceed their tolerance first, then by name.
     pub signals: Vec<SignalDifference>,
     /// Signals that only the baseline has.
     pub missing: Vec<String>,
     /// Signals that only the other has.
     pub added: Vec<String>,
-    /// What is not as the tolerances demand, in words.
+    /// Violations of the tolerances, in words.
     pub failures: Vec<String>,
 }
 
 impl Comparison {
-    /// Signals equal in every bit.
+    /// Number of signals that are equal in every bit.
     pub fn identical(&self) -> usize {
         self.signals.iter().filter(|signal| signal.max == 0.0 && !signal.not_comparable).count()
     }
@@ -76,7 +76,7 @@ impl Comparison {
 /// Compares a flight with a baseline.
 ///
 /// # Errors
-/// There is nothing to align on, or a tolerance names a signal that neither flight has.
+/// There is no event to align on, or a tolerance names a signal that neither flight has.
 pub fn compare(
     baseline: &Flown,
     other: &Flown,
@@ -103,7 +103,7 @@ pub fn compare(
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
     if signals.is_empty() {
-        // Flights of two kinds, for instance; that nothing differs would say too much.
+        // For example two flights of different kinds. "No differences" would be misleading here.
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
@@ -130,7 +130,7 @@ pub fn compare(
     })
 }
 
-/// Samples that are missing or added beyond what is tolerated: a line for each table, of the signal with most of them.
+/// Samples missing or added beyond the tolerance: one line for each table, for the signal with the most of them.
 fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Vec<String> {
     let mut worst: BTreeMap<(&str, bool), (usize, String)> = BTreeMap::new();
     for signal in signals {

@@ -1,27 +1,27 @@
-//! Which samples of a signal only one of two flights has.
+//! Finds the samples of a signal that only one of two flights has.
 //!
-//! A lost record leaves no trace in the values: between its neighbours a straight line looks the same. So samples are
-//! counted: each of the first flight is paired with one of the second that stands at its time, to half a period.
+//! Interpolation hides a lost record, so samples are counted: each sample of the first flight is paired with the sample
+//! of the second flight at the same time, to within half a period.
 
 use serde::Serialize;
 
 use super::Series;
 
-/// Of a period: flights aligned on an event have their samples up to half a period apart.
+/// Fraction of a period: samples of flights aligned on an event are up to half a period apart.
 const PERIOD_SHARE: f64 = 0.6;
-/// Times are sums of periods, and rounded.
+/// Tolerance for rounding: times are sums of periods.
 const SAME_S: f64 = 5e-7;
 
 /// Samples of a signal in two flights.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Samples {
-    /// What the baseline has.
+    /// Samples of the baseline.
     #[serde(rename = "samples_expected")]
     pub expected: usize,
-    /// Of these, those that the other lacks.
+    /// Baseline samples that the other flight lacks.
     #[serde(rename = "samples_missing")]
     pub missing: usize,
-    /// What only the other has.
+    /// Samples that only the other flight has.
     #[serde(rename = "samples_added")]
     pub added: usize,
 }
@@ -32,7 +32,7 @@ impl Samples {
         let (ours, theirs) = (&a.times_s, &b.times_s);
         let mut paired = 0;
         if ours.len() == 1 && theirs.len() == 1 {
-            // What is recorded once has no period, and may stand before the event on which flights are aligned.
+            // A value recorded once has no period, and may come before the event on which flights are aligned.
             paired = 1;
         } else {
             let period_s = typical_period_s(ours).min(typical_period_s(theirs));
@@ -61,7 +61,7 @@ fn share(part: usize, whole: usize) -> f64 {
     if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
 }
 
-/// The median of the steps between times; infinite of a single one.
+/// The median step between times; infinite for a single time.
 fn typical_period_s(times_s: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(found(&whole, &whole[..7]), (3, 0));
         assert_eq!(found(&whole, &[]), (10, 0));
         assert_eq!(found(&[0.0], &[7.0]), (0, 0));
-        // Two records of one time are two.
+        // Two records at the same time count as two.
         assert_eq!(found(&[0.0, 0.0, 1.0], &[0.0, 1.0]), (1, 0));
     }
 }

@@ -1,4 +1,4 @@
-//! A log's numbers as signals over vehicle time.
+//! The numbers of a log as signals over vehicle time.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,10 +8,10 @@ use crate::info::VerdictFacts;
 use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError};
 use crate::table::{Cell, Kind, TableReader, TableShape};
 
-/// Numbers held of one log: some minutes of a flight are a few hundred thousand.
+/// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
 
-/// Columns that are times or numbers of records, and those that were measured rather than decided.
+/// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
 const NO_SIGNALS: [&str; 10] = [
     "log_time_ns",
     "time_s",
@@ -25,19 +25,23 @@ const NO_SIGNALS: [&str; 10] = [
     "state_digest",
 ];
 
+/// Tables without signals. The ticks hold the same decisions, and logs of earlier releases, of campaigns and of
+/// re-flown flights have only the ticks.
+const NO_SIGNAL_TABLES: [&str; 2] = ["computer_start", "computer_frame"];
+
 /// One signal.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Series {
-    /// Vehicle times, s, not falling.
+    /// Vehicle times in ascending order, s.
     pub times_s: Vec<f64>,
     /// The value at each.
     pub values: Vec<f64>,
-    /// Whole numbers, which are held between their samples.
+    /// Whether the values are whole numbers, which are held between samples.
     pub whole: bool,
 }
 
 impl Series {
-    /// The value at a time, within half a microsecond of the series' ends; `None` outside.
+    /// The value at a time; `None` more than half a microsecond outside the series.
     pub fn at(&self, time_s: f64) -> Option<f64> {
         const SAME_S: f64 = 5e-7;
         let behind = self.times_s.partition_point(|t| *t <= time_s + SAME_S);
@@ -64,11 +68,11 @@ pub struct Flown {
     pub anchors: Anchors,
     /// The landing verdict.
     pub verdict: Option<VerdictFacts>,
-    /// What ended the reading early.
+    /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
-    /// Numbers whose times fall behind earlier ones; they are in no signal.
+    /// Number of values left out because their times are earlier than the one before.
     pub out_of_order: usize,
 }
 
@@ -102,6 +106,9 @@ impl Flown {
         let mut reader = TableReader::new();
         reader
             .read::<_, Stopped>(&mut FlightLog::open(path)?, |shape, row| {
+                if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) {
+                    return Ok(());
+                }
                 let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
                 let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
                 let time_s = time_of(shape, &row.cells).unwrap_or(since_s);
@@ -111,7 +118,7 @@ impl Flown {
                         continue;
                     };
                     let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
-                    // Records that come late would make the times fall; what is out of order is left out, and counted.
+                    // A signal needs ascending times, so records out of order are left out and counted.
                     if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
                         series.whole = column.kind == Kind::Integer;
                         series.times_s.push(time_s);
@@ -127,7 +134,7 @@ impl Flown {
                 Stopped::Log(error) => RecordingError::Log(error),
                 Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
             })?;
-        // Rows of several kinds in one table, and texts, are no signals over time.
+        // Tables that mix kinds of rows, and texts, are not signals over time.
         signals.retain(|name, _| !name.starts_with("verdict") && !name.starts_with("events."));
         Ok(Self { name, signals, anchors, verdict, damage, cut: flights.cut(), out_of_order })
     }
@@ -144,7 +151,7 @@ impl From<LogError> for Stopped {
     }
 }
 
-/// The record's own vehicle time, s.
+/// The vehicle time in the record, s.
 fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
     let place =
         shape.columns.iter().position(|column| column.name == "time_s" || column.name == "input.time_s")?;

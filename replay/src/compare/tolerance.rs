@@ -59,26 +59,25 @@ pub enum ToleranceError {
     Parse {
         /// The file.
         origin: String,
-        /// The parser's words.
+        /// The parser's message.
         reason: String,
     },
-    /// No such signal.
+    /// Neither flight has the signal.
     #[error("tolerance of `{given}`: neither flight has such a signal; the nearest is `{nearest}`")]
     Unknown {
         /// What was given.
         given: String,
-        /// The signal most like it.
+        /// The signal with the most similar name.
         nearest: String,
     },
-    /// A share that is none.
+    /// A share outside 0 to 1.
     #[error("{given} = {found}: must be a share from 0 to 1")]
     Share {
-        /// Which.
         given: String,
         /// What was found.
         found: f64,
     },
-    /// A limit that nothing can keep.
+    /// A limit that no signal can meet.
     #[error("tolerance of `{given}`: {found} must be a number, 0 or more")]
     Value {
         /// The signal.
@@ -119,7 +118,7 @@ impl Tolerances {
         Ok(tolerances)
     }
 
-    /// What is tolerated of a signal: the longest pattern that fits.
+    /// The tolerance of a signal: that of the longest pattern that matches.
     pub fn of(&self, signal: &str) -> Option<Tolerance> {
         let fitting = self.signals.iter().filter(|(pattern, _)| fits(pattern, signal));
         fitting.max_by_key(|(pattern, _)| pattern.len()).map(|(_, tolerance)| *tolerance)
@@ -149,22 +148,21 @@ impl Tolerances {
         (limit(own.samples_missing, self.samples_missing), limit(own.samples_added, self.samples_added))
     }
 
-    /// What of the flights was not compared because of how they were recorded.
+    /// Parts of the flights that were not compared because of damage or a missing end.
     pub(super) fn record_failures(&self, flights: [&Flown; 2]) -> Vec<String> {
         let mut failures = Vec::new();
         for Flown { name, damage, cut, out_of_order, .. } in flights {
             if *out_of_order > 0 {
-                failures.push(format!(
-                    "{name}: {out_of_order} numbers stand behind later ones and were not compared"
-                ));
+                failures
+                    .push(format!("{name}: {out_of_order} numbers are out of order and were not compared"));
             }
             if self.damaged {
                 continue;
             }
             failures.extend(
-                damage.as_ref().map(|damage| {
-                    format!("{name} is damaged: {damage}; what is behind that was not compared")
-                }),
+                damage
+                    .as_ref()
+                    .map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
             );
             failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
         }
@@ -172,7 +170,7 @@ impl Tolerances {
         failures
     }
 
-    /// Every tolerance must fit some signal, or a misspelt one would tolerate everything.
+    /// Every tolerance must match some signal; otherwise a misspelt name would go unnoticed.
     pub(super) fn check_names<'a>(
         &self,
         signals: &(impl Iterator<Item = &'a String> + Clone),
@@ -195,7 +193,7 @@ fn signals_are(count: usize) -> String {
     if count == 1 { "1 signal is".to_owned() } else { format!("{count} signals are") }
 }
 
-/// A `*` at the end fits any rest.
+/// A `*` at the end matches any rest.
 fn fits(pattern: &str, signal: &str) -> bool {
     match pattern.strip_suffix('*') {
         Some(beginning) => signal.starts_with(beginning),
@@ -217,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn a_wrong_tolerance_is_named() {
         let refusal = |text| Tolerances::from_toml(text, "t.toml").unwrap_err().to_string();
         assert!(refusal("verdikt = true").contains("verdikt"));
         assert!(refusal("[signals.a]\nmax = -1.0").contains('a'));

@@ -4,11 +4,14 @@
 //! from apogee ([`LoggedPilot`], two hundred frames a second, of which some plan). This is the one place that knows which
 //! kind wrote a log's ticks; verification and evaluation are written for any [`Replayed`].
 
+mod computer;
 mod pilot;
 mod planar;
 mod plans;
 
-pub use pilot::{FrameError, LoggedPilot, PilotStartError, SETTINGS_IN_FLIGHT, settings_in_flight};
+pub use computer::{LoggedComputer, StartError};
+pub use pilot::{FrameError, LoggedPilot, SETTINGS_IN_FLIGHT, settings_in_flight};
+pub(crate) use pilot::{REFLOWN_AT, REFLOWN_BY};
 pub use planar::LoggedController;
 pub use plans::{NewPlans, path_in_world_m};
 
@@ -38,8 +41,11 @@ pub trait Replayed {
     /// # Errors
     /// The recorded input cannot be given to this build's controller.
     fn run_again(&mut self, tick: &Self::Tick) -> Result<Self::Tick, Self::Error>;
+}
 
-    /// What a tick decided, in short; `self` has just run it.
+/// A computer whose decisions can be told in short.
+pub trait Decides: Replayed {
+    /// A summary of a tick's decision; `self` has just run that tick.
     fn decided(&self, tick: &Self::Tick) -> Decided;
 }
 
@@ -50,7 +56,6 @@ pub struct Moment {
     pub tick: u64,
     /// Vehicle time, s.
     pub time_s: f64,
-    /// The phase.
     pub phase: &'static str,
 }
 
@@ -75,6 +80,6 @@ pub struct Decided {
 }
 
 fn phase_name(number: u32) -> &'static str {
-    let phase = u8::try_from(number).ok().and_then(flight::phase::Phase::from_index);
-    phase.map_or("unknown", flight::phase::Phase::name)
+    let phase = u8::try_from(number).ok().and_then(flight::rules::phase::Phase::from_index);
+    phase.map_or("unknown", flight::rules::phase::Phase::name)
 }

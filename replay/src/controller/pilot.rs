@@ -2,17 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use flight::controller::ControlLevel;
-use flight::estimator::StartUncertainty;
-use flight::mission::{Mission, MissionError};
-use flight::nmpc::SolveStatus;
-use flight::pilot::{Pilot, PilotInput, PilotOutput};
-use flight::powered::LandingSolved;
+use flight::computer::pilot::{Pilot, PilotInput, PilotOutput};
+use flight::computer::{Computer, Input, flight_time_s};
+use flight::guidance::baseline::{Controller, Law};
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::LandingSolved;
+use flight::vehicle::mission::Mission;
+use nmpc::SolveStatus;
 use prost_reflect::MessageDescriptor;
 use protocol::log::flight_v1;
 use tick_log::pilot::{PilotLogError, input_from_log, state_from_log, tick_to_log};
 
-use super::{Decided, Moment, Replayed, phase_name};
+use super::{Decided, Decides, Moment, Replayed, phase_name};
 use crate::log::pilot_descriptor;
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
 
@@ -21,27 +22,22 @@ pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
 /// The number of the first frame.
 const FIRST_FRAME: u64 = 1;
-/// Length of a frame, ms; see [`flight::pilot`].
-const FRAME_MS: f64 = 5.0;
+
+/// The log's run facts with the law of the landing burn of a flight flown again, and the frame from which on it flew.
+pub(crate) const REFLOWN_BY: &str = "reflown_by";
+pub(crate) const REFLOWN_AT: &str = "reflown_at_tick";
 
 /// A flight computer being fed from a log; frames must come in order. Missing ones are what a restarted computer leaves:
 /// it is restarted here too.
 #[derive(Debug, Clone)]
 pub struct LoggedPilot {
-    pilot: Pilot,
+    computer: Computer,
     schedule: Schedule<Mission>,
+    /// A flight that was flown again may have changed to another law in this frame.
+    other_law: Option<(u64, Controller)>,
     next: u64,
-}
-
-/// Why a flight computer cannot be let go again.
-#[derive(Debug, thiserror::Error)]
-pub enum PilotStartError {
-    /// A setting is wrong, or the mission is none of this build.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The motor is not to be had.
-    #[error(transparent)]
-    Mission(#[from] MissionError),
+    /// Digests of another schema are not of the same things: what was recorded is taken over.
+    compares_digests: bool,
 }
 
 /// Why a frame was not run again.
@@ -58,14 +54,6 @@ pub enum FrameError {
         /// The frame before it in the log.
         after: u64,
     },
-    /// Settings that change in flight name a motor that is not to be had.
-    #[error("frame {frame}: {reason}")]
-    Settings {
-        /// The frame.
-        frame: u64,
-        /// What is wrong.
-        reason: String,
-    },
 }
 
 /// The settings that a log says were changed in its flight.
@@ -77,20 +65,34 @@ pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>
 }
 
 impl LoggedPilot {
-    /// The flight computer of a mission as it was let go, with other settings.
+    /// The flight computer that a log's frames came from, before its first frame: of its mission, of the laws and the changes
+    /// of settings that its run facts name, and of other settings on top.
     ///
     /// # Errors
-    /// The text is no mission of this build, a name is unknown, or the motor is not to be had.
-    pub fn new(
+    /// The text is no mission of this build, or a name is unknown.
+    pub fn recorded(
         mission_toml: &str,
         start: &flight_v1::PilotStart,
-        settings: &[Setting],
-    ) -> Result<Self, PilotStartError> {
-        let schedule = Self::schedule(mission_toml, start, settings)?;
+        run: &BTreeMap<String, String>,
+        other: &[Setting],
+    ) -> Result<Self, SettingError> {
+        let settings: Vec<Setting> =
+            settings_in_flight(run)?.into_iter().chain(other.iter().cloned()).collect();
+        let schedule = Self::schedule(mission_toml, start, &settings)?;
+        let law_of = |fact: &str| run.get(fact).map(|name| name.parse::<Controller>()).transpose();
+        let controller = law_of("controller")?.unwrap_or_default();
+        let at_frame = run.get(REFLOWN_AT).and_then(|frame| frame.parse().ok());
+        let other_law = at_frame.zip(law_of(REFLOWN_BY)?);
+        let law = Law::of(controller, schedule.base());
         let believed = state_from_log(&start.believed);
-        let uncertainty = StartUncertainty::at_apogee();
-        let pilot = Pilot::at_apogee(schedule.base(), start.time_s, &believed, &uncertainty)?;
-        Ok(Self { pilot, schedule, next: FIRST_FRAME })
+        let computer = Computer::in_space(schedule.base(), law, &believed).released();
+        Ok(Self { computer, schedule, other_law, next: FIRST_FRAME, compares_digests: true })
+    }
+
+    /// The same for a log of another schema, whose digests are not of the same things and are not compared.
+    #[must_use]
+    pub fn without_digests(self) -> Self {
+        Self { compares_digests: false, ..self }
     }
 
     /// The missions that hold one after the other: as it was let go, then with the settings.
@@ -112,21 +114,25 @@ impl LoggedPilot {
         })
     }
 
-    /// The flight computer itself.
+    /// What flies in the flight computer.
+    ///
+    /// # Panics
+    /// Never: the computer of a rocket in space has a pilot.
     pub fn pilot(&self) -> &Pilot {
-        &self.pilot
+        self.computer.pilot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
     }
 
     /// Runs one frame.
     ///
     /// # Errors
-    /// It is out of order, or a change of settings is due that cannot be made.
+    /// It is out of order.
     pub fn step(&mut self, input: &PilotInput) -> Result<PilotOutput, FrameError> {
         self.make_ready(input)?;
-        Ok(self.pilot.step(input))
+        self.computer.step(&Input::in_the_air(input));
+        Ok(self.decided_now())
     }
 
-    /// Runs one frame, and solves the landing that it plans alone; see [`Pilot::step_inspected`].
+    /// Runs one frame, and solves the landing that it plans alone; see [`Computer::step_inspected`].
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -135,7 +141,18 @@ impl LoggedPilot {
         input: &PilotInput,
     ) -> Result<(PilotOutput, Option<LandingSolved>), FrameError> {
         self.make_ready(input)?;
-        Ok(self.pilot.step_inspected(input))
+        let (_, solved) = self.computer.step_inspected(&Input::in_the_air(input));
+        Ok((self.decided_now(), solved))
+    }
+
+    fn decided_now(&self) -> PilotOutput {
+        let piloted = self.computer.piloted();
+        piloted.map_or_else(|| unreachable!("a frame was flown"), |(_, output)| *output)
+    }
+
+    /// A number for what it remembers.
+    pub fn digest(&self) -> u64 {
+        self.computer.flight_digest()
     }
 
     /// Restarts and changes of settings that come before a frame.
@@ -146,13 +163,15 @@ impl LoggedPilot {
         }
         if frame > self.next {
             // It was dead meanwhile, and came back at the end of the frame before this.
-            self.pilot = self.pilot.restarted((frame - 1) as f64 * FRAME_MS * 1e-3);
+            self.computer.restart(flight_time_s(frame - 1));
         }
         self.next = frame.saturating_add(1);
         if let Some(mission) = self.schedule.due(input.time_s) {
-            let changed = self.pilot.reconfigured(mission);
-            self.pilot =
-                changed.map_err(|error| FrameError::Settings { frame, reason: error.to_string() })?;
+            self.computer.reconfigure(mission);
+        }
+        if let Some((_, controller)) = self.other_law.take_if(|(at_frame, _)| *at_frame <= frame) {
+            let law = Law::of(controller, self.pilot().mission());
+            self.computer.set_law(law);
         }
         Ok(())
     }
@@ -179,12 +198,15 @@ impl Replayed for LoggedPilot {
     fn run_again(&mut self, tick: &flight_v1::PilotTick) -> Result<flight_v1::PilotTick, FrameError> {
         let input = input_from_log(&tick.input)?;
         let output = self.step(&input)?;
-        Ok(tick_to_log(&input, &output, self.pilot.digest()))
+        let digest = if self.compares_digests { self.digest() } else { tick.state_digest };
+        Ok(tick_to_log(&input, &output, digest))
     }
+}
 
+impl Decides for LoggedPilot {
     fn decided(&self, tick: &flight_v1::PilotTick) -> Decided {
         let output = &tick.output;
-        let report = self.pilot.report();
+        let report = self.pilot().report();
         let level = u8::try_from(output.level).ok().and_then(ControlLevel::from_index);
         let planned = report.status != SolveStatus::NotRun;
         Decided {

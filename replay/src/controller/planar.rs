@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use flight::controller::{
+use flight::guidance::controller::{
     ControlLevel, ControllerConfig, ControllerInput, ControllerOutput, ControllerState, step,
 };
-use flight::dynamics::PlanarState;
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::profile::Profile;
 use prost_reflect::MessageDescriptor;
 use protocol::log::v1;
 use tick_log::{TickLogError, input_from_log, state_from_log, tick_to_log};
 
-use super::{Decided, Moment, Replayed, phase_name, settings_in_flight};
+use super::{Decided, Decides, Moment, Replayed, phase_name, settings_in_flight};
 use crate::log::tick_descriptor;
 use crate::settings::{Schedule, SettingError};
 
@@ -72,6 +72,11 @@ impl LoggedController {
         step(&mut self.state, input)
     }
 
+    /// The changes of settings that are still to come; of a controller that has a schedule.
+    pub(crate) fn schedule(&self) -> Option<Schedule<Profile>> {
+        self.schedule.clone()
+    }
+
     /// What it remembers.
     pub fn state(&self) -> &ControllerState {
         &self.state
@@ -106,7 +111,9 @@ impl Replayed for LoggedController {
         let output = self.step(&input);
         Ok(tick_to_log(&input, &output, self.state.digest(), tick.solve_time_s, tick.deadline_s))
     }
+}
 
+impl Decides for LoggedController {
     fn decided(&self, tick: &v1::ControllerTick) -> Decided {
         let output = &tick.output;
         let level = u8::try_from(output.level).ok().and_then(ControlLevel::from_index);

@@ -1,9 +1,9 @@
 //! The landings that a flight computer plans. They are not in its log; run again, it makes them again.
 
-use flight::controller::ControlLevel;
-use flight::dynamics::PlanarState;
-use flight::pilot::Pilot;
-use flight::powered::Plane;
+use flight::computer::pilot::Pilot;
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::Plane;
+use flight::vehicle::dynamics::PlanarState;
 use nalgebra::Vector3;
 
 /// Tells the plans made in a frame from those that are flown on; frames must come in order.

@@ -1,76 +1,66 @@
-//! Open loop: the recorded inputs, other settings, the controller alone.
+//! Open loop: runs the controller alone on the recorded inputs, with other settings.
 //!
-//! Every tick is given what it was given in flight, so the vehicle goes where it went, whatever is commanded now. The
-//! answer is what the controller *would have commanded*, beside what it did; what *would have happened* is for the
-//! [closed loop](mod@crate::refly). A flight computer that decides otherwise is not obeyed either: one that lights its
-//! motor earlier than it did feels no thrust.
+//! Every tick gets its recorded input, so the vehicle moves as it did in flight, whatever is commanded now. The answer
+//! is what the controller *would have commanded*, beside what it did command. What *would have happened* is a question
+//! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
+//! measures no thrust until the recorded ignition.
 
-use flight::verdict::TouchdownLimits;
+use flight::rules::verdict::TouchdownLimits;
 use serde::Serialize;
 use tick_log::TickLogError;
 
 pub use crate::controller::Decided;
-use crate::controller::{
-    FrameError, LoggedController, LoggedPilot, PilotStartError, Replayed, settings_in_flight,
-};
-use crate::log::{Recording, RecordingError};
+use crate::controller::{Decides, FrameError, LoggedController, LoggedPilot, settings_in_flight};
+use crate::log::{FlightKind, Recording, RecordingError};
 use crate::settings::{Schedule, Setting, SettingError};
 
 /// Sections that the planar landing's controller never sees.
 const NOT_THE_CONTROLLERS: [&str; 4] = ["plant.", "dispersion.", "arming.", "gate."];
-/// Sections that a flight computer never sees: how its landing is judged, and what chance decided.
+/// Sections that a flight computer never sees: the limits of the verdict, and what was drawn at random.
 const NOT_THE_PILOTS: [&str; 3] = ["touchdown_limits.", "leg_limits.", "truth."];
 
 /// Why a flight cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
-    /// The log has not what it takes.
+    /// The log lacks the records that are needed.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// A recorded input has no meaning in this build.
+    /// This build cannot interpret a recorded input.
     #[error(transparent)]
     Input(#[from] TickLogError),
-    /// The flight computer cannot be let go again.
-    #[error(transparent)]
-    PilotStart(#[from] PilotStartError),
-    /// A recorded frame cannot be run again.
+    /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// The estimator is set up once.
+    /// A timed setting of the estimator, which is set up only once.
     #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
-    TimedEstimator {
-        /// The setting.
-        setting: String,
-    },
+    TimedEstimator { setting: String },
     /// A setting that the controller does not have.
     #[error(
-        "{path} is not the controller's: on recorded inputs it changes nothing; refly flies the flight again with it"
+        "{path} is not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
     )]
     NotTheControllers {
         /// The setting.
         path: String,
     },
-    /// Other ticks than the recorded ones.
+    /// A setting that would change the times of the ticks.
     #[error("{path} cannot be changed on recorded inputs: there is one input every {recorded_s} s")]
     SampleTime {
         /// The setting.
         path: &'static str,
-        /// As recorded, s.
+        /// The recorded value, s.
         recorded_s: f64,
     },
 }
 
-/// A tick, as it was decided and as it would be.
+/// A tick: the recorded decision and the one with other settings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EvaluatedTick {
-    /// Its number.
     pub tick: u64,
     /// Vehicle time, s.
     pub time_s: f64,
-    /// Its phase.
     pub phase: &'static str,
     /// As recorded.
     pub recorded: Decided,
@@ -78,48 +68,46 @@ pub struct EvaluatedTick {
     pub evaluated: Decided,
 }
 
-/// When a phase was entered.
+/// The time at which a phase was entered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseEntered {
-    /// The phase.
     pub phase: &'static str,
-    /// As recorded, vehicle time, s; `None` if it was not.
+    /// As recorded, vehicle time, s; `None` if the phase was not entered.
     pub recorded_s: Option<f64>,
     /// With the other settings.
     pub evaluated_s: Option<f64>,
 }
 
-/// What an evaluation found.
+/// The result of an evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EvaluateReport {
-    /// Says that this is the open loop.
+    /// Marks the report as open loop.
     pub kind: &'static str,
     /// The log.
     pub file: String,
-    /// What was changed.
+    /// The changed settings.
     pub settings: Vec<String>,
-    /// Ticks that this build decides otherwise than recorded with nothing changed: what differs on them may be the
-    /// build's doing and not the settings'.
+    /// Ticks that this build decides differently from the record even with nothing changed: differences there may come
+    /// from the build and not from the settings.
     pub unchanged_different: usize,
-    /// Ticks whose gimbal command differs in some bit.
+    /// Number of ticks whose gimbal command differs in any bit.
     pub commands_different: usize,
     /// Root mean square of the differences of the gimbal commands in the landing, rad.
     pub gimbal_difference_rms_rad: f64,
     /// The largest difference of a gimbal command, rad.
     pub gimbal_difference_max_rad: f64,
-    /// The tick with it.
+    /// The tick with the largest difference.
     pub gimbal_difference_max_tick: Option<u64>,
     /// The largest difference of a fin command, rad.
     pub fins_difference_max_rad: f64,
-    /// Ticks on which another level decides.
+    /// Number of ticks on which another control level decides.
     pub levels_different: usize,
-    /// When each phase was entered, as recorded and as it would be.
+    /// When each phase was entered, as recorded and with the other settings.
     pub phases: Vec<PhaseEntered>,
-    /// Every tick.
     pub ticks: Vec<EvaluatedTick>,
 }
 
-/// Every tick, and how many of them are decided otherwise with nothing changed.
+/// Every tick, and how many of them this build decides differently with nothing changed.
 type Evaluated = (Vec<EvaluatedTick>, usize);
 
 /// Evaluates a recorded flight under other settings.
@@ -127,12 +115,14 @@ type Evaluated = (Vec<EvaluatedTick>, usize);
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let ticks =
-        if recording.is_from_apogee() { frames(recording, settings) } else { ticks(recording, settings) };
+    let ticks = match recording.kind() {
+        FlightKind::FromApogee => frames(recording, settings),
+        FlightKind::Planar => ticks(recording, settings),
+    };
     Ok(summarise(recording, settings, ticks?))
 }
 
-/// The planar landing's ticks.
+/// Evaluates the ticks of a planar landing.
 fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
     let recorded = recording.replayable_ticks()?;
     let profile = recording.profile()?;
@@ -147,20 +137,19 @@ fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, Evalu
     side_by_side(then, now, recorded)
 }
 
-/// The frames of a flight computer.
+/// Evaluates the frames of a flight computer.
 fn frames(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
     let (start, frames) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
-    let in_flight = settings_in_flight(&recording.head.run)?;
-    let then = LoggedPilot::new(toml, start, &in_flight)?;
+    let run = &recording.head.run;
+    let then = LoggedPilot::recorded(toml, start, run, &[])?;
     let recorded_s = then.pilot().mission().estimator.frame_s;
     refuse(settings, &NOT_THE_PILOTS, ("estimator.frame_s", recorded_s))?;
     let timed = |setting: &&Setting| setting.at_s.is_some() && setting.path.starts_with("estimator.");
     if let Some(setting) = settings.iter().find(timed) {
         return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
     }
-    let all: Vec<Setting> = in_flight.iter().chain(settings).cloned().collect();
-    side_by_side(then, LoggedPilot::new(toml, start, &all)?, frames)
+    side_by_side(then, LoggedPilot::recorded(toml, start, run, settings)?, frames)
 }
 
 fn refuse(
@@ -179,9 +168,9 @@ fn refuse(
     Ok(())
 }
 
-/// Runs both on every tick. The recorded decision is the record's; what a record leaves out (cost and iterations of a
-/// flight computer's plan) is that of `then`, which decides it again.
-fn side_by_side<C: Replayed>(mut then: C, mut now: C, ticks: &[C::Tick]) -> Result<Evaluated, EvaluateError>
+/// Runs both computers on every tick. The recorded decision comes from the record; what the record leaves out (cost and
+/// iterations of a flight computer's plan) comes from `then`, which runs with the recorded settings.
+fn side_by_side<C: Decides>(mut then: C, mut now: C, ticks: &[C::Tick]) -> Result<Evaluated, EvaluateError>
 where
     EvaluateError: From<C::Error>,
 {

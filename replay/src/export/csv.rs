@@ -1,4 +1,4 @@
-//! A table as comma-separated values.
+//! Writes a table as comma-separated values.
 
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ impl CsvTable {
         writeln!(self.output, "{}", cells.join(",")).map_err(|source| self.failed(source))
     }
 
-    /// The file, whole but for its name.
+    /// The complete file, still under its temporary name.
     pub(super) fn finish(self) -> Result<NewFile, ExportError> {
         let Self { path, output } = self;
         output.into_inner().map_err(|error| ExportError::Write { path, source: error.into_error() })

@@ -1,9 +1,9 @@
-//! A log's content in other programs' formats.
+//! Writes the content of a log in the formats of other programs.
 //!
 //! * [`export_tables`]: CSV or Parquet, one file a table; see [`table`](crate::table).
 //! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back.
 //!
-//! The export to Rerun is a program of its own, because Rerun costs more to compile than all the rest.
+//! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
 mod csv;
 mod parquet;
@@ -20,31 +20,29 @@ use crate::log::LogError;
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// Not a flight log, or not readable.
+    /// The file is not a flight log, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A file cannot be made or written.
+    /// A file cannot be created or written.
     #[error("{}: cannot be written", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
-    /// The Parquet writer refused.
+    /// The Parquet writer failed.
     #[error("{}: cannot be written as Parquet", path.display())]
     Parquet {
-        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// Error from the writer.
         source: ::parquet::errors::ParquetError,
     },
-    /// Nothing of the kind in the log.
+    /// The log has no such content.
     #[error("{name}: has {found}; {wanted}")]
     Nothing {
         /// The log.
         name: String,
-        /// What there is.
+        /// What the log has.
         found: String,
         /// What would be accepted.
         wanted: String,

@@ -1,4 +1,4 @@
-//! A table as Apache Parquet, written column by column without Arrow.
+//! Writes a table as Apache Parquet, column by column, without Arrow.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::ExportError;
 use crate::output::NewFile;
 use crate::table::{Cell, Column, Kind, Row, TableShape};
 
-/// Rows that are held before they are written as a group.
+/// Number of rows in a group; a group is held in memory until it is written.
 const GROUP_ROWS: usize = 16_384;
 
 pub(super) struct ParquetTable {
@@ -40,7 +40,7 @@ impl ParquetTable {
         if self.held.len() >= GROUP_ROWS { self.write_group() } else { Ok(()) }
     }
 
-    /// The file, whole but for its name.
+    /// The complete file, still under its temporary name.
     pub(super) fn finish(mut self) -> Result<NewFile, ExportError> {
         self.write_group()?;
         let path = self.path;
@@ -74,7 +74,7 @@ fn group(
     group.close().map(|_| ())
 }
 
-/// Definition levels say which cells are there: 1 present, 0 absent.
+/// Parquet definition levels: 1 for a cell with a value, 0 for an empty cell.
 fn write_column<'a, I: Iterator<Item = &'a Cell>>(
     writer: &mut SerializedColumnWriter<'_>,
     kind: Kind,

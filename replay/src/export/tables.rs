@@ -1,4 +1,4 @@
-//! Tables into files.
+//! Writes tables into files.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -25,11 +25,8 @@ pub enum TableFormat {
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ExportedFile {
-    /// Its path.
     pub path: PathBuf,
-    /// Its rows.
     pub rows: u64,
-    /// Its columns.
     pub columns: usize,
 }
 
@@ -38,11 +35,11 @@ enum Table {
     Parquet(Box<ParquetTable>),
 }
 
-/// Writes every table of a log into a directory, which is made if it is not there. Memory does not grow with the log. The
-/// files take their names when all of them are whole.
+/// Writes every table of a log into a directory, which is created if needed. Memory does not grow with the log. The
+/// files get their names when all of them are complete.
 ///
 /// # Errors
-/// The log cannot be read, a file cannot be written, or one of its name is there and may not be replaced.
+/// The log cannot be read, a file cannot be written, or a file exists and may not be replaced.
 pub fn export_tables<'a, R: Read>(
     log: &mut FlightLog<R>,
     format: TableFormat,
@@ -82,7 +79,7 @@ fn create(
         TableFormat::Csv => "csv",
         TableFormat::Parquet => "parquet",
     };
-    // Not before there is a table to write: what is no flight log leaves nothing behind.
+    // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
     std::fs::create_dir_all(directory)
         .map_err(|source| ExportError::Write { path: directory.to_owned(), source })?;
     let path = directory.join(format!("{}.{suffix}", shape.name));

@@ -1,7 +1,7 @@
-//! The raw MAVLink frames as a telemetry log.
+//! Writes the raw MAVLink frames as a telemetry log.
 //!
-//! A `.tlog` is a row of Unix times in microseconds (8 bytes, big-endian), each followed by one whole frame: what
-//! Mission Planner, QGroundControl and MAVProxy write and play back.
+//! A `.tlog` is a sequence of Unix times in microseconds (8 bytes, big-endian), each followed by one whole frame.
+//! Mission Planner, QGroundControl and MAVProxy write and play back such files.
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Write as _};
@@ -14,23 +14,23 @@ use super::ExportError;
 use crate::log::{Entry, FlightLog};
 use crate::output::{Destination, NewFile};
 
-/// What was written.
+/// Summary of a written `.tlog`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ExportedTlog {
-    /// Who had written the frames down: `vehicle` or `ground`.
+    /// The endpoint that recorded the frames: `vehicle` or `ground`.
     pub endpoint: String,
-    /// Frames that it had received.
+    /// Frames that the endpoint had received.
     pub received: u64,
-    /// Frames that it had sent.
+    /// Frames that the endpoint had sent.
     pub sent: u64,
-    /// Frames that other endpoints of the log had written down; they are the same frames at the other end of a link.
+    /// Frames recorded by other endpoints, left out: they are the same frames at the other end of the link.
     pub left_out: u64,
-    /// What ended the reading of the log early.
+    /// Why the log could not be read to its end.
     pub damage: Option<String>,
 }
 
-/// Writes the frames of one endpoint as a `.tlog`: of the ground's if the log has them, else the vehicle's, unless
-/// `endpoint` says which.
+/// Writes the frames of one endpoint as a `.tlog`. Without `endpoint`, it takes the ground's frames if the log has
+/// them, else the vehicle's.
 ///
 /// # Errors
 /// The log cannot be read or has no frames of that endpoint, or the file cannot be written.
@@ -57,7 +57,7 @@ pub fn export_tlog<'a>(
         let found = if endpoints.is_empty() {
             "no raw MAVLink frames".to_owned()
         } else {
-            format!("frames written down by {}", endpoints.join(" and "))
+            format!("frames recorded by {}", endpoints.join(" and "))
         };
         let wanted = format!("a .tlog needs frames of {wanted}");
         return Err(ExportError::Nothing { name: log.name().to_owned(), found, wanted });

@@ -1,4 +1,4 @@
-//! What a ground station knows after each frame.
+//! Builds telemetry records from the frames, as a ground station would know them.
 
 use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA};
 use protocol::frame::Frame;
@@ -7,10 +7,10 @@ use protocol::log::v1;
 use protocol::text::Reassembler;
 use std::time::Duration;
 
-/// Telemetry is written at most this often, s.
+/// Shortest interval between telemetry records, s.
 const PERIOD_S: f64 = 0.1;
 
-/// A verdict's value whose limit no message has told.
+/// A value of the verdict whose limit no message has given.
 const NOT_TOLD: f64 = f64::NAN;
 
 #[derive(Default)]
@@ -24,7 +24,7 @@ pub(super) struct Fold {
 }
 
 impl Fold {
-    /// Takes a frame of the vehicle `time_s` after the first; returns what is worth a record.
+    /// Takes a frame that the vehicle sent `time_s` after the first; returns a record when one is due.
     pub(super) fn take(&mut self, frame: &Frame, time_s: f64) -> Vec<Record> {
         let Ok(message) = frame.decode() else {
             return Vec::new();
@@ -61,7 +61,7 @@ impl Fold {
         records
     }
 
-    /// Whether the message told anything.
+    /// Whether the message changed anything.
     fn note(&mut self, message: &MavMessage) -> bool {
         let known = &mut self.known;
         let centidegrees = |angle: &i16| (f64::from(*angle) / 100.0).to_radians();
@@ -82,7 +82,7 @@ impl Fold {
                 }
             }
             MavMessage::ATTITUDE_QUATERNION(data) => {
-                // A rotation about the east axis; twice its half-angle is the pitch.
+                // A rotation about the east axis: the quaternion holds half of the pitch angle.
                 known.pitch_rad = Some(2.0 * libm::atan2(f64::from(data.q3), f64::from(data.q1)));
                 known.q_rad_s = Some(f64::from(data.pitchspeed));
             }

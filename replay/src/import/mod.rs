@@ -1,8 +1,8 @@
-//! A `.tlog` of a ground station as a flight log, telemetry only.
+//! Converts a ground station's `.tlog` to a flight log that has telemetry only.
 //!
-//! The frames are kept whole; what the dialect's messages tell is decoded beside them as a ground station would have
-//! known it, so that a flight without its own log can still be described, compared and reported. There are no ticks,
-//! so nothing can be re-executed: the log is graded telemetry-only.
+//! The frames are kept whole. The messages of the dialect are also decoded as a ground station would have decoded them,
+//! so that a flight without its own log can still be described, compared and reported. There are no ticks, so nothing
+//! can be re-executed: the log gets the grade telemetry-only.
 
 mod fold;
 mod tlog;

@@ -1,4 +1,4 @@
-//! The frames of a `.tlog` as a log.
+//! Writes the frames of a `.tlog` into a flight log.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,52 +14,46 @@ use super::fold::Fold;
 use crate::log::{NewLog, NewLogError};
 use crate::output::Destination;
 
-/// A ground station's system number, by convention.
+/// System id of a ground station, by convention.
 const GROUND_SYSTEM: u8 = 255;
-/// How far an import is, is told this often.
+/// Interval between progress reports, bytes.
 const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
 
 /// Why a `.tlog` could not be imported.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// It cannot be read.
+    /// The `.tlog` cannot be read.
     #[error("{}: cannot be read", path.display())]
     Read {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
-    /// No frame in it.
-    #[error("{}: is no .tlog: nowhere in it does a MAVLink 2 frame follow a time of 8 bytes", path.display())]
-    NoFrames {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The log cannot be made.
+    /// The `.tlog` has no frame.
+    #[error("{}: is not a .tlog: it has no MAVLink 2 frame that follows a time of 8 bytes", path.display())]
+    NoFrames { path: PathBuf },
+    /// The log cannot be created.
     #[error("{}: cannot be created", path.display())]
     Create {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// The log cannot be written.
     #[error("{}: cannot be written", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// Error from the writer.
         source: LogWriteError,
     },
 }
 
-/// What was imported.
+/// Summary of an import.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct ImportedTlog {
     /// Frames kept.
     pub frames: u64,
-    /// Of these, frames of other dialects, or with a wrong checksum: kept, not understood.
+    /// Of these, frames of other dialects or with a wrong checksum: kept, but not decoded.
     pub not_understood: u64,
     /// Frames of MAVLink 1, which are left out.
     pub mavlink1: u64,
@@ -69,7 +63,7 @@ pub struct ImportedTlog {
     pub telemetry: u64,
 }
 
-/// How far an import is.
+/// Progress of an import.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImportProgress {
     /// Bytes read.
@@ -141,7 +135,7 @@ pub fn import_tlog<'a>(
     Ok(imported)
 }
 
-/// The frame, if its checksum is right and the dialect has its message.
+/// The message, if the checksum is right and the dialect has this message.
 fn understood(bytes: &[u8]) -> Option<Frame> {
     let mut framer = Framer::new();
     framer.push_datagram(bytes);

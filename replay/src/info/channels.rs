@@ -1,4 +1,4 @@
-//! Channels and how many of their messages are there.
+//! Counts the messages of each channel.
 
 use std::collections::BTreeMap;
 
@@ -10,19 +10,17 @@ use crate::log::{Entry, StampedEntry};
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ChannelFacts {
-    /// Its topic.
     pub topic: String,
     /// How its messages are encoded.
     pub message_encoding: String,
     /// The name of its schema.
     pub schema: String,
-    /// What else the log says about it: link, endpoint, dialect.
+    /// Metadata of the channel: link, endpoint, dialect.
     pub metadata: BTreeMap<String, String>,
-    /// Its messages.
     pub messages: u64,
-    /// Of these, how many this build cannot read.
+    /// Messages that this build cannot read.
     pub unreadable: u64,
-    /// Messages that the numbering says existed before the last one and that are not there.
+    /// Missing messages before the last one, by the gaps in the sequence numbers.
     pub lost: u64,
 }
 
@@ -54,7 +52,7 @@ impl ChannelCounter {
         let mut facts: Vec<ChannelFacts> = channels
             .map(|(id, channel)| {
                 let counts = self.counts.remove(&id).unwrap_or_default();
-                // Numbers count from 0; a writer that does not number leaves 0 everywhere.
+                // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
                 let numbered =
                     if counts.last_sequence == 0 { 0 } else { u64::from(counts.last_sequence) + 1 };
                 ChannelFacts {

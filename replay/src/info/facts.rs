@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use flight::mission::Mission;
-use flight::profile::Profile;
 use protocol::log::reader::Damage;
 use protocol::log::v1;
 use serde::Serialize;
@@ -18,17 +16,17 @@ pub struct Info {
     pub file: String,
     /// Size of the file.
     pub size_bytes: Option<u64>,
-    /// What can be done with it.
+    /// What can be done with the log.
     pub grade: Grade,
     /// The library that wrote the file.
     pub library: String,
+    pub schema: SchemaFacts,
     /// Which build wrote it.
     pub build: BTreeMap<String, String>,
-    /// That build against this one.
+    /// Comparison of that build with this one.
     pub build_comparison: BuildComparison,
-    /// Which run it is.
     pub run: BTreeMap<String, String>,
-    /// The profile it was flown with.
+    /// The profile that was flown.
     pub profile: Option<ProfileFacts>,
     /// From the first record to the last.
     pub span: Option<Span>,
@@ -38,16 +36,22 @@ pub struct Info {
     pub ticks: Option<TickFacts>,
     /// The frames of the flight computer from apogee to touchdown.
     pub frames: Option<FrameFacts>,
-    /// The phases, from each source that tells them, the vehicle first.
+    /// The phases from each source that records them, the vehicle first.
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
     pub verdict: Option<VerdictFacts>,
-    /// Why some record could not be read, for the first such.
+    /// Why the first unreadable record could not be read.
     pub unreadable: Option<String>,
     /// Whether anything is missing.
     pub completeness: Completeness,
-    /// Its attachments.
     pub attachments: Vec<AttachmentFacts>,
+}
+
+/// The version of a log's schema, and of this build's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SchemaFacts {
+    pub version: u32,
+    pub this_build: u32,
 }
 
 /// What can be done with a log.
@@ -119,20 +123,20 @@ impl Grade {
 pub struct ProfileFacts {
     /// Its name, if it can be used.
     pub name: Option<String>,
-    /// Its one line for people, if it can be used.
+    /// Its one-line description, if it can be used.
     pub summary: Option<String>,
-    /// What keeps this build from using it.
+    /// Why this build cannot use it, if so.
     pub problem: Option<String>,
 }
 
 impl ProfileFacts {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
-            Ok(text) => Profile::from_toml(text, "profile.toml")
+            Ok(text) => vehicles::profile::from_toml(text, "profile.toml")
                 .map(|profile| (profile.name, profile.summary))
                 .or_else(|error| {
-                    // The other kind of profile; if it is neither, the first says why.
-                    Mission::from_toml(text, "profile.toml")
+                    // Try the other kind of profile; if it is neither, report the first error.
+                    vehicles::mission::from_toml(text, "profile.toml")
                         .map(|mission| (mission.name, mission.summary))
                         .map_err(|_neither| error.to_string())
                 }),
@@ -152,7 +156,7 @@ pub struct Span {
     pub first_ns: u64,
     /// Latest log time, ns since the Unix epoch.
     pub last_ns: u64,
-    /// Between them, s.
+    /// Duration, s.
     pub duration_s: f64,
 }
 
@@ -165,21 +169,21 @@ impl Span {
 /// Whether anything is missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Completeness {
-    /// The log was ended properly, nothing in it is broken and nothing is missing, to the end of its flight.
+    /// The log was closed properly, is undamaged, and lacks nothing up to the end of its flight.
     pub complete: bool,
-    /// What ended the reading early.
+    /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,
-    /// How much is missing behind that, s; known only if the end of the file can be read.
+    /// How much is missing after that, s; known only if the end of the file can be read.
     pub missing_s: Option<f64>,
     /// Ticks missing between the first and the last that are there.
     pub ticks_missing: u64,
     /// Messages missing before the last of their channel.
     pub messages_lost: u64,
-    /// Flights that have ticks: more than one in a log that was joined.
+    /// Number of flights with ticks: more than one in a joined log.
     pub flights: usize,
-    /// Where a flight's record ends, if that is before its end.
+    /// Where the record of a flight ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
 }
 
@@ -209,7 +213,7 @@ impl Completeness {
         }
     }
 
-    /// The same, knowing the log's flights.
+    /// Adds what the flights of the log show.
     pub(super) fn with_flights(self, flights: &Flights) -> Self {
         let cut = flights.cut();
         Self { complete: self.complete && cut.is_none(), flights: flights.flown(), cut, ..self }
@@ -219,28 +223,26 @@ impl Completeness {
 /// The landing verdict, as recorded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictFacts {
-    /// Whether it was a landing.
+    /// Whether the vehicle landed inside every limit.
     pub landed: bool,
     /// Vehicle time of contact, s.
     pub time_s: f64,
-    /// Every limit.
     pub limits: Vec<VerdictLimit>,
 }
 
 /// A limit of the landing verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictLimit {
-    /// What was judged.
+    /// Name of the judged quantity.
     pub name: String,
-    /// The value.
     pub value: f64,
     /// The lowest allowed.
     pub minimum: f64,
     /// The highest allowed.
     pub maximum: f64,
-    /// The unit of the three.
+    /// Unit of value and limits.
     pub unit: String,
-    /// Whether the value lies inside.
+    /// Whether the value is inside the limits.
     pub passed: bool,
 }
 

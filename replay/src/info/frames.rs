@@ -1,4 +1,4 @@
-//! The frames of a flight computer, counted, and what can be done with them.
+//! Counts the frames of a flight computer and finds which of them can be re-executed.
 
 use protocol::log::flight_v1::PilotTiming;
 use serde::Serialize;
@@ -14,17 +14,17 @@ pub struct FrameFacts {
     pub first: u64,
     /// The highest number.
     pub last: u64,
-    /// Numbers left out by a computer that was dead meanwhile, as stretches.
+    /// Ranges of numbers left out because the computer was dead.
     pub restarts: usize,
-    /// Stretches that the log has lost.
+    /// Ranges that the log has lost.
     pub lost: usize,
-    /// The first of them: nothing behind it can be re-executed.
+    /// The first lost range: no frame after it can be re-executed.
     pub first_lost: Option<Gap>,
-    /// How often a number came that was there already.
+    /// Number of repetitions.
     pub repeated: u64,
-    /// There is a record of how the computer was let go.
+    /// Whether the log has the computer's start record.
     pub start: bool,
-    /// How long those took that plan; `None` of a flight that was simulated without a clock.
+    /// Solve times of the planning frames; `None` for a flight simulated without a clock.
     pub solve_time: Option<SolveTimes>,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct FrameCounter {
     lost: usize,
     first_lost: Option<Gap>,
     solve_times: SolveTimeCounter,
-    /// The flight computer was let go on record.
+    /// Notes the start record of the flight computer.
     start: bool,
 }
 
@@ -45,7 +45,7 @@ impl FrameCounter {
         self.start = true;
     }
 
-    /// Counts a frame; `record` is its record's number within its channel.
+    /// Counts a frame; `record` is the sequence number of its record in the channel.
     pub(super) fn count(&mut self, frame: u64, record: u32) {
         self.frames.insert(frame);
         if let Some(gap) = self.order.note(frame, record) {
@@ -60,7 +60,7 @@ impl FrameCounter {
 
     pub(super) fn into_facts(self) -> Option<FrameFacts> {
         let (first, last) = self.frames.bounds()?;
-        // What is lost before the first frame is no gap between frames.
+        // A loss before the first frame is not a gap between frames.
         let lost_between = self.lost - usize::from(self.first_lost.is_some_and(|gap| gap.after == 0));
         Some(FrameFacts {
             first,
@@ -79,7 +79,7 @@ impl Grade {
     pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
         let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
         match profile {
-            _ if !frames.start => numeric("no record of how the flight computer was let go"),
+            _ if !frames.start => numeric("no start record of the flight computer"),
             None => numeric("no attachment profile.toml to build the flight computer from"),
             Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
             Some(ProfileFacts { name, .. }) => {
@@ -88,7 +88,7 @@ impl Grade {
         }
     }
 
-    /// Of frames with all that it takes to run them again, up to the first that are lost.
+    /// The grade of frames that can be executed again, up to the first lost ones.
     fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
         let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
         let level = GradeLevel::BitExact;
@@ -101,7 +101,7 @@ impl Grade {
             Some(Gap { after, before }) => {
                 let more = if *lost > 1 { format!(", the first of {lost} gaps") } else { String::new() };
                 format!(
-                    "up to frame {after} of {last}: those up to frame {before} are lost{more}, and nothing behind them can be run again; mission {mission}"
+                    "up to frame {after} of {last}: those up to frame {before} are lost{more}, and nothing after them can be run again; mission {mission}"
                 )
             }
             None if *repeated > 0 => format!(

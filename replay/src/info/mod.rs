@@ -1,4 +1,4 @@
-//! What is in a log, how complete it is, and what can be done with it.
+//! Describes a log: its content, how complete it is, and what can be done with it.
 
 mod channels;
 mod facts;
@@ -8,7 +8,9 @@ mod solve_times;
 mod ticks;
 
 pub use channels::ChannelFacts;
-pub use facts::{Completeness, Grade, GradeLevel, Info, ProfileFacts, Span, VerdictFacts, VerdictLimit};
+pub use facts::{
+    Completeness, Grade, GradeLevel, Info, ProfileFacts, SchemaFacts, Span, VerdictFacts, VerdictLimit,
+};
 pub use frames::FrameFacts;
 pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
 pub use solve_times::SolveTimes;
@@ -17,6 +19,7 @@ pub use ticks::{Named, TickFacts};
 use std::io::Read;
 use std::path::Path;
 
+use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1;
 
 use crate::log::{Entry, FlightLog, Flights, LogError, SummaryFacts, summary_of};
@@ -57,7 +60,7 @@ pub fn info_of<R: Read>(
     Ok(seen.into_info(log, summary))
 }
 
-/// What has been seen on the way through a log.
+/// Facts collected while the log is read.
 #[derive(Default)]
 struct Seen {
     channels: ChannelCounter,
@@ -94,7 +97,13 @@ impl Seen {
                 self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
                 self.frames.count(tick.input.frame, record);
             }
-            Entry::World(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
+            Entry::ComputerStart(_)
+            | Entry::ComputerFrame(_)
+            | Entry::World(_)
+            | Entry::RawFrame
+            | Entry::Operator
+            | Entry::Event(_)
+            | Entry::Other => {}
         }
     }
 
@@ -117,6 +126,7 @@ impl Seen {
                 None => Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
             },
             frames,
+            schema: SchemaFacts { version: head.schema_version(), this_build: SCHEMA_VERSION },
             library: head.library.clone(),
             build: head.build.clone(),
             build_comparison: head.compare_build(),

@@ -1,16 +1,16 @@
-//! When the vehicle was in which phase.
+//! The flight phases and their times.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use serde::Serialize;
 
-/// Phase changes kept; a flight has about ten.
+/// Limit on the phase changes kept; a flight has about ten.
 const SPANS_KEPT: usize = 200;
 
-/// Who tells the phase.
+/// A source of the phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhaseSource {
-    /// The vehicle: its controller's ticks and, of a simulated one, its plant.
+    /// The vehicle: its controller's ticks and, if simulated, its plant.
     Vehicle,
     /// A ground station's telemetry.
     Telemetry,
@@ -29,11 +29,10 @@ impl PhaseSource {
 /// The phases from one source.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseTimeline {
-    /// Who tells them.
     pub source: PhaseSource,
-    /// In order.
+    /// The phases in order.
     pub spans: Vec<PhaseSpan>,
-    /// Changes that are not listed, because there were too many.
+    /// Number of changes that are not listed because there were too many.
     pub further_changes: u64,
 }
 

@@ -1,24 +1,24 @@
-//! How long solves took.
+//! Statistics of solve times.
 
 use serde::Serialize;
 
-/// Times kept for the percentiles: 8 MB, and more than a day of flight at 10 Hz.
+/// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
 const TIMES_KEPT: usize = 1_000_000;
 
-/// How long the ticks took that solve, as measured on board.
+/// Durations of the ticks that solve, as measured on board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SolveTimes {
-    /// How many were measured.
+    /// Number of measurements.
     pub count: u64,
-    /// Half of them took no longer, s.
+    /// Median, s.
     pub median_s: f64,
-    /// 99 of 100 took no longer, s.
+    /// 99th percentile, s.
     pub p99_s: f64,
     /// The longest, s.
     pub max_s: f64,
-    /// The shortest deadline any had, s.
+    /// The shortest deadline, s.
     pub deadline_s: f64,
-    /// How many took longer than their deadline.
+    /// Number of ticks that missed their deadline.
     pub over_deadline: u64,
 }
 

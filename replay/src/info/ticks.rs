@@ -1,9 +1,9 @@
-//! The controller's ticks, counted.
+//! Counts the controller's ticks.
 
 use std::collections::BTreeMap;
 
-use flight::controller::ControlLevel;
-use flight::nmpc::SolveStatus;
+use flight::guidance::controller::ControlLevel;
+use nmpc::SolveStatus;
 use protocol::log::v1;
 use serde::Serialize;
 
@@ -11,13 +11,13 @@ use super::SolveTimes;
 use super::solve_times::SolveTimeCounter;
 use crate::log::{Gap, TickRanges};
 
-/// Gaps listed one by one.
+/// Most gaps that are listed.
 const GAPS_LISTED: usize = 20;
 
 /// The controller's ticks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TickFacts {
-    /// How many there are.
+    /// Number of ticks.
     pub count: u64,
     /// The lowest number.
     pub first: u64,
@@ -27,19 +27,18 @@ pub struct TickFacts {
     pub first_time_s: f64,
     /// Vehicle time of the last in the file, s.
     pub last_time_s: f64,
-    /// How many numbers came more than once.
+    /// Number of repetitions.
     pub repeated: u64,
-    /// How many are missing between the first and the last.
+    /// Number of missing ticks between the first and the last.
     pub missing: u64,
     /// The first gaps.
     pub gaps: Vec<Gap>,
-    /// How many ticks each control level decided.
+    /// Number of ticks decided by each control level.
     pub levels: Vec<Named>,
-    /// How many ticks ended with each solver status.
+    /// Number of ticks with each solver status.
     pub solver_statuses: Vec<Named>,
-    /// How long the ticks took.
     pub solve_time: SolveTimes,
-    /// Ticks whose predecessor's output was dropped as too late: what was decided on board.
+    /// Ticks whose previous output was dropped as too late, as decided on board.
     pub outputs_dropped: u64,
 }
 

@@ -1,24 +1,24 @@
-//! One record of a log, decoded if replay needs its content.
+//! One record of a log; decoded if replay needs its content.
 
 use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
-    ENCODING_MAVLINK, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START,
-    TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY,
-    TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS,
+    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
+    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
 };
-use protocol::log::{flight_v1, v1};
+use protocol::log::{computer_v1, flight_v1, v1};
 
-use super::schema::{PACKAGE, PACKAGE_FLIGHT, complaint};
+use super::schema::{PACKAGE, PACKAGE_COMPUTER, PACKAGE_FLIGHT, complaint};
 
-/// A record and where it stands in the log.
+/// A record and its position in the log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampedEntry {
     /// Its channel; see [`FlightLog::channels`](super::FlightLog::channels).
     pub channel_id: u16,
     /// Nanoseconds since the Unix epoch.
     pub log_time_ns: u64,
-    /// Its number within its channel.
+    /// Sequence number in its channel.
     pub sequence: u32,
     /// Its bytes.
     pub data: Vec<u8>,
@@ -31,11 +31,15 @@ pub struct StampedEntry {
 pub enum Entry {
     /// A controller tick.
     Tick(Box<v1::ControllerTick>),
-    /// What the flight computer believed when it was let go.
+    /// What the flight computer was built from at power-up.
+    ComputerStart(Box<computer_v1::ComputerStart>),
+    /// A frame of the flight computer, from power-up on.
+    ComputerFrame(Box<computer_v1::ComputerFrame>),
+    /// The start record of the flight computer: what it believed at its release.
     PilotStart(Box<flight_v1::PilotStart>),
     /// A frame of the flight computer from apogee to touchdown.
     PilotTick(Box<flight_v1::PilotTick>),
-    /// How long a frame of it took that plans.
+    /// Solve time of a planning frame.
     PilotTiming(flight_v1::PilotTiming),
     /// The simulated world of a flight from apogee.
     World(Box<flight_v1::TruthSample>),
@@ -49,19 +53,19 @@ pub enum Entry {
     RawFrame,
     /// An operator's action: see the record's own bytes.
     Operator,
-    /// Something that happened, for a person to read; many programs write such.
+    /// An event, as text for people; many programs write such records.
     Event(Box<foxglove::messages::Log>),
     /// A record on one of our topics that this build cannot read.
     Unreadable {
         /// Why.
         reason: String,
     },
-    /// Anything else: transforms, which many programs write, and records of other programs.
+    /// Anything else: transforms and records of other programs.
     Other,
 }
 
 impl Entry {
-    /// Whether only a flight log has such a record.
+    /// Whether such a record occurs only in flight logs.
     pub(super) fn is_ours(&self) -> bool {
         !matches!(self, Self::Event(_) | Self::Other)
     }
@@ -73,6 +77,8 @@ impl Entry {
         };
         match channel.topic.as_str() {
             TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
+            TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
+            TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, Self::ComputerFrame),
             TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
             TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
             TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
@@ -99,8 +105,11 @@ fn decoded<M: Message + Default>(
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    let of_flight = message_name.starts_with("Pilot") || message_name == "TruthSample";
-    let package = if of_flight { PACKAGE_FLIGHT } else { PACKAGE };
+    let package = match message_name {
+        "ComputerStart" | "ComputerFrame" => PACKAGE_COMPUTER,
+        "PilotStart" | "PilotTick" | "PilotTiming" | "TruthSample" => PACKAGE_FLIGHT,
+        _ => PACKAGE,
+    };
     let accepted = format!("{package}.{message_name}");
     if channel.schema_name != accepted {
         // Another program may use the same topic name.
@@ -118,7 +127,7 @@ fn decoded<M: Message + Default>(
             return Entry::Unreadable { reason: format!("{}: {error}", channel.topic) };
         }
     };
-    // The decoder fills missing fields with zeros and skips unknown ones; the encoder then writes other bytes.
+    // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would give different bytes.
     if message.encode_to_vec() != data
         && let Some(complaint) = complaint(&accepted, data)
     {

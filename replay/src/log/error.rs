@@ -3,10 +3,10 @@
 use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_RAW_RX, TOPIC_TELEMETRY};
 use protocol::text::printable;
 
-/// Most topics of a foreign file that a message lists.
+/// Most topics of a foreign file listed in a message.
 const TOPICS_SHOWN: usize = 8;
 
-/// Why a file cannot be used as a flight log at all. Damage inside a log is not among the reasons.
+/// Why a file cannot be used as a flight log. Damage inside a log is not a reason.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file cannot be read.
@@ -14,10 +14,10 @@ pub enum LogError {
     Read {
         /// The file.
         name: String,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
-    /// The file has no content.
+    /// The file is empty.
     #[error("{name}: is empty; a flight log is an MCAP file")]
     Empty {
         /// The file.
@@ -35,7 +35,7 @@ pub enum LogError {
         /// Its first bytes.
         found: Vec<u8>,
     },
-    /// The file begins like a log and breaks off before anything can be read.
+    /// The file begins like a log but ends before any record.
     #[error("{name}: nothing in it can be read: {damage}")]
     NothingReadable {
         /// The file.
@@ -45,7 +45,7 @@ pub enum LogError {
     },
     /// An MCAP file of another program.
     #[error(
-        "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {}, {} and their kin",
+        "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {}, {} or similar topics",
         printable(library.as_bytes()), listed(topics), TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_TELEMETRY,
         TOPIC_RAW_RX
     )]
@@ -54,12 +54,11 @@ pub enum LogError {
         name: String,
         /// The library that wrote it.
         library: String,
-        /// Its topics.
         topics: Vec<String>,
     },
 }
 
-/// What helps with a file of a known other kind.
+/// Advice for a file of another known kind.
 fn hint(name: &str) -> &'static str {
     let is_tlog =
         std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));

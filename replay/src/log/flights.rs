@@ -1,25 +1,25 @@
-//! The flights of a log, told apart: where each begins, and whether it was recorded to its end.
+//! Separates the flights of a log: where each begins, and whether it was recorded to its end.
 //!
-//! A log has one flight. Logs joined by other tools have several, and a log cut by one may end in the middle of its
-//! flight while every checksum holds. A flight from apogee begins with its record `/pilot/start`, a planar one with tick 0,
-//! and each ends with its verdict.
+//! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool may end in the
+//! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`. If the log
+//! has none, a flight from apogee begins with `/pilot/start`, and a planar one with tick 0. Each flight ends with its
+//! verdict.
 
 use std::fmt;
 
-use flight::phase::Phase;
+use flight::computer::FRAME_S;
+use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use super::Entry;
 
-/// Ticks may end so long before the verdict's time of contact, s: the last planar tick stands at most one period (0.1 s)
-/// before it.
+/// Longest time between the last tick and the verdict's time of contact, s: the last planar tick comes at most one
+/// period (0.1 s) before contact.
 const PLANAR_TICK_S: f64 = 0.1;
-/// The same of the flight computer's frames, which last 5 ms.
-const FRAME_S: f64 = 0.005;
-/// Times are sums of periods, and rounded.
+/// Tolerance for rounding: times are sums of periods.
 const ROUNDING_S: f64 = 1e-6;
 
-/// Which computer flew.
+/// The computer that flew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlightKind {
     /// The controller of the planar landing.
@@ -31,24 +31,25 @@ pub enum FlightKind {
 /// A flight of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoggedFlight {
-    /// Which computer flew.
+    /// The computer that flew.
     pub kind: FlightKind,
     /// Ticks or frames.
     pub ticks: u64,
-    /// Vehicle time and phase of the latest of them, s.
+    /// Vehicle time, s, and phase of the latest tick.
     last: Option<(f64, u32)>,
-    /// Time of contact as its verdict says it, s.
+    /// The latest frame of the flight computer since power-up: its time, s, and phase.
+    on_the_pad: Option<(f64, u32)>,
+    /// Time of contact in the verdict, s.
     contact_s: Option<f64>,
 }
 
-/// Where the record of a flight ends that has no end.
+/// Where an incomplete record of a flight ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cut {
     /// Vehicle time of the last tick, s.
     pub time_s: f64,
-    /// Its phase.
     pub phase: &'static str,
-    /// Time of contact as the verdict says it, s, if that is there and only ticks are missing.
+    /// Time of contact in the verdict, s, if the verdict is there and only ticks are missing.
     pub contact_s: Option<f64>,
 }
 
@@ -65,20 +66,20 @@ impl fmt::Display for Cut {
 
 impl LoggedFlight {
     fn new(kind: FlightKind) -> Self {
-        Self { kind, ticks: 0, last: None, contact_s: None }
+        Self { kind, ticks: 0, last: None, on_the_pad: None, contact_s: None }
     }
 
     fn note(&mut self, time_s: f64, phase: u32) {
         self.ticks += 1;
-        // Ticks may be shuffled a little in the file.
+        // Ticks in the file may be slightly out of order.
         if self.last.is_none_or(|(last_s, _)| last_s <= time_s) {
             self.last = Some((time_s, phase));
         }
     }
 
-    /// Where its record ends, if that is before the flight's end; `None` also of a flight without ticks.
+    /// Where the record ends, if that is before the end of the flight; `None` also for a flight without ticks.
     pub fn cut(&self) -> Option<Cut> {
-        let (time_s, phase) = self.last?;
+        let (time_s, phase) = self.last.or(self.on_the_pad)?;
         let period_s = match self.kind {
             FlightKind::Planar => PLANAR_TICK_S,
             FlightKind::FromApogee => FRAME_S,
@@ -90,12 +91,14 @@ impl LoggedFlight {
     }
 }
 
-/// Watches a log's records go by.
+/// Separates flights while the records of a log are read.
 #[derive(Debug, Clone, Default)]
 pub struct Flights {
     found: Vec<LoggedFlight>,
-    /// Tick 0 of the last flight has been seen: the next one is another flight's.
+    /// Tick 0 of the last flight has been seen: the next tick 0 belongs to another flight.
     tick_0_seen: bool,
+    /// The last flight began with the power-up of its flight computer.
+    powered_up: bool,
 }
 
 impl Flights {
@@ -103,6 +106,22 @@ impl Flights {
     pub fn note(&mut self, entry: &Entry) -> bool {
         let before = self.found.len();
         match entry {
+            Entry::ComputerStart(start) => {
+                self.begin(if start.in_space.is_some() {
+                    FlightKind::FromApogee
+                } else {
+                    FlightKind::Planar
+                });
+                self.powered_up = true;
+            }
+            Entry::ComputerFrame(frame) => {
+                if let Some(flight) = self.found.last_mut().filter(|_| self.powered_up) {
+                    flight.on_the_pad = Some((frame.input.time_s, frame.output.phase));
+                }
+            }
+            // If the log has the power-up of this flight computer, its release does not begin another flight.
+            Entry::PilotStart(_)
+                if self.powered_up && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
             Entry::PilotStart(_) => self.begin(FlightKind::FromApogee),
             Entry::PilotTick(tick) => {
                 self.present(FlightKind::FromApogee, false).note(tick.input.time_s, tick.output.phase);
@@ -126,9 +145,10 @@ impl Flights {
     fn begin(&mut self, kind: FlightKind) {
         self.found.push(LoggedFlight::new(kind));
         self.tick_0_seen = false;
+        self.powered_up = false;
     }
 
-    /// The flight that a tick of a kind belongs to, begun here if it is another one or its beginning is lost.
+    /// The flight that a tick belongs to; it begins a new flight if the kind differs or the start is lost.
     fn present(&mut self, kind: FlightKind, another: bool) -> &mut LoggedFlight {
         if another || self.found.last().is_none_or(|flight| flight.kind != kind) {
             self.begin(kind);
@@ -142,7 +162,7 @@ impl Flights {
         &self.found
     }
 
-    /// Where the first flight's record ends that was not recorded to its end.
+    /// Where the record ends, for the first flight that is incomplete.
     pub fn cut(&self) -> Option<Cut> {
         self.found.iter().find_map(LoggedFlight::cut)
     }

@@ -1,38 +1,38 @@
-//! Frames that a log has lost, told from frames that were never there.
+//! Tells frames that a log has lost from frames that never existed.
 //!
-//! A flight computer that was restarted leaves out frames, and its records are numbered without a hole. A log that has
-//! lost some leaves out records. What the computer remembered behind a loss is not known, so nothing behind the first one
-//! can be run again.
+//! A flight computer that restarts skips frame numbers, but the sequence numbers of its records have no gap. A log that
+//! lost frames has a gap in the sequence numbers. The computer's memory after a loss is unknown, so no frame after the
+//! first loss can be executed again.
 
 use super::Gap;
 
-/// Watches a log's frames go by, in file order.
+/// Checks the order of frames as they are read from the file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameOrder {
     last_frame: u64,
-    /// Number that the next record of the channel has if none is lost.
+    /// The sequence number of the channel's next record if none is lost.
     next_record: u32,
-    /// Another flight stands before this one in the log. Whether its records are numbered on or anew is not known, so its
-    /// first frame must be the first there is.
+    /// Another flight comes before this one in the log. Sequence numbers may continue or start again, so the number of
+    /// the flight's first frame shows whether frames are lost.
     behind_another: bool,
 }
 
-/// The number of the first frame of a flight.
+/// The highest number that a flight's first frame can have; the planar vehicle's first frame has number 0.
 const FIRST_FRAME: u64 = 1;
 
 impl FrameOrder {
-    /// The order of a flight that stands behind another one in the same log.
+    /// The order of a flight that follows another one in the same log.
     pub fn behind_another() -> Self {
         Self { behind_another: true, ..Self::default() }
     }
 
-    /// Notes a frame and its record's number within its channel; the gap before it, if records are lost there.
+    /// Takes a frame and the sequence number of its record; returns the gap before it, if records are lost there.
     pub fn note(&mut self, frame: u64, record: u32) -> Option<Gap> {
         let gap = Gap { after: self.last_frame, before: frame };
-        let lost = if self.behind_another { frame != FIRST_FRAME } else { record > self.next_record };
+        let lost = if self.behind_another { frame > FIRST_FRAME } else { record > self.next_record };
         self.behind_another = false;
         self.last_frame = frame;
-        // A writer that does not number leaves 0 everywhere, and nothing is ever missing.
+        // A writer without sequence numbers leaves 0 everywhere, and no loss can be seen.
         self.next_record = record.saturating_add(1);
         lost.then_some(gap)
     }

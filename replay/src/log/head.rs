@@ -1,10 +1,13 @@
-//! What a log says about itself.
+//! The head of a log: metadata and attachments.
 
 use std::collections::BTreeMap;
 
 use protocol::log::build::build_info;
 use protocol::log::reader::LogItem;
-use protocol::log::record::{ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RUN};
+use protocol::log::record::{
+    ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RUN, METADATA_SCHEMA,
+    SCHEMA_VERSION_ENTRY,
+};
 use serde::Serialize;
 
 /// Metadata and attachments.
@@ -12,31 +15,31 @@ use serde::Serialize;
 pub struct Head {
     /// The library that wrote the file.
     pub library: String,
+    /// The log's schema metadata: the version of its contents.
+    pub schema: BTreeMap<String, String>,
     /// Which build wrote it.
     pub build: BTreeMap<String, String>,
-    /// Which run it is: profile, seed and so on.
+    /// Facts about the run: profile, seed and so on.
     pub run: BTreeMap<String, String>,
-    /// The profile's whole text, or what kept it from being text.
+    /// The profile's whole text, or why it is not text.
     pub profile_toml: Option<Result<String, std::string::FromUtf8Error>>,
-    /// The whole text of what chance was drawn from.
+    /// The whole text of the dispersions.
     pub scenario_toml: Option<String>,
-    /// Every attachment.
     pub attachments: Vec<AttachmentFacts>,
 }
 
 /// An attachment, without its content.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AttachmentFacts {
-    /// Its name.
     pub name: String,
     /// Its size.
     pub bytes: usize,
 }
 
-/// The build that wrote a log against this one.
+/// Comparison of the build that wrote a log with this one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BuildComparison {
-    /// The log says which build wrote it.
+    /// Whether the log says which build wrote it.
     pub recorded: bool,
     /// Every fact that differs; empty with `recorded` means the same build.
     pub differences: Vec<BuildDifference>,
@@ -45,16 +48,20 @@ pub struct BuildComparison {
 /// A fact in which two builds differ.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BuildDifference {
-    /// Which fact.
     pub fact: String,
-    /// As recorded; absent if the log does not say.
+    /// The recorded value; absent if the log does not say.
     pub recorded: Option<String>,
-    /// Of this build; absent if this build does not note it.
+    /// The value of this build; absent if this build does not record it.
     pub this_build: Option<String>,
 }
 
 impl Head {
-    /// Written by one of our programs.
+    /// Version of the log's contents; 1 if the log does not state it.
+    pub fn schema_version(&self) -> u32 {
+        self.schema.get(SCHEMA_VERSION_ENTRY).and_then(|version| version.parse().ok()).unwrap_or(1)
+    }
+
+    /// Whether one of our programs wrote the log.
     pub(super) fn is_ours(&self) -> bool {
         self.library.starts_with("touchdown ")
             || self.build.contains_key("git_commit")
@@ -66,6 +73,7 @@ impl Head {
         match item {
             LogItem::Library(library) => self.library = library,
             LogItem::Metadata { name, entries } if name == METADATA_BUILD => self.build = entries,
+            LogItem::Metadata { name, entries } if name == METADATA_SCHEMA => self.schema = entries,
             LogItem::Metadata { name, entries } if name == METADATA_RUN => self.run.extend(entries),
             LogItem::Attachment { name, data } => {
                 self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
@@ -79,7 +87,7 @@ impl Head {
         }
     }
 
-    /// The build that wrote the log against this one.
+    /// Comparison of the build that wrote the log with this one.
     pub fn compare_build(&self) -> BuildComparison {
         let this = build_info();
         let facts: std::collections::BTreeSet<&String> = self.build.keys().chain(this.keys()).collect();

@@ -1,7 +1,7 @@
-//! A flight log, opened: what it says about itself, then its records in file order.
+//! Opens a flight log and reads its head, then its records in file order.
 //!
-//! Records are streamed, so memory does not grow with the log. Damage ends the stream and is then known
-//! ([`FlightLog::damage`]); everything before it has been handed out.
+//! Records are streamed, so memory does not grow with the log. Damage ends the stream and can then be queried
+//! ([`FlightLog::damage`]); every record before the damage has been returned.
 
 mod entry;
 mod error;
@@ -22,7 +22,7 @@ pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
-pub(crate) use schema::{pilot_descriptor, tick_descriptor};
+pub(crate) use schema::{computer_descriptor, pilot_descriptor, tick_descriptor};
 pub(crate) use summary::chunk_offsets;
 pub use summary::{SummaryFacts, summary_of};
 pub use tick_order::{Ordered, TickOrder};
@@ -44,7 +44,7 @@ pub struct FlightLog<R: Read> {
     name: String,
     reader: LogReader<Chain<Cursor<Vec<u8>>, R>>,
     head: Head,
-    /// Something was found that only a flight log has.
+    /// Whether a record was found that only flight logs have.
     recognised: bool,
     last_log_time_ns: Option<u64>,
 }
@@ -94,8 +94,8 @@ impl<R: Read> FlightLog<R> {
         &self.name
     }
 
-    /// What the log has said about itself so far: complete once the entries are exhausted, and in our own logs
-    /// already at the first entry.
+    /// The head as read so far: complete once the entries are exhausted, and in our own logs already at the first
+    /// entry.
     pub fn head(&self) -> &Head {
         &self.head
     }
@@ -105,12 +105,12 @@ impl<R: Read> FlightLog<R> {
         self.reader.channels()
     }
 
-    /// The channel of an entry that was handed out.
+    /// The channel of an entry.
     pub fn channel(&self, id: u16) -> Option<&LogChannel> {
         self.reader.channel(id)
     }
 
-    /// What ended the reading early; `None` for a whole log, once the entries are exhausted.
+    /// Why the log could not be read to its end; `None` for a whole log, once the entries are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
         self.reader.damage()
     }

@@ -1,4 +1,4 @@
-//! A new log file, for what is flown again or imported.
+//! Creates a log file for a re-flown or imported flight.
 
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
@@ -13,9 +13,9 @@ pub(crate) struct NewLog {
     writer: LogWriter<BufWriter<NewFile>>,
 }
 
-/// Why a new log is not there.
+/// Why a new log could not be written.
 pub(crate) enum NewLogError {
-    /// The file exists, or cannot be made.
+    /// The file exists or cannot be created.
     Create(std::io::Error),
     /// Writing failed.
     Write(LogWriteError),

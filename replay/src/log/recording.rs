@@ -1,55 +1,55 @@
-//! A whole flight in memory, for questions that need more than one pass over it.
+//! Holds a whole flight in memory, for questions that need more than one pass.
 //!
-//! Plans and raw frames are left out, so a flight of minutes takes some megabytes; a log that is longer than any
-//! flight is refused rather than held.
+//! Plans and raw frames are left out, so a flight of some minutes takes a few megabytes. A log that is longer than any
+//! real flight is refused.
 
 use std::path::Path;
 
-use flight::profile::Profile;
+use flight::vehicle::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::{Cut, Entry, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
+use super::{Cut, Entry, FlightKind, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
 
-/// Most records of one kind that are held: five hours of ticks at 10 Hz.
+/// Most records of one kind: five hours of ticks at 10 Hz.
 const RECORDS_MAX: usize = 200_000;
 
-/// Why a log cannot be flown from.
+/// Why a log cannot be executed or flown again.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// Not a flight log, or not readable.
+    /// The file is not a flight log, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
     /// Longer than any flight.
     #[error(
-        "{name}: has more than {RECORDS_MAX} {kind}, more than this question holds in memory; no flight is that long"
+        "{name}: has more than {RECORDS_MAX} {kind}, more than this command holds in memory; no flight is that long"
     )]
     TooLong {
         /// The file.
         name: String,
-        /// What there are too many of.
+        /// The kind of record of which there are too many.
         kind: &'static str,
     },
-    /// Nothing to re-execute.
+    /// The log has no ticks to re-execute.
     #[error(
         "{name}: has no controller ticks from tick 0 on: {}",
-        unreadable.as_deref().unwrap_or("this question needs the log of the vehicle or of the demonstration")
+        unreadable.as_deref().unwrap_or("this command needs the log of the vehicle or of the demonstration")
     )]
     NoTicks {
         /// The file.
         name: String,
-        /// Why some record could not be read, if that is the reason.
+        /// Why a record could not be read, if that is the reason.
         unreadable: Option<String>,
     },
-    /// Nothing to re-execute of a flight from apogee.
+    /// The log has no frames of a flight from apogee to re-execute.
     #[error(
-        "{name}: has no frames of the flight computer behind a record /pilot/start{}",
+        "{name}: has no frames of the flight computer after a record /pilot/start{}",
         unreadable.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default()
     )]
     NoFrames {
         /// The file.
         name: String,
-        /// Why some record could not be read, if that is the reason.
+        /// Why a record could not be read, if that is the reason.
         unreadable: Option<String>,
     },
     /// The first frames are lost.
@@ -59,12 +59,12 @@ pub enum RecordingError {
     BeginningLost {
         /// The file.
         name: String,
-        /// The first frame there is.
+        /// The first frame in the log.
         first: u64,
     },
-    /// Joined from several logs.
+    /// The log holds several flights.
     #[error(
-        "{name}: holds {flights} flights, and this question is about one; `replay verify` tells each of them"
+        "{name}: holds {flights} flights, and this command takes one; `replay verify` reports on each of them"
     )]
     SeveralFlights {
         /// The file.
@@ -72,18 +72,18 @@ pub enum RecordingError {
         /// How many.
         flights: usize,
     },
-    /// Nothing to build the controller from.
+    /// The log has no profile to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile {
         /// The file.
         name: String,
     },
-    /// The profile is not one of this build.
+    /// This build cannot use the profile.
     #[error("{name}: its profile cannot be used by this build: {reason}")]
     ProfileUnusable {
         /// The file.
         name: String,
-        /// What is wrong with it.
+        /// What is wrong.
         reason: String,
     },
 }
@@ -97,15 +97,15 @@ pub struct Recording {
     pub head: Head,
     /// Every tick, by number, without its plan.
     pub ticks: Vec<v1::ControllerTick>,
-    /// How many of them follow each other from tick 0 without a gap or a repetition.
+    /// Number of leading ticks, from tick 0, without a gap or a repetition.
     pub ticks_unbroken: usize,
-    /// How the flight computer of a flight from apogee was let go.
+    /// The start record of a flight from apogee.
     pub pilot_start: Option<flight_v1::PilotStart>,
     /// Its frames, in file order.
     pub frames: Vec<flight_v1::PilotTick>,
-    /// How many of them stand before the first that the log has lost.
+    /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
-    /// How long those took that plan, in file order; none of a flight that was simulated without a clock.
+    /// Solve times of planning frames, in file order; empty for a flight simulated without a clock.
     pub timings: Vec<flight_v1::PilotTiming>,
     /// Its simulated world, in file order.
     pub world: Vec<flight_v1::TruthSample>,
@@ -113,15 +113,15 @@ pub struct Recording {
     pub truth: Vec<v1::PlantTruth>,
     /// What a ground station knew, in file order.
     pub telemetry: Vec<v1::Telemetry>,
-    /// What happened, with the log's time, s after its first record.
+    /// Events, with log time in seconds after the first record.
     pub events: Vec<(f64, EventRecord)>,
     /// The last landing verdict.
     pub verdict: Option<v1::LandingVerdict>,
-    /// What ended the reading early.
+    /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
-    /// Why the first record that this build cannot read could not be read.
+    /// Why the first unreadable record could not be read.
     pub unreadable: Option<String>,
 }
 
@@ -129,8 +129,8 @@ impl Recording {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight. Damage is not an
-    /// error.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight. Damage is not
+    /// an error.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::read(&mut FlightLog::open(path)?)
     }
@@ -161,7 +161,7 @@ impl Recording {
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
-                // Of a start with no frames behind it nothing is known.
+                // A start record without frames after it says nothing.
                 Entry::PilotStart(start) if recording.frames.is_empty() => {
                     recording.pilot_start = Some(*start);
                 }
@@ -171,7 +171,12 @@ impl Recording {
                     }
                     recording.frames.push(*tick);
                 }
-                Entry::PilotStart(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {}
+                Entry::ComputerStart(_)
+                | Entry::ComputerFrame(_)
+                | Entry::PilotStart(_)
+                | Entry::RawFrame
+                | Entry::Operator
+                | Entry::Other => {}
             }
             recording.check_length()?;
         }
@@ -205,15 +210,16 @@ impl Recording {
         }
     }
 
-    /// Whether the flight computer of a flight from apogee wrote it, not the controller of the planar landing.
-    pub fn is_from_apogee(&self) -> bool {
-        self.pilot_start.is_some() || !self.frames.is_empty()
+    /// Which vehicle flew: its ticks are of this kind.
+    pub fn kind(&self) -> FlightKind {
+        let in_space = self.pilot_start.is_some() || !self.frames.is_empty();
+        if in_space { FlightKind::FromApogee } else { FlightKind::Planar }
     }
 
-    /// How the flight computer of a flight from apogee was let go, and all its frames.
+    /// The start record of a flight from apogee and all its frames.
     ///
     /// # Errors
-    /// There are none, or nothing to begin from.
+    /// The log has no frames or no start record.
     pub fn recorded_frames(
         &self,
     ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
@@ -225,10 +231,10 @@ impl Recording {
         }
     }
 
-    /// The same, of the frames those that can be re-executed: up to the first that the log has lost.
+    /// The start record and the frames that can be re-executed: those before the first lost one.
     ///
     /// # Errors
-    /// There are none, or nothing to begin from.
+    /// The log has no frames or no start record.
     pub fn replayable_frames(
         &self,
     ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
@@ -241,7 +247,7 @@ impl Recording {
         }
     }
 
-    /// Where the ticks or frames end that can be re-executed, if more are recorded behind.
+    /// Where re-execution must stop, if the log has ticks or frames after that.
     pub fn gap(&self) -> Option<Gap> {
         fn around<T>(records: &[T], place: usize, number: impl Fn(&T) -> u64) -> Option<Gap> {
             let before = number(records.get(place)?);
@@ -254,7 +260,7 @@ impl Recording {
     /// The ticks that can be re-executed.
     ///
     /// # Errors
-    /// There are none.
+    /// The log has no such ticks.
     pub fn replayable_ticks(&self) -> Result<&[v1::ControllerTick], RecordingError> {
         match self.ticks.get(..self.ticks_unbroken) {
             Some(ticks) if !ticks.is_empty() => Ok(ticks),
@@ -267,7 +273,7 @@ impl Recording {
     /// The text of the profile that was flown.
     ///
     /// # Errors
-    /// There is none, or it is no text.
+    /// The log has no profile, or it is not text.
     pub fn profile_toml(&self) -> Result<&str, RecordingError> {
         match &self.head.profile_toml {
             None => Err(RecordingError::NoProfile { name: self.name.clone() }),
@@ -281,16 +287,16 @@ impl Recording {
     /// The profile that was flown.
     ///
     /// # Errors
-    /// There is none, or it is not one of this build.
+    /// The log has no profile, or this build cannot use it.
     pub fn profile(&self) -> Result<Profile, RecordingError> {
         let text = self.profile_toml()?;
-        Profile::from_toml(text, "profile.toml").map_err(|error| RecordingError::ProfileUnusable {
+        vehicles::profile::from_toml(text, "profile.toml").map_err(|error| RecordingError::ProfileUnusable {
             name: self.name.clone(),
             reason: error.to_string(),
         })
     }
 
-    /// The seed of the flight's dispersions, if the log says it.
+    /// The seed of the flight's dispersions, if the log has it.
     pub fn seed(&self) -> Option<u64> {
         self.head.run.get("seed")?.parse().ok()
     }

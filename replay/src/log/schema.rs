@@ -1,12 +1,12 @@
-//! The log's own description of its records, for what the generated types do not say: names of fields, and which
-//! are missing or unknown.
+//! Finds the names of fields, and which fields of a record are missing or unknown, from this build's schemas; the
+//! generated types do not know them.
 
 use std::sync::LazyLock;
 
 use prost_reflect::{
     Cardinality, DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMessage as _, Value,
 };
-use protocol::log::{DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
+use protocol::log::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
 
 /// Package of the log's own records.
 pub(super) const PACKAGE: &str = "touchdown.log.v1";
@@ -14,10 +14,14 @@ pub(super) const PACKAGE: &str = "touchdown.log.v1";
 /// Package of the records of the flight from apogee.
 pub(super) const PACKAGE_FLIGHT: &str = "touchdown.flight.v1";
 
+/// Package of the flight computer's frames from power-up on.
+pub(super) const PACKAGE_COMPUTER: &str = "touchdown.computer.v1";
+
 static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
     let mut pool = DescriptorPool::decode(DESCRIPTORS_V1).unwrap_or_default();
-    // What cannot be added is missing, which the crate's tests would see.
+    // A schema that cannot be added would be missing, and the crate's tests would notice.
     let _ = pool.decode_file_descriptor_set(DESCRIPTORS_FLIGHT_V1);
+    let _ = pool.decode_file_descriptor_set(DESCRIPTORS_COMPUTER_V1);
     pool
 });
 
@@ -31,7 +35,12 @@ pub(crate) fn pilot_descriptor() -> Option<MessageDescriptor> {
     POOL.get_message_by_name("touchdown.flight.v1.PilotTick")
 }
 
-/// What keeps a record from being understood exactly: a missing or an unknown field.
+/// Descriptor of a frame of the flight computer from power-up on.
+pub(crate) fn computer_descriptor() -> Option<MessageDescriptor> {
+    POOL.get_message_by_name("touchdown.computer.v1.ComputerFrame")
+}
+
+/// Why a record cannot be understood exactly: a missing or an unknown field. `None` if it can.
 pub(super) fn complaint(full_name: &str, data: &[u8]) -> Option<String> {
     let descriptor = POOL.get_message_by_name(full_name)?;
     match DynamicMessage::decode(descriptor, data) {
@@ -77,7 +86,9 @@ mod tests {
         for name in ["ControllerTick", "PlantTruth", "LandingVerdict", "Telemetry", "OperatorAction"] {
             assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
         }
-        assert!(tick_descriptor().is_some() && pilot_descriptor().is_some());
+        assert!(
+            tick_descriptor().is_some() && pilot_descriptor().is_some() && computer_descriptor().is_some()
+        );
     }
 
     #[test]

@@ -1,27 +1,25 @@
-//! What the far end of a damaged file still says: a file broken in its middle may have kept its summary.
+//! Reads the summary at the end of a damaged file: a file broken in its middle may still have it.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
 use std::path::Path;
 
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use protocol::log::reader::RECORD_LIMIT_BYTES;
 use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK};
 
-/// A summary larger than this is taken for damage.
-const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
-
-/// What a file's summary says about the whole.
+/// Facts from a file's summary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SummaryFacts {
     /// Messages in the file.
     pub message_count: u64,
-    /// Of these, ticks of a controller and frames of a flight computer.
+    /// Of these, controller ticks and flight computer frames.
     pub ticks: u64,
     /// Time of the last message, ns since the Unix epoch.
     pub last_log_time_ns: u64,
 }
 
-/// What the summary at the end of a file says, if it has one that can be read.
+/// Reads the summary at the end of a file, if possible.
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     let summary = read_summary(path)?;
     let stats = summary.stats?;
@@ -39,7 +37,7 @@ pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     })
 }
 
-/// Where the chunks of a file begin, in order, as its summary says; empty without one.
+/// The start offsets of the chunks in a file, in order, from its summary; empty without a summary.
 pub(crate) fn chunk_offsets(path: &Path) -> Vec<u64> {
     let indexes = read_summary(path).map(|summary| summary.chunk_indexes).unwrap_or_default();
     let mut offsets: Vec<u64> = indexes.iter().map(|index| index.chunk_start_offset).collect();

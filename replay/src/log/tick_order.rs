@@ -1,33 +1,30 @@
-//! Ticks in the order of their numbers, whatever order the file has them in.
+//! Sorts ticks by number, whatever their order in the file.
 
 use std::collections::BTreeMap;
 
 use protocol::log::v1::ControllerTick;
 
-/// How many ticks may wait for one that comes later in the file. At 10 Hz this is far more than any queue of a
-/// recorder can shuffle; a tick that is still missing then is taken for lost.
+/// How many ticks may wait for one that comes later in the file. At 10 Hz this is far more than a recorder's queue can
+/// reorder; a tick that is still missing then counts as lost.
 const WINDOW_TICKS: usize = 256;
 
 /// The number of the first tick a controller runs.
 const FIRST_TICK: u64 = 0;
 
-/// What comes out of the ordering.
+/// An item of the ordered sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ordered {
     /// The next tick.
     Tick(Box<ControllerTick>),
     /// Ticks are missing before the next one there is.
     Missing {
-        /// The first that is missing.
+        /// The first missing tick.
         from: u64,
-        /// The next there is.
+        /// The next tick in the log.
         next: u64,
     },
-    /// A tick that was there already.
-    Repeated {
-        /// Its number.
-        tick: u64,
-    },
+    /// A repeated tick.
+    Repeated { tick: u64 },
 }
 
 /// Orders ticks by number, with bounded memory.
@@ -43,7 +40,7 @@ impl TickOrder {
         Self { waiting: BTreeMap::new(), next: FIRST_TICK }
     }
 
-    /// Takes a tick as the file has it.
+    /// Takes the next tick from the file.
     pub fn push(&mut self, tick: Box<ControllerTick>) -> Option<Ordered> {
         let number = tick.input.tick;
         if number < self.next || self.waiting.contains_key(&number) {

@@ -1,10 +1,10 @@
-//! Which tick numbers a log holds, without holding the ticks.
+//! The set of tick numbers in a log, without the ticks.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// A set of tick numbers, as runs.
+/// A set of tick numbers, stored as runs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TickRanges {
     /// First number of each run, and its last.
@@ -12,12 +12,12 @@ pub struct TickRanges {
     repeated: u64,
 }
 
-/// Ticks that are not there, between two that are.
+/// A gap between two ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Gap {
-    /// The last tick before.
+    /// The last tick before the gap.
     pub after: u64,
-    /// The first tick behind.
+    /// The first tick after the gap.
     pub before: u64,
 }
 
@@ -42,7 +42,7 @@ impl TickRanges {
         Some((*self.runs.first_key_value()?.0, *self.runs.last_key_value()?.1))
     }
 
-    /// How often a number came that was there already.
+    /// Number of repetitions.
     pub fn repeated(&self) -> u64 {
         self.repeated
     }

@@ -1,4 +1,4 @@
-//! Flights compared: Markdown for people, cases for build servers.
+//! Prints comparisons: Markdown for people, test cases for build servers.
 
 use std::io::{self, Write};
 
@@ -6,9 +6,9 @@ use super::verdicts::{self, LimitRow};
 use super::{JunitCase, JunitOutcome, counted, shown};
 use crate::compare::{Align, Comparison};
 
-/// Signals listed of those that differ within their tolerance or without one.
+/// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
-/// Names listed of added and missing signals.
+/// Most names listed of added and missing signals.
 const NAMES_SHOWN: usize = 20;
 
 /// Writes comparisons as Markdown.
@@ -104,12 +104,12 @@ fn print_signals(comparison: &Comparison, output: &mut impl Write) -> io::Result
     writeln!(output)
 }
 
-/// Text that does not end a cell of a table.
+/// Escapes text for a table cell.
 fn cell(text: &str) -> String {
     shown(text).replace('|', "\\|")
 }
 
-/// Comparisons as cases for a build server: one for the verdict and the counts, one a signal with a tolerance.
+/// Comparisons as test cases: one for the verdict and the counts, and one for each signal with a tolerance.
 pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
     let mut cases = Vec::new();
     for comparison in comparisons {

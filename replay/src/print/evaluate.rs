@@ -1,14 +1,14 @@
-//! An evaluation, for people and as a table.
+//! Prints an evaluation as text and as a table.
 
 use std::io::{self, Write};
 
 use super::shown;
 use crate::evaluate::{Decided, EvaluateReport, EvaluatedTick, PhaseEntered};
 
-/// Differing ticks that are shown.
+/// Most differing ticks that are shown.
 const TICKS_SHOWN: usize = 120;
 
-/// Writes an evaluation as text: the summary, then every tick on which something differs.
+/// Writes an evaluation as text: the summary, then the ticks that differ.
 ///
 /// # Errors
 /// The output failed.
@@ -20,7 +20,7 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     if report.unchanged_different > 0 {
         writeln!(
             output,
-            "with nothing changed this build decides {} of {} ticks otherwise than recorded",
+            "with nothing changed this build decides {} of {} ticks differently from the record",
             report.unchanged_different,
             report.ticks.len()
         )?;
@@ -54,7 +54,7 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     if differing.is_empty() {
         return Ok(());
     }
-    // Two hundred frames a second are for --csv; between plans they hardly differ.
+    // Text shows planning frames only, because the others hardly differ; --csv has all 200 frames a second.
     let stride = differing.len().div_ceil(TICKS_SHOWN).max(1);
     if stride > 1 {
         writeln!(output, "one of {stride} differing ticks; --csv and --json show all:")?;
@@ -102,7 +102,7 @@ pub fn print_evaluate_csv(report: &EvaluateReport, output: &mut impl Write) -> i
     let mut columns = vec!["tick".to_owned(), "time_s".to_owned()];
     for side in ["recorded", "evaluated"] {
         columns.extend(["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}")));
-        // One gimbal angle needs no number.
+        // A single gimbal angle has no index in its name.
         let gimbal = (0..lists.0).map(|axis| match lists.0 {
             1 => format!("{side}_gimbal_rad"),
             _ => format!("{side}_gimbal_rad_{axis}"),

@@ -1,4 +1,4 @@
-//! A description of a log, for people.
+//! Prints the description of a log for people.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -21,9 +21,20 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
     row(output, "complete", &completeness(info))?;
     if info.completeness.flights > 1 {
-        row(output, "flights", &format!("{}, told apart by `replay verify`", info.completeness.flights))?;
+        row(output, "flights", &format!("{}; `replay verify` reports on each", info.completeness.flights))?;
     }
     print_origin(info, output)?;
+    let schema = &info.schema;
+    if schema.version != schema.this_build {
+        let newer = schema.version > schema.this_build;
+        let words =
+            if newer { "newer than this build reads" } else { "without the flight computer's frames" };
+        row(
+            output,
+            "schema",
+            &format!("{}, {words} (this build writes {})", schema.version, schema.this_build),
+        )?;
+    }
     if let Some(span) = &info.span {
         let (first, last) = (utc(span.first_ns), utc(span.last_ns));
         row(output, "time", &format!("{first} to {last}, {:.3} s", span.duration_s))?;
@@ -69,7 +80,7 @@ fn completeness(info: &Info) -> String {
             None => "no record could be read".to_owned(),
             Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
         });
-        faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s behind that are lost")));
+        faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
     }
     if found.ticks_missing > 0 {
         faults.push(format!("{} missing", counted(found.ticks_missing, "tick")));
@@ -95,7 +106,7 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
     } else if comparison.differences.is_empty() {
         row(output, "build", &format!("this one: {}", listed(&info.build)))?;
     } else {
-        row(output, "build", "another than this one:")?;
+        row(output, "build", "differs from this build:")?;
         for difference in &comparison.differences {
             let value =
                 |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
@@ -230,7 +241,7 @@ fn print_channels(channels: &[ChannelFacts], output: &mut impl Write) -> io::Res
     Ok(())
 }
 
-/// A hash is known by its beginning; JSON has the whole.
+/// Only the beginning of a hash; JSON has all of it.
 fn short(value: &str) -> String {
     const HASH_MIN: usize = 40;
     const SHOWN: usize = 12;
@@ -238,7 +249,7 @@ fn short(value: &str) -> String {
     shown(if hash { &value[..SHOWN] } else { value })
 }
 
-/// A limit is a decimal number that went through radians.
+/// Rounds away the error of converting degrees to radians and back.
 fn rounded(limit: f64) -> f64 {
     (limit * 1e6).round() / 1e6
 }

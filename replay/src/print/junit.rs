@@ -1,31 +1,29 @@
-//! Answers as JUnit XML, for the servers that collect test results.
+//! Prints answers as JUnit XML for build servers.
 
 use std::io::{self, Write};
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-/// One question and how it was answered.
+/// One question and its answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JunitCase {
     /// What was asked.
     pub name: String,
-    /// How it was answered.
     pub outcome: JunitOutcome,
 }
 
-/// How a question was answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum JunitOutcome {
     /// Yes.
     Passed {
-        /// What there is to say all the same.
+        /// Remarks.
         said: String,
     },
-    /// No, and why in a line and in full.
+    /// No, with a short and a full reason.
     Failed {
         /// One line.
         message: String,
-        /// All that is known.
+        /// The full reason.
         details: String,
     },
     /// There is no answer.

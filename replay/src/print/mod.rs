@@ -1,6 +1,6 @@
-//! Reports as text for people, as JSON for programs and as JUnit XML for build servers.
+//! Prints reports as text for people, as JSON for programs and as JUnit XML for build servers.
 //!
-//! Text from a log is made fit for a terminal first: a log may come from anywhere.
+//! Control characters are removed from the text of a log first, because a log may come from anywhere.
 
 mod compare;
 mod evaluate;
@@ -36,7 +36,7 @@ pub fn print_json(report: &impl Serialize, output: &mut impl Write) -> io::Resul
     writeln!(output)
 }
 
-/// Text from a log, made fit for a terminal.
+/// Text from a log, without control characters.
 fn shown(text: &str) -> String {
     protocol::text::printable(text.as_bytes())
 }

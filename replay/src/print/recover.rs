@@ -1,4 +1,4 @@
-//! A recovery, for people.
+//! Prints a recovery for people.
 
 use std::io::{self, Write};
 

@@ -1,4 +1,4 @@
-//! A flight flown again, for people.
+//! Prints a re-flown flight for people.
 
 use std::io::{self, Write};
 
@@ -7,7 +7,7 @@ use super::{counted, shown};
 use crate::info::VerdictFacts;
 use crate::refly::{Law, Reached, ReflyReport};
 
-/// Writes what came of flying a flight again.
+/// Writes the result of flying a flight again.
 ///
 /// # Errors
 /// The output failed.
@@ -41,7 +41,7 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
         if let Some(frame) = first_different {
             writeln!(
                 output,
-                "NOT AS RECORDED from frame {frame} on: this build flies another flight, and what follows begins there"
+                "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
             )?;
         }
     }

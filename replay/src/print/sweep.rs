@@ -1,4 +1,4 @@
-//! Sweeps and bisections, for people and as a table.
+//! Prints sweeps and bisections as text and as a table.
 
 use std::io::{self, Write};
 
@@ -100,10 +100,10 @@ pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Resul
         }
     }
     match report.smallest() {
-        None => writeln!(output, "no change within the range turns the verdict; {} flown", report.flown),
+        None => writeln!(output, "no change within the range changes the verdict; {} flown", report.flown),
         Some(flip) => writeln!(
             output,
-            "the smallest change that turns the verdict: {:+.6e}, to {}; {} flown",
+            "the smallest change that changes the verdict: {:+.6e}, to {}; {} flown",
             flip.change,
             told_apart(flip.other_at, flip.same_at).0,
             report.flown
@@ -115,11 +115,11 @@ fn not_reproduced(name: &str, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "{}: with nothing changed this build does not fly it as recorded", shown(name))
 }
 
-/// Two numbers with as many decimals as it takes to tell them apart.
+/// Two numbers with just enough decimals to differ.
 fn told_apart(a: f64, b: f64) -> (String, String) {
     const DECIMALS: std::ops::RangeInclusive<usize> = 9..=16;
     let rounded = |decimals: usize| (format!("{a:.decimals$}"), format!("{b:.decimals$}"));
-    // The shortest text of a number is that of no other.
+    // The shortest exact text of a number is unique.
     DECIMALS.map(rounded).find(|(a, b)| a != b).unwrap_or_else(|| (format!("{a:?}"), format!("{b:?}")))
 }
 
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbours_are_told_apart() {
+    fn neighbouring_numbers_print_differently() {
         let apart = |a: f64, b: f64| told_apart(a, b);
         assert_eq!(apart(0.95, 0.96), ("0.950000000".to_owned(), "0.960000000".to_owned()));
         assert_eq!(

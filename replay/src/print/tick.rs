@@ -1,11 +1,11 @@
-//! A tick solved again, for people.
+//! Prints a tick that was solved again.
 
 use std::io::{self, Write};
 
 use super::shown;
 use crate::tick::{Solved, TickReport};
 
-/// Nodes of the plan that are shown.
+/// Most nodes of the plan that are shown.
 const NODES_SHOWN: usize = 12;
 
 /// Writes a tick as text.

@@ -1,8 +1,8 @@
-//! Two verdicts side by side, limit by limit.
+//! Prints two verdicts side by side, limit by limit.
 
 use crate::info::{VerdictFacts, VerdictLimit};
 
-/// A limit that both were judged by.
+/// One limit in both verdicts.
 pub(super) struct LimitRow<'a> {
     pub(super) limit: &'a VerdictLimit,
     /// Each verdict's value with its unit, marked if outside.
@@ -18,8 +18,8 @@ pub(super) fn words(verdict: Option<&VerdictFacts>, none: &str) -> String {
     }
 }
 
-/// The limits of `named`, then what else one of both was judged by, with the values of both; `shown` makes text fit for where it is printed, `outside` marks a value
-/// that is.
+/// The limits of `named`, then those that only one verdict has, with the values of both. `shown` escapes text for the
+/// output; `outside` marks a value outside its limit.
 pub(super) fn rows<'a>(
     named: Option<&'a VerdictFacts>,
     both: [Option<&'a VerdictFacts>; 2],

@@ -1,11 +1,13 @@
-//! A verification, for people.
+//! Prints a verification for people.
 
 use std::io::{self, Write};
 
 use super::{JunitCase, JunitOutcome, counted, shown};
-use crate::verify::{Consequence, Divergence, FieldDifference, Growth, GrowthStep, Outcome, VerifyReport};
+use crate::verify::{
+    Consequence, Divergence, FieldDifference, FramesReport, Growth, GrowthStep, Verification, VerifyReport,
+};
 
-/// Fields of the first diverged tick that are shown.
+/// Most fields of the first diverged tick that are shown.
 const FIELDS_SHOWN: usize = 5;
 
 /// Writes a verification as text.
@@ -16,10 +18,10 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     let name = name_of(report);
     let VerifyReport { ticks_identical, ticks_compared, ticks_recorded, .. } = report;
     match report.outcome {
-        Outcome::Identical => {
+        Verification::Identical => {
             writeln!(output, "{name}: {ticks_identical} of {ticks_compared} ticks identical")?;
         }
-        Outcome::IdenticalReadablePart => {
+        Verification::IdenticalReadablePart => {
             let of = if report.damage.is_some() { " of the readable part" } else { "" };
             let what_is_missing = what_is_missing(report);
             writeln!(
@@ -27,7 +29,13 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
                 "{name}: {ticks_identical} of {ticks_compared} ticks identical{of}{what_is_missing}"
             )?;
         }
-        Outcome::Diverged => {
+        Verification::Diverged if report.ticks_different == 0 => {
+            writeln!(
+                output,
+                "{name}: DIVERGED, though {ticks_identical} of {ticks_compared} ticks are identical"
+            )?;
+        }
+        Verification::Diverged => {
             let VerifyReport { ticks_different, fields_different, .. } = report;
             let fields = counted(*fields_different, "field");
             writeln!(
@@ -35,17 +43,24 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
                 "{name}: DIVERGED: {ticks_different} of {ticks_compared} ticks differ, in {fields}"
             )?;
         }
-        Outcome::NotReplayable if *ticks_compared == 0 => {
+        Verification::NotReplayable if *ticks_compared == 0 => {
             let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
             writeln!(output, "{name}: nothing was compared: {}", reason.unwrap_or_default())?;
         }
-        Outcome::NotReplayable => writeln!(
+        Verification::NotReplayable => writeln!(
             output,
             "{name}: not replayable as a whole: the first {ticks_identical} of {ticks_recorded} ticks are identical"
         )?,
     }
     if let Some(first) = &report.first_divergence {
-        print_divergence(first, output)?;
+        print_divergence("tick", first, output)?;
+    }
+    print_frames(report, output)?;
+    if !report.digests_compared && report.ticks_compared > 0 {
+        writeln!(
+            output,
+            "another release wrote it: what it remembered was not compared, what it decided was"
+        )?;
     }
     if let Some(growth) = &report.growth {
         print_growth(growth, output)?;
@@ -56,7 +71,7 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *ticks_compared > 0) {
         writeln!(output, "not every tick was compared: {}", shown(&obstacle.to_string()))?;
     }
-    if report.outcome != Outcome::IdenticalReadablePart {
+    if report.outcome != Verification::IdenticalReadablePart {
         let what_is_missing = what_is_missing(report);
         if !what_is_missing.is_empty() {
             writeln!(output, "what was compared is{what_is_missing}")?;
@@ -65,7 +80,29 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     Ok(())
 }
 
-/// The file, and which of its flights if it holds several.
+/// What the whole flight computer did from power-up on, or that only its ticks were compared.
+fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
+    let Some(frames) = &report.frames else {
+        let nothing = report.ticks_compared == 0;
+        return if nothing { Ok(()) } else { writeln!(output, "{TICKS_ALONE}") };
+    };
+    let FramesReport { compared, different, until_s, .. } = frames;
+    let until = until_s.map(|until_s| format!(" to T+{until_s:.3} s")).unwrap_or_default();
+    if *different == 0 {
+        writeln!(output, "flight computer from power-up{until}: {compared} of {compared} frames identical")?;
+    } else {
+        writeln!(output, "flight computer from power-up{until}: {different} of {compared} frames DIFFER")?;
+    }
+    match &frames.first_divergence {
+        Some(first) => print_divergence("frame", first, output),
+        None => Ok(()),
+    }
+}
+
+/// Said of a log whose flight computer cannot be run again from power-up on.
+const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
+
+/// The file and, if it holds several flights, the flight's number.
 fn name_of(report: &VerifyReport) -> String {
     let file = shown(&report.file);
     report
@@ -73,7 +110,7 @@ fn name_of(report: &VerifyReport) -> String {
         .map_or_else(|| file.clone(), |flight| format!("{file}: flight {} of {}", flight.number, flight.of))
 }
 
-/// What of the flight is not in the part that was read.
+/// What is missing from the part of the flight that was read.
 fn what_is_missing(report: &VerifyReport) -> String {
     let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
     let unread = report.damage.as_ref().map(|damage| {
@@ -88,10 +125,10 @@ fn what_is_missing(report: &VerifyReport) -> String {
     [cut, unread].into_iter().flatten().collect()
 }
 
-fn print_divergence(first: &Divergence, output: &mut impl Write) -> io::Result<()> {
+fn print_divergence(kind: &str, first: &Divergence, output: &mut impl Write) -> io::Result<()> {
     writeln!(
         output,
-        "first at tick {} (t = {:.3} s, {}), {}:",
+        "first at {kind} {} (t = {:.3} s, {}), {}:",
         first.tick,
         first.time_s,
         first.phase,
@@ -118,7 +155,7 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
     Ok(())
 }
 
-/// The first tick, those twice and four times and so on behind it, the worst and the last.
+/// The first diverged tick, those 1, 2, 4, 8 and so on after it, the worst one and the last one.
 fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "how it grows (gimbal command, predicted touchdown, worst field):")?;
     let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
@@ -164,7 +201,7 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     )
 }
 
-/// A verification as a case for a build server. `strict`: what is identical passes only if it is the whole flight.
+/// A verification as a test case. With `strict`, only a whole identical flight passes.
 pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
     let mut text = Vec::new();
     // Writing into memory cannot fail.
@@ -172,10 +209,12 @@ pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
     let details = String::from_utf8_lossy(&text).into_owned();
     let message = details.lines().next().unwrap_or_default().to_owned();
     let outcome = match report.outcome {
-        Outcome::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
-        Outcome::Identical | Outcome::IdenticalReadablePart => JunitOutcome::Passed { said: details },
-        Outcome::Diverged => JunitOutcome::Failed { message, details },
-        Outcome::NotReplayable => JunitOutcome::Error { message: details },
+        Verification::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
+        Verification::Identical | Verification::IdenticalReadablePart => {
+            JunitOutcome::Passed { said: details }
+        }
+        Verification::Diverged => JunitOutcome::Failed { message, details },
+        Verification::NotReplayable => JunitOutcome::Error { message: details },
     };
     JunitCase { name: format!("verify {}", name_of(report)), outcome }
 }

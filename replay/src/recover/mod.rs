@@ -1,8 +1,8 @@
-//! A whole log out of a damaged one.
+//! Recovers a whole log from a damaged one.
 //!
-//! A recorder that was killed leaves a log without its end; a disk may break one in its middle. Every chunk whose
-//! checksum holds is kept, also behind a broken one; what is lost is said, with its span where the file still tells.
-//! Nothing is invented: a message is kept as it is or not at all.
+//! A recorder that was killed leaves a log without its end; a bad disk may damage the middle. Every chunk with a
+//! correct checksum is kept, also after a broken one. The report lists what is lost, with its time span if the file
+//! still has it. Nothing is invented: a message is kept unchanged or not at all.
 
 mod walk;
 mod write;
@@ -19,23 +19,21 @@ use write::Rescue;
 /// Why nothing could be recovered.
 #[derive(Debug, thiserror::Error)]
 pub enum RecoverError {
-    /// Not an MCAP file, or not readable.
+    /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The file cannot be made.
+    /// The file cannot be created.
     #[error("{}: cannot be created", path.display())]
     Create {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// Writing failed.
     #[error("{}: cannot be written", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// Error from the writer.
         source: mcap::McapError,
     },
 }
@@ -49,11 +47,11 @@ pub struct Lost {
     pub bytes: u64,
     /// The times of its messages, s after the first message of the log; `None` if the file does not tell.
     pub span_s: Option<(f64, f64)>,
-    /// What is wrong with it.
+    /// What is wrong.
     pub reason: String,
 }
 
-/// What was kept and what is lost.
+/// Report of a recovery.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Recovery {
     /// The damaged log.
@@ -70,7 +68,7 @@ pub struct Recovery {
     pub kept_s: Option<f64>,
     /// What was lost.
     pub lost: Vec<Lost>,
-    /// The log has its end mark: nothing came after what is there.
+    /// Whether the log has its end mark, so nothing is missing at the end.
     pub ended: bool,
 }
 

@@ -1,4 +1,4 @@
-//! A file's records from front to back, over broken ones.
+//! Walks through the records of a file and skips broken ones.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek as _, SeekFrom};
@@ -6,14 +6,12 @@ use std::path::Path;
 
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use protocol::log::reader::parse_record;
+use protocol::log::reader::{RECORD_LIMIT_BYTES, parse_record};
 
 use crate::log::{LogError, chunk_offsets};
 
-/// Type and length in front of every record.
+/// Size of the type and length before every record.
 const HEAD_BYTES: u64 = 9;
-/// A record longer than this is taken for damage.
-const RECORD_LIMIT_BYTES: u64 = 64 * 1024 * 1024;
 
 /// The next stretch of a file.
 pub(super) enum Piece {
@@ -30,7 +28,7 @@ pub(super) struct Walk {
     input: BufReader<File>,
     size: u64,
     at: u64,
-    /// Where chunks begin, if the file's summary says so.
+    /// Start offsets of chunks, if the file's summary has them.
     chunks: Vec<u64>,
     over: bool,
 }
@@ -59,7 +57,7 @@ impl Walk {
             let Some((opcode, length)) = self.head()? else {
                 return self.skip(from_byte, None, "ends inside a record".to_owned()).map(Some);
             };
-            if opcode == 0 || length > RECORD_LIMIT_BYTES {
+            if opcode == 0 || length > RECORD_LIMIT_BYTES as u64 {
                 return self.skip(from_byte, None, "no record begins here".to_owned()).map(Some);
             }
             let mut body = Vec::new();
@@ -77,7 +75,7 @@ impl Walk {
         Ok(None)
     }
 
-    /// A record's meaning; `None` for what is only an index of others.
+    /// The decoded record; `None` for index records.
     fn understand(&mut self, opcode: u8, body: &[u8], from_byte: u64) -> Option<Piece> {
         let bytes = HEAD_BYTES + body.len() as u64;
         match opcode {
@@ -114,7 +112,7 @@ impl Walk {
         Ok(head.first().copied().zip(length.map(|bytes| u64::from_le_bytes(*bytes))))
     }
 
-    /// Gives up what stands here and goes on at the next chunk the summary knows, if any.
+    /// Skips the damage and continues at the next chunk in the summary, if any.
     fn skip(
         &mut self,
         from_byte: u64,
@@ -138,14 +136,14 @@ impl Walk {
     }
 }
 
-/// The times of a chunk's messages, as its own head says them, ns; those of an empty chunk are none.
+/// First and last message time from a chunk's header, ns; `None` for an empty chunk.
 fn span_of(opcode: u8, body: &[u8]) -> Option<(u64, u64)> {
     let time = |place: usize| body.get(place..)?.first_chunk::<8>().map(|bytes| u64::from_le_bytes(*bytes));
     let (from, until) = (opcode == op::CHUNK).then(|| Some((time(0)?, time(8)?)))??;
     (from > 0 && from <= until).then_some((from, until))
 }
 
-/// Every record of a chunk, if its checksum holds.
+/// Every record of a chunk, if its checksum is correct.
 fn records_of_chunk(body: &[u8]) -> mcap::McapResult<Vec<Record<'static>>> {
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)

@@ -1,4 +1,4 @@
-//! What was kept, as a whole log.
+//! Writes the recovered records as a whole log.
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
@@ -11,14 +11,14 @@ use crate::output::{Destination, NewFile};
 
 /// Name of the metadata record that says that a log was recovered.
 const METADATA_RECOVERY: &str = "recovery";
-/// Small chunks, as in the recorder's own logs.
+/// Chunk size as in the recorder's own logs.
 const CHUNK_BYTES: u64 = 64 * 1024;
 
 type Writer = mcap::Writer<BufWriter<NewFile>>;
 
 pub(super) struct Rescue {
     path: PathBuf,
-    /// Made once the library's name is known, which stands at a file's very beginning.
+    /// Created when the library's name is known, which is the first record of a file.
     state: State,
     /// The file's schemas and channels by their numbers there.
     schemas: BTreeMap<u16, u16>,
@@ -74,7 +74,7 @@ impl Rescue {
                 self.schemas.insert(header.id, id);
             }
             Record::Channel(channel) => {
-                // Schema 0 is none.
+                // Schema 0 means no schema.
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or(0);
                 let id = self.writer("")?.add_channel(
                     schema,
@@ -105,7 +105,7 @@ impl Rescue {
     }
 
     fn message(&mut self, header: MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
-        // Without its channel a message means nothing.
+        // A message without its channel cannot be decoded.
         let Some(channel_id) = self.channels.get(&header.channel_id).copied() else {
             return Ok(());
         };
@@ -116,7 +116,7 @@ impl Rescue {
         Ok(())
     }
 
-    /// The writer, made with this library's name if there is none yet.
+    /// The writer; created with this library's name if necessary.
     fn writer(&mut self, library: &str) -> mcap::McapResult<&mut Writer> {
         self.state = match std::mem::replace(&mut self.state, State::Gone) {
             State::Waiting(file) => State::Writing(Box::new(
@@ -130,7 +130,7 @@ impl Rescue {
         };
         match &mut self.state {
             State::Writing(writer) => Ok(writer),
-            // Only a failed creation leaves nothing, and its error ended the recovery.
+            // It is only absent after a failed creation, whose error has ended the recovery.
             State::Waiting(_) | State::Gone => Err(mcap::McapError::UnexpectedEof),
         }
     }

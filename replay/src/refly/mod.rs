@@ -1,19 +1,19 @@
 //! Closed loop: the flight flown again in simulation from a chosen moment, with other settings.
 //!
-//! Of a planar landing the simulated plant is put into the recorded state of that moment (position, motion, servos, time since ignition),
-//! the controller into what it remembered then, and both fly on to the ground. Nothing of the record is used after
-//! the moment of the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate) answers what
-//! the controller alone *would have commanded* on the recorded inputs. With nothing changed, a simulated flight comes
-//! out the same bit for bit.
+//! For a planar landing, the simulated plant starts in the recorded state of that moment (position, motion, servos,
+//! time since ignition) and the controller with the memory it had then. Both continue to the ground. Nothing of the
+//! record is used after the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate)
+//! answers what the controller alone *would have commanded* on the recorded inputs. With nothing changed, a simulated
+//! flight is reproduced bit for bit.
 //!
-//! Of a flight from apogee the recorded truth is not enough (gusts, servos and sensors have memories that no log holds), so
-//! it is flown again from apogee with the recorded draw and seed up to that moment, and compared with the record frame by
-//! frame on the way; from there on the other settings hold, for world and flight computer alike.
+//! For a flight from apogee, the recorded truth is not enough, because no log holds the internal states of gusts,
+//! servos and sensors. So the flight is flown again from apogee, with the recorded draw and seed, up to that moment,
+//! and compared with the record frame by frame on the way. From there on the changed settings apply to world and flight
+//! computer.
 //!
-//! Settings change the controller and the plant alike, those "of the plant" the plant alone, timed ones the
-//! controller alone. Abort under thrust is flown if the record had it at the start; of a flight
-//! from apogee, a crew's abort comes at its recorded frame. There is wind in a flight from apogee
-//! only (`truth.wind_m_s`): the planar plant has none.
+//! Settings change both controller and plant. Settings "of the plant" change the plant only, timed ones the controller
+//! only. An abort under thrust is flown if the record had it at the start; in a flight from apogee, the crew's abort
+//! comes at its recorded frame. Only a flight from apogee has wind (`truth.wind_m_s`); the planar plant has none.
 
 mod apogee;
 mod planar;
@@ -27,10 +27,9 @@ pub use simulation::{ReflownFlight, ReflownTick};
 pub use start::{From, StartAt, StartState};
 pub use write::{ReflyLogError, write_log};
 
-use campaign::fly::FlyError;
-use flight::mission::MissionError;
-use onboard_sim::vehicle::VehicleError;
+use flight::computer::plane::PlaneError;
 use serde::Serialize;
+use sim::sortie::SetUpError;
 use tick_log::TickLogError;
 use world::world::WorldError;
 
@@ -38,23 +37,23 @@ use crate::info::VerdictFacts;
 use crate::log::{Recording, RecordingError};
 use crate::settings::{Setting, SettingError};
 
-/// The log's run fact with the settings of the plant alone, in a flight flown again.
+/// Key of the run fact that holds the plant's settings in the log of a re-flown flight.
 const RUN_PLANT_SETTINGS: &str = "plant_settings";
 
-/// Which law flies.
+/// The controller that flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// As recorded: the landing controller, with an abort that was latched; the upright law if it flew alone.
+    /// As recorded: the landing controller, with a latched abort if there was one; the upright law if it flew alone.
     #[default]
     AsRecorded,
-    /// The upright law alone; of the planar landing.
+    /// The upright law alone; for planar landings only.
     Stabiliser,
-    /// The pilot itself; of a flight from apogee, as those below.
+    /// The pilot itself; this one and those below are for flights from apogee only.
     Nmpc,
-    /// Ignition and fins timed beforehand.
+    /// Ignition and fins at times fixed in advance.
     OpenLoop,
-    /// A nose that swings to waste thrust.
+    /// The nose swings to waste thrust.
     Oscillating,
 }
 
@@ -71,18 +70,18 @@ impl Law {
     }
 }
 
-/// What to fly again, and how.
+/// Options of a re-flown flight.
 #[derive(Debug, Clone, Default)]
 pub struct ReflyOptions {
     /// Where to begin.
     pub start: StartAt,
     /// Which recorded state to begin from.
     pub from: From,
-    /// Settings of controller and plant; timed ones change the controller alone.
+    /// Settings of controller and plant; timed ones change the controller only.
     pub settings: Vec<Setting>,
-    /// Settings of the plant alone, on top.
+    /// Additional settings of the plant only.
     pub plant_settings: Vec<Setting>,
-    /// Which law flies.
+    /// The controller that flies.
     pub law: Law,
     /// Seed of the plant's dispersions instead of the recorded one.
     pub seed: Option<u64>,
@@ -91,35 +90,32 @@ pub struct ReflyOptions {
 /// Why a flight cannot be flown again.
 #[derive(Debug, thiserror::Error)]
 pub enum ReflyError {
-    /// The log has not what it takes.
+    /// The log lacks the records that are needed.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The profile asks for something the simulation does not do.
+    /// The profile needs something that the simulation cannot do.
     #[error(transparent)]
-    Vehicle(#[from] VehicleError),
-    /// A recorded input has no meaning in this build.
+    Vehicle(#[from] PlaneError),
+    /// This build cannot interpret a recorded input.
     #[error(transparent)]
     Input(#[from] TickLogError),
-    /// The moment to start from is not in the log, or not part of a landing.
+    /// The requested start is not in the log, or not part of a landing.
     #[error("{name}: {reason}")]
     Start {
         /// The file.
         name: String,
-        /// What was asked for and what there is.
+        /// What was requested and what the log has.
         reason: String,
     },
     /// The flight from apogee cannot be set up.
     #[error(transparent)]
-    Flight(#[from] FlyError),
-    /// The moment's world cannot be changed so.
+    Flight(#[from] SetUpError),
+    /// The world cannot be changed this way at the start.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// The mission's motor is not to be had.
-    #[error(transparent)]
-    Mission(#[from] MissionError),
     /// The log does not say how its flight from apogee was flown, or this build does not know it.
     #[error("{name}: cannot be flown again from apogee: {reason}")]
     Recipe {
@@ -128,80 +124,75 @@ pub enum ReflyError {
         /// What is missing or unknown.
         reason: String,
     },
-    /// Another kind of flight has this.
-    #[error("{what} is of {of}; {name} is {is}")]
+    /// The request applies only to another kind of flight.
+    #[error("{what} is only for {of}; {name} is {is}")]
     OtherKind {
         /// The file.
         name: String,
-        /// What was asked for.
+        /// The request.
         what: String,
-        /// Which kind has it.
+        /// The kind of flight that has it.
         of: &'static str,
-        /// Which kind this is.
+        /// The kind of this flight.
         is: &'static str,
     },
     /// A setting of the controller given to the plant, or the other way round.
     #[error("{setting}: {belongs}")]
     Misplaced {
-        /// The setting.
         setting: String,
-        /// Whose it is.
+        /// The owner of the setting.
         belongs: &'static str,
     },
-    /// A timed setting of the plant.
+    /// A setting of the plant has a time.
     #[error(
         "{setting}: the plant's settings hold from the beginning; only the controller's can change in flight"
     )]
-    TimedPlant {
-        /// The setting.
-        setting: String,
-    },
+    TimedPlant { setting: String },
 }
 
-/// How the moment of the start was reached, flying again from apogee.
+/// How the re-flown frames before the start compare with the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Reached {
     /// Recorded frames before the start.
     pub frames: usize,
-    /// Of these, how many came out as recorded, bit for bit.
+    /// Of these, how many were reproduced bit for bit.
     pub identical: usize,
-    /// The first that did not.
+    /// The first frame that was not.
     pub first_different: Option<u64>,
 }
 
-/// What came of it.
+/// The result of flying again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReflyReport {
-    /// Says that this is the closed loop.
+    /// Marks the report as closed loop.
     pub kind: &'static str,
     /// The log.
     pub file: String,
-    /// What was changed, for controller and plant.
+    /// The changed settings of controller and plant.
     pub settings: Vec<String>,
-    /// What was changed for the plant alone.
+    /// The changed settings of the plant only.
     pub plant_settings: Vec<String>,
-    /// Which law flew.
+    /// The controller that flew.
     pub law: Law,
-    /// Where it began.
     pub start: StartState,
-    /// Of a flight from apogee: how the moment of the start was reached.
+    /// For a flight from apogee: how the frames before the start compare with the record.
     pub reached: Option<Reached>,
-    /// True thrust over nominal thrust; of a flight from apogee impulse over certified impulse.
+    /// True thrust over nominal thrust; for a flight from apogee, impulse over certified impulse.
     pub thrust_scale: f64,
     /// The recorded verdict.
     pub recorded: Option<VerdictFacts>,
     /// The verdict now; `None` if the vehicle did not come down in a minute.
     pub reflown: Option<VerdictFacts>,
-    /// Whether landed became not landed or the other way round; `None` if either is not known.
+    /// Whether the verdict changed between landed and not landed; `None` if either is unknown.
     pub verdict_changed: Option<bool>,
-    /// The smallest distance to a touchdown limit, as a fraction of the limit: 1 in its middle, 0 on it, negative
-    /// outside. Height is left out, since contact is at the ground. `None` without a contact.
+    /// The smallest distance to a touchdown limit, as a fraction of the limit: 1 in the middle of the range, 0 on the
+    /// limit, negative outside. Height is left out, because contact is at the ground. `None` without a contact.
     pub margin: Option<f64>,
     /// Ticks that the controller ran.
     pub ticks: usize,
     /// Of these, how many have a recorded tick of the same number.
     pub commands_recorded: usize,
-    /// Of those, how many decided the same gimbal command, bit for bit.
+    /// Of those, how many commanded the same gimbal angle, bit for bit.
     pub commands_identical: usize,
     /// The largest difference of a gimbal command from the recorded one of the same tick, rad.
     pub gimbal_difference_max_rad: f64,
@@ -226,13 +217,13 @@ pub fn refly_flight(
     Prepared::new(recording, options)?.fly_kept(options)
 }
 
-/// Settings of the plant have no time.
+/// Refuses a time on settings of the plant.
 fn refuse_timed(plant_settings: &[Setting]) -> Result<(), ReflyError> {
     let timed = plant_settings.iter().find(|setting| setting.at_s.is_some());
     timed.map_or(Ok(()), |timed| Err(ReflyError::TimedPlant { setting: timed.to_string() }))
 }
 
-/// A report of a flight that came out so; what only one kind of flight has is filled in by it.
+/// The report of a re-flown flight, without the fields that only one kind of flight has.
 fn report(
     recording: &Recording,
     options: &ReflyOptions,
@@ -267,7 +258,7 @@ pub fn margin(verdict: &VerdictFacts) -> f64 {
     let fractions = verdict.limits.iter().filter(|limit| limit.name != "altitude").map(|limit| {
         let half_width = 0.5 * (limit.maximum - limit.minimum);
         let fraction = (limit.value - limit.minimum).min(limit.maximum - limit.value) / half_width;
-        // What is not a number is as far outside as can be.
+        // A NaN counts as infinitely far outside.
         if fraction.is_nan() { f64::NEG_INFINITY } else { fraction }
     });
     fractions.fold(f64::INFINITY, f64::min)

@@ -1,16 +1,14 @@
-//! A planar landing, flown again from a recorded state.
+//! Flies a planar landing again from a recorded state.
 
 use std::collections::BTreeMap;
 
-use flight::profile::Profile;
-use flight::verdict::TouchdownLimits;
-use onboard_sim::scatter::draw;
+use flight::vehicle::profile::Profile;
 use protocol::log::v1;
+use sim::plane::draw::draw;
 
-use super::simulation::Simulation;
 use super::{
     Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report,
-    start,
+    simulation, start,
 };
 use crate::controller::{LoggedController, Replayed as _, SETTINGS_IN_FLIGHT, settings_in_flight};
 use crate::info::VerdictFacts;
@@ -34,7 +32,7 @@ pub(super) fn fly(
     let toml = recording.profile_toml()?;
     refuse_wind_and_chance(recording, options)?;
     let plant_profile = plant_profile(recording, options)?;
-    // What the recorded flight changed on its way, this one changes too.
+    // Timed settings of the recorded flight apply to this one, too.
     let recorded = settings_in_flight(&recording.head.run)?;
     let all: Vec<Setting> = recorded.iter().chain(&options.settings).cloned().collect();
     let schedule = Schedule::new(toml, &all)?;
@@ -46,10 +44,10 @@ pub(super) fn fly(
         ticks.iter().take(start.index).map(|tick| controller.run_again(tick)).collect::<Result<_, _>>()?;
     let seed = options.seed.or_else(|| recording.seed()).unwrap_or(0);
     let dispersed = draw(&plant_profile, seed);
-    let limits = TouchdownLimits::from_profile(believed);
-    let mut simulation =
-        Simulation::new(believed, &plant_profile, &dispersed, controller, &start, options.law)?;
-    let flown = ReflownFlight { before, run: run_facts(&all), ..simulation.fly(&limits) };
+    let mut flight =
+        simulation::at_start(believed, &plant_profile, &dispersed, &controller, &start, options.law)?;
+    let flown =
+        ReflownFlight { before, run: run_facts(&all), ..simulation::fly(&mut flight, controller.schedule()) };
 
     let (commands_recorded, commands_identical, gimbal_difference_max_rad) = compare_commands(ticks, &flown);
     let recorded = recording.verdict.as_ref().map(VerdictFacts::of);
@@ -65,7 +63,7 @@ pub(super) fn fly(
     Ok((report, flown))
 }
 
-/// What a log of this flight says beside what the recorded one says: the settings with a time. The others are in its
+/// Facts that the log of this flight adds to those of the recorded one: the timed settings. The others are in its
 /// profile.
 fn run_facts(settings: &[Setting]) -> BTreeMap<String, String> {
     let timed = settings.iter().filter(|setting| setting.at_s.is_some());
@@ -73,7 +71,8 @@ fn run_facts(settings: &[Setting]) -> BTreeMap<String, String> {
     BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))])
 }
 
-/// What is true: the flown profile, what a flight flown again before had its plant changed by, and the settings.
+/// The profile of the plant: the flown profile, the plant settings if the record is itself a re-flown flight, and the
+/// new settings.
 fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profile, ReflyError> {
     refuse_timed(&options.plant_settings)?;
     let recorded = recording.head.run.get(RUN_PLANT_SETTINGS).map(String::as_str).unwrap_or_default();
@@ -84,7 +83,7 @@ fn plant_profile(recording: &Recording, options: &ReflyOptions) -> Result<Profil
     Ok(profile_with(recording.profile_toml()?, &settings)?)
 }
 
-/// The planar plant flies in still air, and what chance decided about it is `plant.*` and `dispersion.*`.
+/// The planar plant flies in still air; its random draw is set by `plant.*` and `dispersion.*`.
 fn refuse_wind_and_chance(recording: &Recording, options: &ReflyOptions) -> Result<(), ReflyError> {
     let of_apogee = |setting: &&Setting| setting.path.starts_with("truth.") || setting.path.contains("wind");
     let mut settings = options.settings.iter().chain(&options.plant_settings);
@@ -98,8 +97,8 @@ fn refuse_wind_and_chance(recording: &Recording, options: &ReflyOptions) -> Resu
     })
 }
 
-/// How many ticks have a recorded one of their number, how many of those command the same, and by how much the others
-/// differ at most, rad.
+/// The number of ticks with a recorded tick of the same number, how many of those command the same, and the largest
+/// difference of the others, rad.
 fn compare_commands(recorded: &[v1::ControllerTick], flown: &ReflownFlight) -> (usize, usize, f64) {
     let (mut known, mut identical) = (0, 0);
     let mut largest_rad = 0.0_f64;

@@ -1,28 +1,29 @@
-//! A recorded flight made ready to be flown again many times from the same moment.
+//! Prepares a recorded flight to be flown again many times from the same moment.
 
 use super::{From, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
-use crate::log::Recording;
+use crate::log::{FlightKind, Recording};
 use crate::settings::{is_whole, is_whole_in_mission, mission_value_of, value_of};
 
 /// A recorded flight at the moment it is flown again from.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     recording: &'a Recording,
-    /// Of a flight from apogee: flown up to there.
+    /// For a flight from apogee: already flown to the start.
     at_start: Option<Box<apogee::AtStart<'a>>>,
 }
 
 impl<'a> Prepared<'a> {
-    /// Makes a flight ready; of the options the start counts.
+    /// Prepares a flight; only the start is taken from the options.
     ///
     /// # Errors
     /// See [`ReflyError`].
     pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
-        let at_start = if recording.is_from_apogee() {
-            Some(Box::new(apogee::AtStart::new(recording, options)?))
-        } else {
-            recording.replayable_ticks()?;
-            None
+        let at_start = match recording.kind() {
+            FlightKind::FromApogee => Some(Box::new(apogee::AtStart::new(recording, options)?)),
+            FlightKind::Planar => {
+                recording.replayable_ticks()?;
+                None
+            }
         };
         Ok(Self { recording, at_start })
     }
@@ -32,7 +33,7 @@ impl<'a> Prepared<'a> {
         self.recording
     }
 
-    /// Flies it again; the start must be the one it was made ready for.
+    /// Flies it again; the start must be the one it was prepared for.
     ///
     /// # Errors
     /// See [`ReflyError`].
@@ -54,8 +55,8 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Whether this build, with nothing changed, flies it as recorded: up to the start, and from there on wherever the
-    /// start is what was true. Costs a flight; the start must be the one it was made ready for.
+    /// Whether this build, with nothing changed, flies it as recorded: up to the start, and also after it if the start
+    /// is the true state. This takes the time of one flight. The start must be the one the flight was prepared for.
     ///
     /// # Errors
     /// See [`ReflyError`].

@@ -1,8 +1,8 @@
-//! The moment a flight is flown again from, and the state at it.
+//! The start of a re-flown flight, and the state at that moment.
 
-use flight::controller::ControllerInput;
-use flight::dynamics::PlanarState;
-use flight::phase::Phase;
+use flight::guidance::controller::ControllerInput;
+use flight::rules::phase::Phase;
+use flight::vehicle::dynamics::PlanarState;
 use protocol::log::v1;
 use serde::Serialize;
 use tick_log::{input_from_log, state_from_log};
@@ -16,7 +16,6 @@ pub enum StartAt {
     /// The first tick of the landing.
     #[default]
     Landing,
-    /// This tick.
     Tick(u64),
     /// The first tick at or after this vehicle time, s.
     Time(f64),
@@ -42,9 +41,8 @@ pub struct StartState {
     pub tick: u64,
     /// Its vehicle time, s.
     pub time_s: f64,
-    /// Its phase.
     pub phase: &'static str,
-    /// Which recorded state it is.
+    /// The recorded state that was used.
     pub from: From,
     /// Horizontal position, m.
     pub x_m: f64,
@@ -54,7 +52,7 @@ pub struct StartState {
 
 /// Everything the simulation starts from.
 pub(super) struct Start {
-    /// Place of the first tick in the recording.
+    /// Index of the first tick in the recording.
     pub(super) index: usize,
     /// Its recorded input.
     pub(super) input: ControllerInput,
@@ -65,10 +63,10 @@ pub(super) struct Start {
     pub(super) state: StartState,
 }
 
-/// A record of the plant this close to a tick is of the same moment, s.
+/// A record of the plant this close to a tick belongs to the same moment, s.
 const SAME_MOMENT_S: f64 = 1e-4;
 
-/// Vehicle time up to which a simulation starts: a day, s.
+/// Latest vehicle time at which a simulation may start: a day, s.
 const LONGEST_S: f64 = 86_400.0;
 
 pub(super) fn find(
@@ -111,7 +109,7 @@ pub(super) fn find(
         )));
     }
     let near = recording.truth.iter().find(|truth| (truth.time_s - input.time_s).abs() < SAME_MOMENT_S);
-    // At the release itself the last record of the plant is of the rig; the servos are as it says, the state is not.
+    // At the release the last record of the plant shows the rig: its servo positions are right, its state is not.
     let moving = near.filter(|truth| {
         u8::try_from(truth.phase).ok().and_then(Phase::from_index).is_some_and(|phase| !phase.on_pad())
     });
@@ -123,7 +121,7 @@ pub(super) fn find(
         return Err(refused(format!("the state at tick {} is not finite", input.tick)));
     }
     let four = |angles: &Vec<f64>| <[f64; 4]>::try_from(angles.as_slice()).ok();
-    // The fins get at a tick what the one before commanded; and a waiting vehicle is recorded once a second only.
+    // The fins receive at a tick the command of the tick before. A waiting vehicle is recorded only once a second.
     let before = index.checked_sub(1).and_then(|before| four(&ticks.get(before)?.output.fin_command_rad));
     Ok(Start {
         index,

@@ -1,4 +1,4 @@
-//! A flight flown again, as a log of its own.
+//! Writes a re-flown flight as a log.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,35 +7,34 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriteError};
 
 use super::{Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
-use crate::log::{NewLog, NewLogError, Recording};
+use crate::controller::{REFLOWN_AT, REFLOWN_BY};
+use crate::log::{FlightKind, NewLog, NewLogError, Recording};
 use crate::output::Destination;
 use crate::settings::{Setting, profile_toml_with};
 
 /// Why a log could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReflyLogError {
-    /// The file exists or cannot be made.
+    /// The file exists or cannot be created.
     #[error("{}: cannot be created", path.display())]
     Create {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// Writing failed.
     #[error("{}: cannot be written", path.display())]
     Write {
-        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// Error from the writer.
         source: LogWriteError,
     },
 }
 
-/// Writes a flight flown again as a log that every question about logs can be asked of.
+/// Writes a re-flown flight as a log that every command accepts.
 ///
 /// # Errors
-/// The file exists and may not be replaced, or cannot be made or written.
+/// The file exists and may not be replaced, or cannot be created or written.
 pub fn write_log<'a>(
     destination: impl Into<Destination<'a>>,
     recording: &Recording,
@@ -65,10 +64,10 @@ fn header(
 ) -> LogHeader {
     let mut run: BTreeMap<String, String> = recording.head.run.clone();
     run.insert("reflown_from".to_owned(), report.file.clone());
-    run.insert("reflown_at_tick".to_owned(), report.start.tick.to_string());
+    run.insert(REFLOWN_AT.to_owned(), report.start.tick.to_string());
     run.insert("reflown_with".to_owned(), report.settings.join(" "));
     if report.law != Law::AsRecorded {
-        run.insert("reflown_by".to_owned(), report.law.name().to_owned());
+        run.insert(REFLOWN_BY.to_owned(), report.law.name().to_owned());
     }
     run.extend(flight.run.clone());
     let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
@@ -80,13 +79,10 @@ fn header(
     }
     let lasting: Vec<Setting> =
         options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-    let profile = recording.profile_toml().ok().and_then(|toml| {
-        // Of a flight from apogee the mission stays as it was let go with; its settings change in flight.
-        if recording.is_from_apogee() {
-            Some(toml.to_owned())
-        } else {
-            profile_toml_with(toml, &lasting).ok()
-        }
+    let profile = recording.profile_toml().ok().and_then(|toml| match recording.kind() {
+        // It keeps its mission from the start record; its settings change in flight.
+        FlightKind::FromApogee => Some(toml.to_owned()),
+        FlightKind::Planar => profile_toml_with(toml, &lasting).ok(),
     });
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
     LogHeader {

@@ -1,30 +1,30 @@
-//! A flight from apogee as the report looks at it: seen in the plane of its landing.
+//! Prepares a flight from apogee for the report, seen in the plane of its landing.
 //!
-//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, and asked for them. What
-//! the sections read of a planar landing (records of the plant, ticks, plans) is made of what this flight has: a tick is a
-//! frame that plans. Plans are made in the air's own frame; here they are brought back over the ground.
+//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them. The data
+//! that the sections read for a planar landing (records of the plant, ticks, plans) are derived from this flight: each
+//! planning frame becomes a tick. Plans are made in the frame of the moving air; here they are converted to the ground.
 
-use flight::controller::ControlLevel;
-use flight::dynamics::PlanarState;
-use flight::estimator::Estimate;
-use flight::mission::Mission;
-use flight::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::powered::{Plane, PoweredReport};
-use flight::rigid::RigidState;
-use flight::thrust_curve::ThrustCurve;
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
+use flight::estimation::estimator::Estimate;
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::{Plane, PoweredReport};
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use protocol::log::{flight_v1, v1};
 use tick_log::pilot::state_from_log;
 use tick_log::state_to_log;
 
 use super::track::{AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, track_of};
-use crate::controller::{LoggedPilot, NewPlans, Replayed as _, settings_in_flight};
+use crate::controller::{LoggedPilot, NewPlans, Replayed as _};
 use crate::log::Recording;
 
-/// Records of the world this close to a frame are of the same moment, s.
+/// Records of the world this close to a frame belong to the same moment, s.
 const SAME_MOMENT_S: f64 = 1e-4;
 
-/// What the flight computer thought at a frame that plans.
+/// The flight computer's estimate and plan at a planning frame.
 struct Thought {
     frame: u64,
     time_s: f64,
@@ -34,14 +34,14 @@ struct Thought {
     burning_s: f64,
     impulse_scale: f64,
     inferred_n: f64,
-    /// Of a plan that was made at this frame: what was found, and its path, one step apart, s.
+    /// If a plan was made at this frame: the solution, its path, and the time between path points, s.
     plan: Option<(PoweredReport, Vec<PlanarState>, f64)>,
 }
 
 /// The flight, seen in the plane of its landing.
 pub(super) fn flight(mut recording: Recording) -> Flight {
     let Some((mission, curve, thoughts, pilot)) = run_again(&recording) else {
-        // Without mission, start or frames: the sections say what is missing.
+        // Without mission, start or frames the sections report what is missing.
         return Flight::new(recording, Vec::new());
     };
     let nil = Vector3::zeros();
@@ -92,13 +92,14 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
     }
 }
 
-/// The flight computer run again, and what it thought every tenth frame; `None` if the log has not what it takes.
+/// Runs the flight computer again and returns its estimate and plan at every tenth frame; `None` if the log lacks
+/// records.
 fn run_again(recording: &Recording) -> Option<(Mission, ThrustCurve, Vec<Thought>, Pilot)> {
     let (start, frames) = recording.replayable_frames().ok()?;
-    let in_flight = settings_in_flight(&recording.head.run).ok()?;
-    let mut controller = LoggedPilot::new(recording.profile_toml().ok()?, start, &in_flight).ok()?;
+    let toml = recording.profile_toml().ok()?;
+    let mut controller = LoggedPilot::recorded(toml, start, &recording.head.run, &[]).ok()?;
     let mission = controller.pilot().mission().clone();
-    let curve = mission.motor().ok()?;
+    let curve = mission.motor_curve.clone();
     let (mut thoughts, mut plans) = (Vec::new(), NewPlans::default());
     for recorded in frames {
         let again = controller.run_again(recorded).ok()?;
@@ -137,13 +138,13 @@ fn vehicle(mission: &Mission, curve: ThrustCurve) -> Vehicle {
     }
 }
 
-/// The state in the plane over the ground, with feet's height for altitude.
+/// The state in the plane, relative to the ground; altitude is the height of the feet.
 fn in_plane(plane: &Plane, state: &RigidState, height_m: f64) -> PlanarState {
     PlanarState { z_m: height_m, ..plane.project(state, 0.0, 0.0) }
 }
 
 impl Thought {
-    /// The wind along the plane that a plan of this frame was made in, m/s.
+    /// The wind along the plane of this frame's plan, m/s.
     fn wind_m_s(&self, plane: &Plane) -> f64 {
         self.estimate.as_ref().map_or(0.0, |estimate| estimate.wind_m_s.push(0.0).dot(&plane.along))
     }
@@ -179,7 +180,7 @@ fn gimbal(name: &'static str, axis: usize, world: &[flight_v1::TruthSample]) -> 
 
 fn tick(thought: &Thought, world: &[flight_v1::TruthSample], plane: &Plane) -> v1::ControllerTick {
     let place = world.partition_point(|sample| sample.time_s < thought.time_s - SAME_MOMENT_S);
-    // Feet below the centre of gravity, as in the record of the world.
+    // The feet are below the centre of gravity, as in the record of the world.
     let feet_below_m = world.get(place).map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
     let state = thought.estimate.as_ref().map_or_else(PlanarState::default, |estimate| {
         in_plane(plane, &estimate.state, estimate.state.position_m.z - feet_below_m)
@@ -228,7 +229,7 @@ fn plans(thoughts: &[Thought], plane: &Plane) -> Vec<PlanSample> {
     made.iter().enumerate().filter_map(sample).collect()
 }
 
-/// The state at so many steps, between nodes; `None` behind the last.
+/// The state after a number of steps, interpolated between nodes; `None` after the last.
 fn between(states: &[[f64; 6]], steps: f64) -> Option<[f64; 6]> {
     let share = steps.fract();
     let (before, after) = (states.get(steps as usize)?, states.get(steps as usize + 1)?);

@@ -1,4 +1,4 @@
-//! The axes of a chart: where a value stands, and which round numbers are written.
+//! The axes of a chart: positions of values, and round numbers as labels.
 
 /// One axis of a chart.
 #[derive(Clone, Copy)]
@@ -40,7 +40,7 @@ pub(super) fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let bounds = values.fold(None, |bounds: Option<(f64, f64)>, value| {
         Some(bounds.map_or((value, value), |(from, to)| (from.min(value), to.max(value))))
     });
-    // Numbers so far apart that their difference is no number cannot be drawn.
+    // A range whose width is not a finite number cannot be drawn.
     let bounds = bounds.filter(|(from, to)| (to - from).is_finite());
     bounds.map(|(from, to)| if to - from > 1e-12 { (from, to) } else { (from - 0.5, to + 0.5) })
 }
@@ -65,7 +65,7 @@ pub(super) fn equalise(x: &mut Axis, y: &mut Axis) {
 /// A number on an axis.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    // A rounded negative nought.
+    // Rounding can give a negative zero.
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
         format!("{:.decimals$}", 0.0)
     } else {

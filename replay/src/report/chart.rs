@@ -1,17 +1,17 @@
 //! A line chart as SVG.
 
 use super::axis::{Axis, equalise, extent, number, padded};
-use super::page::{escaped, put};
+use super::html::{escaped, put};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
-/// Height of a picture that is higher than wide: three others stand beside it.
+/// Height of a tall picture: it stands beside three others.
 const TALL: f64 = 800.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 52.0;
 const BOTTOM: f64 = 36.0;
-/// Points drawn of one line; more than there are pixels nobody sees.
+/// Most points drawn for one line; more points than pixels cannot be seen.
 const POINTS_MAX: usize = 1200;
 
 /// A line of a chart.
@@ -32,16 +32,16 @@ pub(super) struct Chart {
     pub(super) lines: Vec<Line>,
     /// Horizontal limits.
     pub(super) limits: Vec<f64>,
-    /// Vertical marks and their words.
+    /// Vertical marks and their labels.
     pub(super) marks: Vec<(f64, &'static str)>,
-    /// Both axes in the same scale.
+    /// Whether both axes have the same scale.
     pub(super) equal_scales: bool,
-    /// Over the whole width of the page.
+    /// Whether the chart takes the whole width of the page.
     pub(super) full: bool,
 }
 
 impl Chart {
-    /// The chart, or nothing without a point to draw.
+    /// The chart, or nothing if there is no point to draw.
     pub(super) fn svg(&self) -> String {
         let finite = || {
             let all = self.lines.iter().flat_map(|line| line.points.iter());
@@ -54,7 +54,7 @@ impl Chart {
         let Some((y_from, y_to)) = extent(values) else {
             return String::new();
         };
-        // What is in one scale and higher than wide gets a picture that is too.
+        // A path in equal scales that is taller than wide gets a tall picture.
         let tall = self.equal_scales && y_to - y_from > x_to - x_from;
         let width = if self.full && !tall { 2.0 * WIDTH } else { WIDTH };
         let height = match (self.equal_scales, tall) {
@@ -183,7 +183,7 @@ impl Chart {
     }
 }
 
-/// At most [`POINTS_MAX`] points, with every stretch's highest and lowest among them.
+/// At most [`POINTS_MAX`] points, including the highest and lowest of every stretch.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= POINTS_MAX {
         return points.to_vec();

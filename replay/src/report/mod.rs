@@ -1,12 +1,13 @@
-//! A flight as one page: HTML with its pictures inside, no script and nothing from the network.
+//! Writes a flight as one HTML page with its pictures inside, without scripts and without network access.
 //!
-//! The verdict stands first, each value against its limit; then what led to it: phases, path, states, input, tracking,
-//! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. A log that lacks something
-//! has the section say so. A flight from apogee is seen in the plane of its landing.
+//! The verdict comes first, each value against its limit; then what led to it: phases, path, states, input, tracking,
+//! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. If the log lacks something,
+//! the section says so. A flight from apogee is shown in the plane of its landing.
 
 mod apogee;
 mod axis;
 mod chart;
+mod html;
 mod page;
 mod section;
 mod track;
@@ -14,7 +15,7 @@ mod track;
 use std::path::Path;
 
 use crate::info::{Completeness, Info, info};
-use crate::log::{Recording, RecordingError};
+use crate::log::{FlightKind, Recording, RecordingError};
 use track::{Flight, plans_of};
 
 /// A flight's page.
@@ -24,7 +25,7 @@ pub struct Report {
     pub name: String,
     /// The page.
     pub html: String,
-    /// Whether anything of the log is missing; the page says so too.
+    /// Whether the log is incomplete; the page says so, too.
     pub completeness: Completeness,
 }
 
@@ -35,10 +36,9 @@ pub struct Report {
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
-    let flight = if recording.is_from_apogee() {
-        apogee::flight(recording)
-    } else {
-        Flight::new(recording, plans_of(path)?)
+    let flight = match recording.kind() {
+        FlightKind::FromApogee => apogee::flight(recording),
+        FlightKind::Planar => Flight::new(recording, plans_of(path)?),
     };
     let html = page::page(&flight, &info, &section::all(&flight, &info));
     Ok(Report { name: info.file, html, completeness: info.completeness })

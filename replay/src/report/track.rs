@@ -1,20 +1,19 @@
-//! A recorded flight as the report looks at it.
+//! A recorded flight, prepared for the report.
 
 use std::path::Path;
 
-use flight::phase::Phase;
-use flight::profile::Profile;
+use flight::rules::phase::Phase;
+use flight::vehicle::profile::Profile;
 use protocol::log::v1;
 
 use crate::log::{Entry, FlightLog, LogError, Recording};
 
-/// How far ahead predictions are compared with what came, s.
+/// Prediction times at which predictions are compared with the flight, s.
 pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
 
-/// Plans that are drawn.
 pub(super) const PLANS_DRAWN: usize = 8;
 
-/// Where the flight was at one time.
+/// The state of the flight at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     /// Vehicle time, s.
@@ -24,18 +23,18 @@ pub(super) struct Sample {
     pub(super) state: [f64; 6],
 }
 
-/// One tick's plan, in short.
+/// A summary of one tick's plan.
 #[derive(Debug, Clone)]
 pub(super) struct PlanSample {
     /// Vehicle time of the tick, s.
     pub(super) time_s: f64,
     /// The state predicted for each of [`AHEAD_S`].
     pub(super) ahead: [Option<[f64; 6]>; 2],
-    /// The plan in the pitch plane, for those that are drawn.
+    /// The plan in the pitch plane, for plans that are drawn.
     pub(super) path: Vec<(f64, f64)>,
 }
 
-/// Who tells where the vehicle was.
+/// Source of the vehicle's states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Teller {
     Plant,
@@ -44,7 +43,7 @@ pub(super) enum Teller {
     Nobody,
 }
 
-/// What the report must know of the vehicle.
+/// Facts about the vehicle for the report.
 pub(super) struct Vehicle {
     pub(super) gravity_m_s2: f64,
     /// Before ignition, N.
@@ -82,10 +81,10 @@ pub(super) struct GimbalAxis {
     pub(super) actual: Vec<(f64, f64)>,
 }
 
-/// What a flight from apogee has beside what a planar landing has.
+/// Data that only a flight from apogee has.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FromApogee {
-    /// Impulse and burn time over certified ones, as inferred at the end.
+    /// Impulse and burn time over the certified ones, as estimated at the end.
     pub(super) inferred_scales: Option<(f64, f64)>,
     /// True impulse over the certified one.
     pub(super) true_impulse_scale: Option<f64>,
@@ -97,7 +96,7 @@ pub(super) struct Flight {
     pub(super) vehicle: Option<Vehicle>,
     pub(super) from_apogee: Option<FromApogee>,
     pub(super) gimbal: Vec<GimbalAxis>,
-    /// Vehicle time, s, and thrust as inferred in flight, N.
+    /// Vehicle time, s, and thrust as estimated in flight, N.
     pub(super) inferred_n: Vec<(f64, f64)>,
     pub(super) plans: Vec<PlanSample>,
     pub(super) teller: Teller,
@@ -157,7 +156,7 @@ impl Flight {
         if self.ignition_s.is_some() { "s since ignition" } else { "s of vehicle time" }
     }
 
-    /// Whether a time belongs to the pictures: from a second before the landing begins to a second after its end.
+    /// Whether a time is shown in the pictures: from a second before the landing to a second after its end.
     pub(super) fn is_shown(&self, time_s: f64) -> bool {
         let from_s = self.ignition_s.unwrap_or(f64::NEG_INFINITY) - 1.0;
         let until_s = self.touchdown_s.unwrap_or(f64::INFINITY) + 1.0;
@@ -185,7 +184,7 @@ impl Flight {
     }
 }
 
-/// The gimbal of the planar landing, else what a ground station heard of it.
+/// The gimbal angle of the planar landing, else from the telemetry of a ground station.
 fn gimbal_of(recording: &Recording) -> GimbalAxis {
     let truth = &recording.truth;
     let mut axis = GimbalAxis {
@@ -210,7 +209,7 @@ pub(super) fn state_of(state: &v1::PlanarState) -> [f64; 6] {
     [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s]
 }
 
-/// The best that the log has: the plant, else the controller's estimate, else what a ground station heard.
+/// The best source in the log: the plant, else the controller's estimate, else the telemetry of a ground station.
 pub(super) fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
     let sample = |time_s, phase, state| Sample { time_s, phase, state };
     let plant = recording.truth.iter();
@@ -250,7 +249,7 @@ pub(super) fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
     best
 }
 
-/// What the report needs of every tick's plan, without holding the plans.
+/// Summaries of every tick's plan, so that the plans need not be held.
 pub(super) fn plans_of(path: &Path) -> Result<Vec<PlanSample>, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut plans = Vec::new();

@@ -1,11 +1,12 @@
-//! Settings of a flight from apogee: its mission, its airframe, and what chance decided about its day.
+//! Settings of a flight from apogee: its mission, its airframe, and its random draw (the truth).
 //!
-//! A mission may name a built-in airframe; a setting inside the airframe puts the airframe's own text in the name's place.
+//! A mission may name a built-in airframe. A setting inside the airframe replaces that name by the airframe's full
+//! text.
 
 use std::collections::BTreeSet;
 
-use flight::airframe::Airframe;
-use flight::mission::Mission;
+use flight::vehicle::airframe::Airframe;
+use flight::vehicle::mission::Mission;
 use world::Truth;
 
 use super::names::Names;
@@ -13,7 +14,7 @@ use super::{Setting, SettingError, insert, listed, parsed_table, set, text_of, v
 
 /// The section of the airframe.
 const AIRFRAME: &str = "airframe";
-/// The section of what chance decided.
+/// The section of the random draw.
 const TRUTH: &str = "truth.";
 
 /// Every key that a mission may have, as in `powered.weights.theta` and `airframe.mass.loaded_kg`.
@@ -42,13 +43,13 @@ pub fn is_whole_in_mission(mission_toml: &str, path: &str) -> Result<bool, Setti
     Ok(names.is_whole(path))
 }
 
-/// The mission of this text with other settings, whenever they begin to hold.
+/// The mission of this text with other settings; their times are ignored.
 ///
 /// # Errors
-/// A name is unknown, or the result is no mission.
+/// A name is unknown, or the result is not a valid mission.
 pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission, SettingError> {
     let text = mission_toml_with(mission_toml, settings)?;
-    Mission::from_toml(&text, "profile.toml").map_err(|error| {
+    vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
         let reason = error.to_string();
         match settings {
             [] => SettingError::Toml { origin: "profile.toml".to_owned(), reason },
@@ -63,7 +64,7 @@ pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission,
 /// A name is unknown, or the text is not TOML.
 pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
     if settings.is_empty() {
-        // Untouched, byte for byte.
+        // Without settings the text stays the same, byte for byte.
         return Ok(mission_toml.to_owned());
     }
     let mut table = parsed_table(mission_toml, "profile.toml")?;
@@ -74,10 +75,10 @@ pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<Str
     text_of(&table)
 }
 
-/// What chance decided, with other settings: those of the section `truth`. Others are left alone.
+/// The random draw with other settings: those of the section `truth`. Other settings are ignored.
 ///
 /// # Errors
-/// A name is unknown, or the result is no truth.
+/// A name is unknown, or the result is not a valid truth.
 pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingError> {
     let wrong = |reason: String| SettingError::Mission { settings: listed(settings), reason };
     let mut table = toml::Table::try_from(truth).map_err(|error| wrong(error.to_string()))?;
@@ -102,10 +103,10 @@ pub fn mission_value_of(mission_toml: &str, truth: &Truth, path: &str) -> Option
     value_in(table, path)
 }
 
-/// A built-in airframe's text in the place of its name.
+/// Replaces the name of a built-in airframe by its text.
 fn expand_airframe(table: &mut toml::Table) -> Result<(), SettingError> {
     if let Some(name) = table.get(AIRFRAME).and_then(toml::Value::as_str)
-        && let Some(text) = Airframe::builtin_toml(name)
+        && let Some(text) = vehicles::airframe::builtin_toml(name)
     {
         let airframe = parsed_table(text, name)?;
         table.insert(AIRFRAME.to_owned(), toml::Value::Table(airframe));
@@ -113,7 +114,7 @@ fn expand_airframe(table: &mut toml::Table) -> Result<(), SettingError> {
     Ok(())
 }
 
-/// Every number of the truth is a real one: `4` is meant as `4.0`.
+/// Every number of the truth is a real number: `4` means `4.0`.
 fn as_number(value: &toml::Value) -> toml::Value {
     value.as_integer().map_or_else(|| value.clone(), |whole| toml::Value::Float(whole as f64))
 }
@@ -123,7 +124,7 @@ mod tests {
     use super::*;
 
     fn toml() -> &'static str {
-        flight::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap().1
+        vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap().1
     }
 
     fn with(given: &[&str]) -> Result<Mission, SettingError> {
@@ -140,13 +141,16 @@ mod tests {
         let given =
             ["powered.weights.theta=150", "airframe.mass.loaded_kg=2.5", "ignition.fixed_height_m=31.0"];
         assert_eq!(with(&given).unwrap(), expected);
-        assert_eq!(with(&["airframe=mk2-h53"]).unwrap().airframe, Airframe::builtin("mk2-h53").unwrap());
+        assert_eq!(
+            with(&["airframe=mk2-h53"]).unwrap().airframe,
+            vehicles::airframe::builtin("mk2-h53").unwrap()
+        );
     }
 
     #[test]
     fn every_key_of_the_built_in_missions_is_known_and_others_are_refused_with_the_nearest() {
         let known = known_mission_paths();
-        for (name, text) in flight::mission::BUILTIN {
+        for (name, text) in vehicles::mission::BUILTIN {
             let mut table = text.parse::<toml::Table>().unwrap();
             expand_airframe(&mut table).unwrap();
             super::super::collect_leaves("", &table, &mut |path, _| {

@@ -1,8 +1,8 @@
-//! Other settings for a recorded flight: named as in its profile, checked against the names there are.
+//! Other settings for a recorded flight, named as in its profile and checked against the known names.
 //!
 //! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A file of settings is a
-//! TOML file of the profile's shape with only the keys to change. A name that no profile has is refused with the
-//! nearest that one has.
+//! TOML file with the structure of the profile and only the keys to change. An unknown name is refused, and the most
+//! similar known name is suggested.
 
 mod mission;
 mod names;
@@ -17,7 +17,9 @@ pub use schedule::Schedule;
 use std::fmt;
 use std::str::FromStr;
 
-use flight::profile::{Profile, ProfileError};
+use flight::guidance::baseline::UnknownController;
+use flight::vehicle::profile::Profile;
+use vehicles::profile::ProfileError;
 
 use self::names::Names;
 
@@ -26,38 +28,39 @@ use self::names::Names;
 pub struct Setting {
     /// The key, as in `nmpc.weights.w`.
     pub path: String,
-    /// Its value.
     pub value: toml::Value,
-    /// Vehicle time from which on it holds, s; `None`: from the beginning.
+    /// Vehicle time from which it applies, s; `None`: from the beginning.
     pub at_s: Option<f64>,
 }
 
 /// Why a setting cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SettingError {
+    /// The log names a controller of the landing burn that this build does not have.
+    #[error(transparent)]
+    Law(#[from] UnknownController),
     /// Not of the form `path=value`.
     #[error("setting `{given}`: must be path=value or path=value@seconds, as in nmpc.weights.w=90@6.5")]
     Form {
         /// What was given.
         given: String,
     },
-    /// No such key.
+    /// The key is unknown.
     #[error("no setting `{given}`: did you mean `{nearest}`?")]
     Unknown {
         /// What was given.
         given: String,
-        /// The known name most like it.
+        /// The most similar known name.
         nearest: String,
     },
-    /// A section, not a key.
+    /// The path names a section, not a key.
     #[error("`{given}` is a section; its settings are {}", keys.join(", "))]
     Section {
         /// What was given.
         given: String,
-        /// The keys in it.
         keys: Vec<String>,
     },
-    /// A fraction where a whole number is asked for.
+    /// A fraction for a key that takes whole numbers.
     #[error("setting `{given}`: must be a whole number")]
     NotWhole {
         /// What was given.
@@ -68,21 +71,19 @@ pub enum SettingError {
     Toml {
         /// Which text.
         origin: String,
-        /// The parser's words.
+        /// The parser's message.
         reason: String,
     },
-    /// The mission or the truth with the settings is none.
+    /// The mission or the truth is invalid with the settings.
     #[error("with {settings}: {reason}")]
     Mission {
-        /// The settings.
         settings: String,
         /// What is wrong.
         reason: String,
     },
-    /// The profile with the settings is not a profile.
+    /// The profile is invalid with the settings.
     #[error("with {settings}: {source}")]
     Profile {
-        /// The settings.
         settings: String,
         /// What is wrong.
         source: ProfileError,
@@ -112,7 +113,7 @@ impl FromStr for Setting {
     }
 }
 
-/// A TOML value, or else text: `consistent` needs no quotes on a command line.
+/// Parses a TOML value, or else takes the text: `consistent` needs no quotes on a command line.
 fn parsed_value(text: &str) -> toml::Value {
     let table = format!("value = {text}").parse::<toml::Table>();
     let value = table.ok().filter(|table| table.len() == 1).and_then(|mut table| table.remove("value"));
@@ -139,13 +140,13 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
     Ok(settings)
 }
 
-/// The profile of this text with other settings, whenever they begin to hold.
+/// The profile of this text with other settings; their times are ignored.
 ///
 /// # Errors
-/// A name is unknown, or the result is no profile.
+/// A name is unknown, or the result is not a valid profile.
 pub fn profile_with(profile_toml: &str, settings: &[Setting]) -> Result<Profile, SettingError> {
     let text = profile_toml_with(profile_toml, settings)?;
-    Profile::from_toml(&text, "profile.toml")
+    vehicles::profile::from_toml(&text, "profile.toml")
         .map_err(|source| SettingError::Profile { settings: listed(settings), source })
 }
 
@@ -155,7 +156,7 @@ pub fn profile_with(profile_toml: &str, settings: &[Setting]) -> Result<Profile,
 /// A name is unknown, or the text is not TOML.
 pub fn profile_toml_with(profile_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
     if settings.is_empty() {
-        // Untouched, byte for byte.
+        // Without settings the text stays the same, byte for byte.
         return Ok(profile_toml.to_owned());
     }
     let mut table = parsed_table(profile_toml, "profile.toml")?;
@@ -182,7 +183,7 @@ fn listed(settings: &[Setting]) -> String {
     settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// The value of a key in a profile's text, if it stands there.
+/// The value of a key in a profile's text, if it is there.
 pub fn value_of(profile_toml: &str, path: &str) -> Option<toml::Value> {
     value_in(profile_toml.parse::<toml::Table>().ok()?, path)
 }
@@ -210,7 +211,7 @@ fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(Strin
     }
 }
 
-/// Puts a value at a path, making the sections on the way.
+/// Puts a value at a path and creates the sections on the way.
 fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
     match path.split_once('.') {
         None => {
@@ -232,7 +233,7 @@ mod tests {
     const CALIBRATED: &str = "paper-calibrated";
 
     fn calibrated() -> &'static str {
-        Profile::builtin_toml(CALIBRATED).unwrap()
+        vehicles::profile::builtin_toml(CALIBRATED).unwrap()
     }
 
     fn with(given: &[&str]) -> Result<Profile, SettingError> {
@@ -257,11 +258,11 @@ mod tests {
     #[test]
     fn a_set_value_reaches_the_profile_and_nothing_else_changes() {
         let changed = with(&["nmpc.weights.w=90", "nmpc.model=as-printed"]).unwrap();
-        let mut expected = Profile::builtin(CALIBRATED).unwrap();
+        let mut expected = vehicles::profile::builtin(CALIBRATED).unwrap();
         expected.nmpc.weights.w = 90.0;
-        expected.nmpc.model = flight::profile::ModelKind::AsPrinted;
+        expected.nmpc.model = flight::vehicle::profile::ModelKind::AsPrinted;
         assert_eq!(changed, expected);
-        assert_eq!(with(&[]).unwrap(), Profile::builtin(CALIBRATED).unwrap());
+        assert_eq!(with(&[]).unwrap(), vehicles::profile::builtin(CALIBRATED).unwrap());
     }
 
     #[test]

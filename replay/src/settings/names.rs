@@ -1,19 +1,19 @@
 //! The names that a profile's settings can have, from the profile's own types.
 //!
-//! The types are asked rather than a list kept: every struct tells a deserializer its field names, so one that
-//! supplies placeholder values walks the whole profile and notes each path on its way.
+//! The names come from the types and not from a list: every struct gives its field names to the deserializer, so a
+//! deserializer that supplies placeholder values visits the whole profile and notes each path.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use flight::profile::Profile;
+use flight::vehicle::profile::Profile;
 use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
 
 use super::{Setting, SettingError, collect_leaves, parsed_table};
 
-/// The placeholder for what may be a name or a table: a mission's airframe.
+/// The placeholder for a mission's airframe, which may be a name or a table.
 const NAME_OR_TABLE: &str = "mk2";
 
 /// Every key that a profile may have, as in `nmpc.weights.w`.
@@ -35,29 +35,29 @@ pub fn is_whole(profile_toml: &str, path: &str) -> Result<bool, SettingError> {
 /// The keys that a type may have.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Names {
-    /// All of them.
+    /// All keys.
     pub(super) paths: BTreeSet<String>,
-    /// Those that take whole numbers.
+    /// Keys that take whole numbers.
     whole: BTreeSet<String>,
 }
 
 impl Names {
-    /// The keys that a type may have, behind a prefix.
+    /// The keys that a type may have, after a prefix.
     pub(super) fn of<'de, T: Deserialize<'de>>(prefix: &str) -> Self {
         let names = RefCell::default();
-        // Placeholders may not make a value of every type; what was noted until then stays.
+        // Placeholders may not be valid for every type; the keys noted so far are kept.
         let _ = T::deserialize(Walker { path: prefix.to_owned(), names: &names });
         names.into_inner()
     }
 
-    /// Those of another type too.
+    /// Adds the keys of another type.
     pub(super) fn and(mut self, other: Self) -> Self {
         self.paths.extend(other.paths);
         self.whole.extend(other.whole);
         self
     }
 
-    /// With those that a table has already.
+    /// Adds the keys that a table has already.
     pub(super) fn with_those_in(mut self, table: &toml::Table) -> Self {
         collect_leaves("", table, &mut |path, _| {
             self.paths.insert(path);
@@ -65,7 +65,7 @@ impl Names {
         self
     }
 
-    /// Refuses a name that is none of them, with the nearest.
+    /// Refuses an unknown name and suggests the most similar one.
     pub(super) fn check(&self, given: &str) -> Result<(), SettingError> {
         check(given, &self.paths)
     }
@@ -75,7 +75,7 @@ impl Names {
         self.whole.contains(path)
     }
 
-    /// The value of a setting as its key takes it: a range's `10.0` is meant as `10` where a whole number is asked for.
+    /// Converts a value to the type of its key: `10.0` from a range means `10` for a key that takes whole numbers.
     pub(super) fn value_of(&self, setting: &Setting) -> Result<toml::Value, SettingError> {
         match setting.value {
             toml::Value::Float(number) if self.is_whole(&setting.path) => {
@@ -91,7 +91,7 @@ impl Names {
     }
 }
 
-/// Refuses a name that is none of the known, with the nearest.
+/// Refuses an unknown name and suggests the most similar one.
 fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
     if known.contains(given) {
         return Ok(());
@@ -107,7 +107,7 @@ fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
     Err(SettingError::Unknown { given: given.to_owned(), nearest: nearest.cloned().unwrap_or_default() })
 }
 
-/// Answers every request with a placeholder and notes where it was asked.
+/// Answers every request with a placeholder and notes its path.
 struct Walker<'a> {
     path: String,
     names: &'a RefCell<Names>,
@@ -124,7 +124,7 @@ impl Walker<'_> {
     }
 }
 
-/// Number methods: note the place, give nought.
+/// Number methods: note the path and give zero.
 macro_rules! numbers {
     ($note:ident: $($method:ident $visit:ident $nought:expr),* $(,)?) => {
         $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
@@ -273,11 +273,11 @@ impl<'de> MapAccess<'de> for Fields<'_> {
 mod tests {
     use super::*;
 
-    /// Every key of every built-in profile, and those that all of them leave out.
+    /// Every key of every built-in profile, and the keys that all of them leave out.
     #[test]
     fn every_key_of_the_built_in_profiles_is_known() {
         let known = known_paths();
-        for (name, text) in flight::profile::BUILTIN {
+        for (name, text) in vehicles::profile::BUILTIN {
             let table = text.parse::<toml::Table>().unwrap();
             collect_leaves("", &table, &mut |path, _| {
                 assert!(known.contains(&path), "{name}: {path}");
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
-        let text = Profile::builtin_toml("paper-calibrated").unwrap();
+        let text = vehicles::profile::builtin_toml("paper-calibrated").unwrap();
         let with = |given: &str| super::super::profile_with(text, &[given.parse().unwrap()]);
         assert_eq!(with("nmpc.horizon_steps=12.0").unwrap().nmpc.horizon_steps, 12);
         let refusal = with("nmpc.horizon_steps=12.5").unwrap_err().to_string();

@@ -1,6 +1,6 @@
-//! Which settings hold when.
+//! The settings over the time of a flight.
 
-use flight::profile::Profile;
+use flight::vehicle::profile::Profile;
 
 use super::{Setting, SettingError, profile_with};
 
@@ -8,23 +8,23 @@ use super::{Setting, SettingError, profile_with};
 #[derive(Debug, Clone)]
 pub struct Schedule<T> {
     base: T,
-    /// By time, each with everything that came before it.
+    /// By time; each stage includes all earlier changes.
     changes: Vec<(f64, T)>,
     next: usize,
 }
 
 impl Schedule<Profile> {
-    /// The settings that hold from the beginning, then each timed one from its time on.
+    /// Builds a schedule of profiles: the settings from the beginning, then each timed one from its time.
     ///
     /// # Errors
-    /// A name is unknown, or some stage is no profile.
+    /// A name is unknown, or some stage is not a valid profile.
     pub fn new(profile_toml: &str, settings: &[Setting]) -> Result<Self, SettingError> {
         Self::of(settings, |so_far| profile_with(profile_toml, so_far))
     }
 }
 
 impl<T> Schedule<T> {
-    /// What `build` makes of the settings that hold from the beginning, then with each timed one from its time on.
+    /// Calls `build` for the settings from the beginning, then again with each timed one from its time.
     ///
     /// # Errors
     /// Those of `build`.
@@ -43,7 +43,7 @@ impl<T> Schedule<T> {
             let at_s = setting.at_s.unwrap_or(0.0);
             let stage = build(&so_far)?;
             match changes.last_mut() {
-                // Of the same moment: one change.
+                // Changes at the same moment are one change.
                 Some((before_s, before)) if before_s.to_bits() == at_s.to_bits() => *before = stage,
                 _ => changes.push((at_s, stage)),
             }
@@ -56,7 +56,7 @@ impl<T> Schedule<T> {
         &self.base
     }
 
-    /// The settings that begin to hold at this vehicle time, s, if any do; times must not fall.
+    /// The settings that take effect at this vehicle time, s, if any; times must not decrease.
     pub fn due(&mut self, time_s: f64) -> Option<&T> {
         let due = self.changes.iter().skip(self.next).take_while(|(at_s, _)| *at_s <= time_s).count();
         self.next += due;

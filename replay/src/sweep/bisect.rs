@@ -1,4 +1,4 @@
-//! The smallest change of one setting that turns a landing into none, or the other way round.
+//! Finds the smallest change of one setting that turns landed into not landed, or back.
 
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ pub enum BisectError {
     /// The flight cannot be flown again.
     #[error(transparent)]
     Refly(#[from] ReflyError),
-    /// No number to begin from.
+    /// The setting has no number to begin from.
     #[error("{path} has no number in the flight's profile; say where to begin with --value")]
     NoValue {
         /// The setting.
@@ -27,7 +27,6 @@ pub enum BisectError {
     Outside {
         /// The setting.
         path: String,
-        /// Its value.
         value: f64,
         /// Lowest value.
         from: f64,
@@ -36,12 +35,12 @@ pub enum BisectError {
     },
 }
 
-/// What to change and how far.
+/// Options of a bisection.
 #[derive(Debug, Clone)]
 pub struct BisectOptions {
     /// The setting.
     pub path: String,
-    /// Change the plant alone.
+    /// Change the plant only.
     pub plant_alone: bool,
     /// Where to begin; the profile's own value if left out.
     pub value: Option<f64>,
@@ -51,16 +50,16 @@ pub struct BisectOptions {
     pub to: f64,
     /// Values tried on either side before the change is narrowed down.
     pub steps: u32,
-    /// How the flight is flown besides.
+    /// The other options of the flight.
     pub refly: ReflyOptions,
 }
 
-/// Where the verdict changes on one side.
+/// The change of the verdict on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Flip {
-    /// The value farthest from the beginning with the same verdict.
+    /// The last value tried that keeps the verdict.
     pub same_at: f64,
-    /// The value nearest to it with the other.
+    /// The first value tried with the other verdict.
     pub other_at: f64,
     /// The change from the beginning.
     pub change: f64,
@@ -68,10 +67,10 @@ pub struct Flip {
     pub outcome: FlightOutcome,
 }
 
-/// What a bisection found.
+/// The result of a bisection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BisectReport {
-    /// Says that this is the closed loop.
+    /// Marks the report as closed loop.
     pub kind: &'static str,
     /// The flight.
     pub file: String,
@@ -81,17 +80,17 @@ pub struct BisectReport {
     pub path: String,
     /// Whether it is changed for the plant alone.
     pub plant_alone: bool,
-    /// Where it began.
+    /// The start.
     pub value: f64,
-    /// How the flight comes out there.
+    /// The outcome at the start value.
     pub outcome: FlightOutcome,
-    /// The first change of the verdict below, found by steps of this much and then narrowed down.
+    /// The first change of the verdict below the start value, found by steps and then narrowed down.
     pub below: Option<Flip>,
-    /// The first above.
+    /// The first change above the start value.
     pub above: Option<Flip>,
-    /// The size of the steps below and above: what changes and changes back within one is not seen.
+    /// The size of the steps below and above. A change that reverts within one step is not seen.
     pub steps: (f64, f64),
-    /// Flights flown.
+    /// Number of flights flown.
     pub flown: usize,
 }
 
@@ -167,12 +166,12 @@ impl Search<'_> {
         })
     }
 
-    /// So far on from `value`; of whole numbers the one before it.
+    /// Moves from `value` by a distance; rounds down for whole numbers.
     fn onward(&self, value: f64, by: f64) -> f64 {
         value + if self.is_whole { libm::trunc(by) } else { by }
     }
 
-    /// Steps from `value` towards `end` until the verdict is another, then halves the last step.
+    /// Steps from `value` towards `end` until the verdict changes, then halves the last step.
     fn first_flip(
         &mut self,
         value: f64,

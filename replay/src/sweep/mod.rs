@@ -1,8 +1,8 @@
-//! Many settings over many flights, each flown again in closed loop, ranked by the worst flight's margin.
+//! Flies many settings over many flights in closed loop and ranks them by the worst flight's margin.
 //!
 //! A point is one choice of every varied setting; a job is one point on one flight. Jobs are independent and their
 //! results are put in the order of the points, so the answer does not depend on how many run at the same time. With a
-//! state file every finished job is kept, and a sweep that was stopped goes on where it was.
+//! state file every finished job is kept, and a sweep that was stopped can be continued.
 
 mod bisect;
 mod run;
@@ -18,13 +18,13 @@ use serde::Serialize;
 
 use crate::refly::ReflyError;
 
-/// Why a sweep could not be run to its end.
+/// Why a sweep could not be finished.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// A flight cannot be flown again with some choice.
+    /// A flight cannot be flown again at some point.
     #[error("{settings}")]
     Refly {
-        /// The choice.
+        /// The settings of the point.
         settings: String,
         /// What is wrong.
         source: Box<ReflyError>,
@@ -34,7 +34,7 @@ pub enum SweepError {
     State(#[from] StateError),
 }
 
-/// How one flight came out at one point.
+/// The outcome of one flight at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FlightOutcome {
     /// Inside every touchdown limit.
@@ -44,38 +44,35 @@ pub struct FlightOutcome {
     pub margin: Option<f64>,
 }
 
-/// How a point came out.
+/// The outcomes at one point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointOutcome {
     /// Its number among the points.
     pub point: usize,
-    /// Its settings.
     pub settings: Vec<String>,
     /// Flights that landed.
     pub landed: usize,
     /// The worst flight's margin; `None` if one did not come down.
     pub worst_margin: Option<f64>,
-    /// The worst flight.
     pub worst_flight: String,
     /// Every flight, in the order given.
     pub flights: Vec<FlightOutcome>,
 }
 
-/// What a sweep found.
+/// The result of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SweepReport {
-    /// Says that this is the closed loop.
+    /// Marks the report as closed loop.
     pub kind: &'static str,
-    /// The flights.
     pub flights: Vec<String>,
-    /// Of the flights that this run flew: those that this build, with nothing changed, does not fly as recorded.
+    /// The flights of this run that this build, with nothing changed, does not fly as recorded.
     pub not_reproduced: Vec<String>,
     /// The points, the best first.
     pub points: Vec<PointOutcome>,
 }
 
 impl SweepReport {
-    /// Ranks the points: the largest worst-case margin first, then the more landings, then the order given.
+    /// Ranks the points by largest worst-case margin, then by number of landings, then in the given order.
     fn ranked(flights: Vec<String>, not_reproduced: Vec<String>, mut points: Vec<PointOutcome>) -> Self {
         let margin = |point: &PointOutcome| point.worst_margin.unwrap_or(f64::NEG_INFINITY);
         points.sort_by(|a, b| {

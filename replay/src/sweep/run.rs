@@ -1,4 +1,4 @@
-//! The jobs of a sweep, several at a time.
+//! Runs the jobs of a sweep, several at a time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -10,19 +10,19 @@ use super::{Choice, FlightOutcome, PointOutcome, State, SweepError, SweepReport}
 use crate::log::Recording;
 use crate::refly::{Prepared, ReflyError, ReflyOptions};
 
-/// Results that may wait to be noted.
+/// Capacity of the queue of results.
 const QUEUE: usize = 256;
 
-/// How far a sweep is.
+/// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Jobs finished, also those of an earlier run.
+    /// Jobs finished, including those of an earlier run.
     pub done: usize,
     /// All jobs.
     pub jobs: usize,
 }
 
-/// Flies every flight at every point, `jobs` at a time. `options` say how, besides the points' settings.
+/// Flies every flight at every point, `jobs` at a time. `options` apply in addition to the settings of the points.
 ///
 /// # Errors
 /// Some flight cannot be flown again, or the state cannot be written.
@@ -51,7 +51,7 @@ pub fn sweep(
                 while !stop.load(Ordering::Relaxed)
                     && let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)).copied()
                 {
-                    // Whatever is missing was made ready.
+                    // Every flight with a missing job was prepared.
                     let Some(Ready { flight, .. }) = prepared.get(&(job % flights.len())) else { return };
                     let outcome = fly(flight, points, options, job / flights.len());
                     if results.send((job, outcome)).is_err() {
@@ -76,7 +76,7 @@ pub fn sweep(
                 }
                 Err(error) => {
                     stop.store(true, Ordering::Relaxed);
-                    // Of several errors that of the first job, whichever came first.
+                    // Of several errors, the one of the lowest-numbered job is reported, whatever the timing.
                     if failed.as_ref().is_none_or(|(earlier, _)| job < *earlier) {
                         failed = Some((job, error));
                     }
@@ -94,7 +94,7 @@ pub fn sweep(
     Ok(SweepReport::ranked(names, not_reproduced, outcomes.collect()))
 }
 
-/// A flight made ready.
+/// A prepared flight.
 struct Ready<'a> {
     flight: Prepared<'a>,
     is_reproduced: bool,
@@ -107,8 +107,8 @@ impl<'a> Ready<'a> {
     }
 }
 
-/// Every flight that a missing job needs, made ready, `jobs` at a time: to fly one up to its start may take as long as the
-/// rest of it.
+/// Prepares every flight that a missing job needs, `jobs` at a time. Flying to the start may take as long as the rest
+/// of the flight.
 fn prepare<'a>(
     flights: &'a [Recording],
     missing: &[usize],
@@ -131,7 +131,7 @@ fn prepare<'a>(
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
         joined.flatten().collect()
     });
-    // Of several errors that of the first flight, whichever came first.
+    // Of several errors, the one of the first flight is reported, whatever the timing.
     let prepared = prepared.into_iter().map(|(place, flight)| Ok((place, flight?)));
     prepared
         .collect::<Result<_, ReflyError>>()

@@ -1,4 +1,4 @@
-//! What a sweep has found so far, on the disk: one line a job, behind one line that says which sweep it is.
+//! Keeps the results of a sweep on disk: one line that identifies the sweep, then one line for each job.
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -14,17 +14,13 @@ pub enum StateError {
     /// It cannot be read or written.
     #[error("{}: cannot be used", path.display())]
     File {
-        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// It belongs to another sweep.
     #[error("{}: belongs to another sweep: other flights, settings, points or another build; give another file", path.display())]
-    Other {
-        /// The file.
-        path: PathBuf,
-    },
+    Other { path: PathBuf },
 }
 
 /// The outcomes of a sweep's jobs, perhaps backed by a file.
@@ -34,7 +30,7 @@ pub struct State {
     file: Option<(PathBuf, File)>,
 }
 
-/// A line of the file. The margin is text, because text reads back as the same number in every reader.
+/// A line of the file. The margin is text, because every reader reads text back as the same number.
 #[derive(Serialize, Deserialize)]
 struct Line {
     job: usize,
@@ -43,15 +39,15 @@ struct Line {
 }
 
 impl State {
-    /// A state of so many jobs that is forgotten in the end.
+    /// A state in memory only.
     pub fn in_memory(jobs: usize) -> Self {
         Self { outcomes: vec![None; jobs], file: None }
     }
 
-    /// A state in a file: continued if it is there, else begun. `identity` is one line that says which sweep it is.
+    /// A state in a file, continued if the file exists. `identity` is one line that identifies the sweep.
     ///
     /// # Errors
-    /// The file cannot be read or written, or is of another sweep.
+    /// The file cannot be read or written, or belongs to another sweep.
     pub fn open(path: &Path, identity: &str, jobs: usize) -> Result<Self, StateError> {
         let failed = |source| StateError::File { path: path.to_owned(), source };
         let mut outcomes = vec![None; jobs];
@@ -60,7 +56,7 @@ impl State {
         match lines.next().transpose().map_err(failed)? {
             None => writeln!(file, "{identity}").map_err(failed)?,
             Some(found) if found == identity => {
-                // The last line of a killed run may be cut; its job is then run again.
+                // The last line of a killed run may be incomplete; its job is then run again.
                 for line in lines {
                     let line = line.map_err(failed)?;
                     if let Ok(Line { job, landed, margin }) = serde_json::from_str(&line)
@@ -70,7 +66,7 @@ impl State {
                         *place = Some(FlightOutcome { landed, margin });
                     }
                 }
-                // Whatever a cut line left behind must not join the next one.
+                // An incomplete line must not be joined with the next one.
                 writeln!(file).map_err(failed)?;
             }
             Some(_) => return Err(StateError::Other { path: path.to_owned() }),

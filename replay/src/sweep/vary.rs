@@ -1,4 +1,4 @@
-//! What is varied, and the points that come of it.
+//! The varied settings, and the points that follow from them.
 
 use std::str::FromStr;
 
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha12Rng;
 
 use crate::settings::Setting;
 
-/// Points of one sweep: more would take days.
+/// Most points of one sweep: more would take days.
 const POINTS_MAX: usize = 1_000_000;
 
 /// A setting and the values it takes.
@@ -15,30 +15,29 @@ const POINTS_MAX: usize = 1_000_000;
 pub struct Vary {
     /// The setting, as in `nmpc.weights.w`.
     pub path: String,
-    /// Its values.
     pub values: Values,
 }
 
 /// The values of a varied setting.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// These, one after the other.
+    /// A list of values.
     Listed(Vec<toml::Value>),
-    /// From the first to the second, this many evenly spaced; at random: anywhere in between.
+    /// A range: evenly spaced values for a grid, or random values inside it.
     Range {
         /// The first.
         from: f64,
         /// The last.
         to: f64,
-        /// How many; for random points it does not count.
+        /// Number of values; ignored for random points.
         count: usize,
     },
 }
 
-/// Why something cannot be varied so.
+/// Why the values cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum VaryError {
-    /// Not understood.
+    /// The text cannot be parsed.
     #[error(
         "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in nmpc.weights.w=50:110:7"
     )]
@@ -47,12 +46,12 @@ pub enum VaryError {
         given: String,
     },
     /// Too many points.
-    #[error("{points} points; at most {POINTS_MAX} are flown at once")]
+    #[error("{points} points; at most {POINTS_MAX} are allowed in one sweep")]
     TooMany {
         /// How many.
         points: usize,
     },
-    /// Random points need a range.
+    /// Random points need a range, not a list.
     #[error("{path}: random points need a range PATH=FROM:TO, not a list")]
     NoRange {
         /// The setting.
@@ -60,12 +59,12 @@ pub enum VaryError {
     },
 }
 
-/// The settings of one point: of controller and plant, and of the plant alone.
+/// The settings of one point.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Choice {
-    /// Of controller and plant.
+    /// Settings of controller and plant.
     pub settings: Vec<Setting>,
-    /// Of the plant alone.
+    /// Settings of the plant only.
     pub plant_settings: Vec<Setting>,
 }
 
@@ -116,7 +115,7 @@ impl Vary {
         }
     }
 
-    /// The value of this place in the grid.
+    /// The value at this index of the grid.
     fn at(&self, place: usize) -> Setting {
         let value = match &self.values {
             Values::Listed(values) => values.get(place).cloned().unwrap_or(toml::Value::Boolean(false)),
@@ -132,7 +131,7 @@ impl Vary {
 /// Every combination; the last setting changes fastest.
 ///
 /// # Errors
-/// There are too many.
+/// There are too many points.
 pub fn grid(vary: &[Vary], plant: &[Vary]) -> Result<Vec<Choice>, VaryError> {
     let all: Vec<&Vary> = vary.iter().chain(plant).collect();
     let points = all.iter().map(|vary| vary.count()).fold(1, usize::saturating_mul);
@@ -153,10 +152,10 @@ pub fn grid(vary: &[Vary], plant: &[Vary]) -> Result<Vec<Choice>, VaryError> {
     Ok((0..points).map(choice).collect())
 }
 
-/// Points at random in the ranges, evenly; the same seed gives the same.
+/// Uniformly random points in the ranges; the same seed gives the same points.
 ///
 /// # Errors
-/// There are too many, or a list where a range is needed.
+/// There are too many points, or a setting has a list instead of a range.
 pub fn random(vary: &[Vary], plant: &[Vary], points: usize, seed: u64) -> Result<Vec<Choice>, VaryError> {
     if points > POINTS_MAX {
         return Err(VaryError::TooMany { points });
@@ -221,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_understood_is_refused() {
+    fn a_malformed_range_is_refused() {
         for bad in ["a", "a=", "=1:2", "a=1:2:0", "a=1:x", "a=1:2:3:4", "a=1:inf"] {
             assert!(bad.parse::<Vary>().is_err(), "{bad}");
         }

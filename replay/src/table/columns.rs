@@ -1,24 +1,23 @@
-//! The columns of a table, from a record's description.
+//! Derives the columns of a table from the schema of a record.
 
 use prost_reflect::{
     DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor, ReflectMessage as _, Value,
 };
 
-/// A list this long has a column an element; a longer one, as a plan's nodes, has none.
+/// A list up to this length has one column for each element; a longer one, such as a plan's nodes, has none.
 const LIST_MAX: usize = 8;
 
-/// Units at the end of a field's name, the longest first.
+/// Unit suffixes of field names, the longest first.
 const UNITS: [&str; 12] =
     ["_rad_s2", "_rad_s", "_m_s2", "_m_s", "_kg_m2", "_bytes", "_rad", "_deg", "_kg", "_m", "_n", "_s"];
 
-/// What a column holds.
+/// The type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Numbers.
     Float,
-    /// Whole numbers; also flags, as 0 and 1.
+    /// Whole numbers, and flags as 0 and 1.
     Integer,
-    /// Text.
     Text,
 }
 
@@ -27,7 +26,6 @@ pub enum Kind {
 pub struct Column {
     /// Its name, with its unit.
     pub name: String,
-    /// What it holds.
     pub kind: Kind,
 }
 
@@ -40,7 +38,7 @@ pub struct TableShape {
     pub columns: Vec<Column>,
 }
 
-/// Where a column's value stands in a record: fields from the outside in, and an element of a list.
+/// Path of a column's value in a record: fields from the outside in, and an element of a list.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
     pub(super) fields: Vec<FieldDescriptor>,
@@ -57,8 +55,8 @@ impl TableShape {
         }
     }
 
-    /// The table of a kind of record, and where its columns' values stand, without the time. Lists are taken to be as
-    /// long as in this first record.
+    /// The table of a kind of record, and the paths of its columns' values, without the time. Lists are assumed to be
+    /// as long as in this first record.
     pub(super) fn of_record(name: &str, first: &DynamicMessage) -> (Self, Vec<Place>) {
         let mut shape = Self::new(name, &[]);
         let mut places = Vec::new();
@@ -82,7 +80,7 @@ fn walk(
     above: &mut Vec<FieldDescriptor>,
     take: &mut impl FnMut(Column, Place),
 ) {
-    // A schema may hold itself; no record does so more often than this.
+    // A schema may contain itself; this is the deepest nesting that is followed.
     if above.len() > LIST_MAX {
         return;
     }

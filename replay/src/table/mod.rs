@@ -1,9 +1,9 @@
-//! A log as tables: one a topic, one row a record, one column a number.
+//! Reads a log as tables: one table for each topic, one row for each record, one column for each number.
 //!
-//! The columns come from the schema that the log itself carries, so a new kind of record, or one of a newer version, is a
-//! table without a line here. Column names are the fields' paths, as in `output.gimbal_command_rad`, and carry their units
-//! as the fields do. A short list (four fins) has a column an element, a long one (a plan's nodes) has none; the limits of
-//! a verdict are rows of a table of their own.
+//! The columns come from the schema in the log, so a new kind of record, or a newer version of one, becomes a table
+//! without any code here. Column names are the paths of the fields, as in `output.gimbal_command_rad`, with their
+//! units. A short list (four fins) has one column for each element, a long one (a plan's nodes) has none. The limits of
+//! a verdict are rows of a separate table.
 
 mod columns;
 mod rows;

@@ -1,4 +1,4 @@
-//! A log's records as rows, streamed.
+//! Streams the records of a log as rows.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
@@ -19,7 +19,6 @@ pub enum Cell {
     Float(f64),
     /// A whole number or a flag; digests of 64 bits wrap around to negative numbers.
     Integer(i64),
-    /// Text.
     Text(String),
     /// Never received, or not in the record.
     Absent,
@@ -39,9 +38,9 @@ impl Cell {
 /// One row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Place of its table in [`TableReader::shapes`].
+    /// Index of its table in [`TableReader::shapes`].
     pub table: usize,
-    /// One value a column.
+    /// One value for each column.
     pub cells: Vec<Cell>,
 }
 
@@ -55,7 +54,7 @@ pub struct TableReader {
     events: Option<usize>,
 }
 
-/// What is known of a channel's records.
+/// The known structure of a channel's records.
 struct Known {
     table: usize,
     descriptor: MessageDescriptor,
@@ -73,7 +72,7 @@ impl TableReader {
         &self.shapes
     }
 
-    /// Hands out every row of a log.
+    /// Passes every row of a log to `take`.
     ///
     /// # Errors
     /// The log cannot be read, or `take` refused a row.
@@ -116,7 +115,7 @@ impl TableReader {
         }
     }
 
-    /// A record of a package of ours, as the log itself describes it.
+    /// A record of one of our packages, with the schema in the log.
     fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
         let channel = log.channel(stamped.channel_id)?;
         let shapes = &mut self.shapes;
@@ -126,7 +125,7 @@ impl TableReader {
                 let known = described(channel).and_then(|descriptor| {
                     let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
                     let (shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
-                    // Two channels of one topic share a table.
+                    // Two channels with one topic share a table.
                     let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
                         shapes.push(shape);
                         shapes.len() - 1
@@ -169,7 +168,7 @@ impl TableReader {
     }
 }
 
-/// The place of a table that has no description in the schema.
+/// The index of a table that has no schema.
 fn place_of(
     shapes: &mut Vec<TableShape>,
     place: &mut Option<usize>,
@@ -197,7 +196,7 @@ fn value_at(message: &DynamicMessage, fields: &[FieldDescriptor], element: Optio
     }
 }
 
-/// Describes a channel's records from the schema that the log carries; `None` for records that are not ours.
+/// Describes a channel's records from the schema in the log; `None` for records that are not ours.
 fn described(channel: &LogChannel) -> Option<MessageDescriptor> {
     if channel.message_encoding != "protobuf" || !channel.schema_name.starts_with("touchdown.") {
         return None;

@@ -1,21 +1,21 @@
-//! One recorded tick, solved again alone.
+//! Solves one recorded tick again.
 //!
-//! The controller is brought to the tick by running every one before it, so that its warm start is the one it had in
-//! flight. Then the same landing problem is solved once more from nothing, and the two are put side by side.
+//! The controller first runs every earlier tick, so that it has the warm start it had in flight. Then the same landing
+//! problem is solved again with a cold start, and the two solutions are compared.
 
 mod pilot;
 mod planar;
 
-use flight::nmpc::{Problem, Solution};
+use nmpc::{Problem, Solution};
 use serde::Serialize;
 use tick_log::TickLogError;
 use tick_log::pilot::PilotLogError;
 
-use crate::controller::{FrameError, PilotStartError};
-use crate::log::{Recording, RecordingError};
+use crate::controller::FrameError;
+use crate::log::{FlightKind, Recording, RecordingError};
 use crate::settings::SettingError;
 
-/// A condition or limit closer than this to being broken is active, in its own unit (m, rad, m/s or rad/s).
+/// A condition or limit with less margin than this counts as active; in its own unit (m, rad, m/s or rad/s).
 const ACTIVE: f64 = 1e-4;
 
 /// State components in order, with their units.
@@ -24,42 +24,39 @@ const COMPONENTS: [&str; 6] = ["x_m", "z_m", "theta_rad", "u_m_s", "w_m_s", "q_r
 /// Why a tick cannot be solved again.
 #[derive(Debug, thiserror::Error)]
 pub enum TickError {
-    /// The log has not what it takes.
+    /// The log lacks the records that are needed.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The log names settings that this build does not have.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// A recorded input has no meaning in this build.
+    /// This build cannot interpret a recorded input.
     #[error(transparent)]
     Input(#[from] TickLogError),
-    /// The flight computer cannot be let go again.
-    #[error(transparent)]
-    PilotStart(#[from] PilotStartError),
-    /// A recorded frame has no meaning in this build.
+    /// This build cannot interpret a recorded frame.
     #[error(transparent)]
     FrameInput(#[from] PilotLogError),
-    /// A recorded frame cannot be run again.
+    /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// No such tick.
+    /// The log has no such tick.
     #[error("{name}: no tick {tick} that can be re-executed; there are {first} to {last}")]
     NoTick {
         /// The file.
         name: String,
-        /// What was asked for.
+        /// The request.
         tick: u64,
-        /// The first there is.
+        /// The first tick in the log.
         first: u64,
-        /// The last there is.
+        /// The last tick in the log.
         last: u64,
     },
 }
 
-/// How a solve went.
+/// The result of a solve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Solved {
-    /// How it ended.
+    /// The solver status.
     pub status: &'static str,
     /// Newton iterations.
     pub iterations: usize,
@@ -69,7 +66,7 @@ pub struct Solved {
     pub kkt_stationarity: f64,
     /// Feasibility residual.
     pub kkt_feasibility: f64,
-    /// How far the path misses its conditions at worst, m, rad, m/s or rad/s.
+    /// The largest violation of a condition along the path, m, rad, m/s or rad/s.
     pub condition_miss: f64,
     /// The first input, rad.
     pub gimbal_rad: f64,
@@ -78,38 +75,36 @@ pub struct Solved {
 /// A limit or condition that the plan touches.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActiveConstraint {
-    /// What it is about, as in `w_m_s <= 0.03`.
+    /// The limit as text, as in `w_m_s <= 0.03`.
     pub what: String,
     /// Nodes or intervals of the plan at which it is active.
     pub at: Vec<usize>,
-    /// The largest multiplier among them; what loosening by one unit would save.
+    /// The largest multiplier among them: how much cost would be saved if the limit were one unit looser.
     pub multiplier: f64,
 }
 
-/// A tick, solved again.
+/// A tick that was solved again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TickReport {
     /// The log.
     pub file: String,
-    /// Its number.
     pub tick: u64,
     /// Vehicle time, s.
     pub time_s: f64,
-    /// Its phase.
     pub phase: &'static str,
     /// The recorded input.
     pub input: InputFacts,
-    /// What decided.
+    /// The control level that decided.
     pub level: &'static str,
-    /// The gimbal command as recorded, rad: one angle, or pitch and yaw.
+    /// The recorded gimbal command, rad: one angle, or pitch and yaw.
     pub recorded_gimbal_rad: Vec<f64>,
-    /// As decided now, rad.
+    /// The gimbal command of this build, rad.
     pub gimbal_rad: Vec<f64>,
-    /// Whether the whole output and the memory are the recorded ones, bit for bit, but for the recorded plan.
+    /// Whether the whole output (except the plan) and the memory are equal to the recorded ones, bit for bit.
     pub identical: bool,
     /// The solve as in flight; `None` if this tick solved nothing.
     pub warm: Option<Solved>,
-    /// The same problem from nothing.
+    /// The same problem with a cold start.
     pub cold: Option<Solved>,
     /// The nearest tick that solves a landing; this one if it does, `None` if none does.
     pub nearest_solved: Option<u64>,
@@ -119,13 +114,12 @@ pub struct TickReport {
     pub path: Vec<PathPoint>,
 }
 
-/// What the tick was given.
+/// The input of the tick.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputFacts {
-    /// State components in order: x, z, theta, u, w, q. Of a flight from apogee those in the plane of the landing, with
-    /// velocities through the air.
+    /// State components in order: x, z, theta, u, w, q. For a flight from apogee, those in the plane of the landing,
+    /// with velocities relative to the air.
     pub state: [f64; 6],
-    /// Time since ignition, s.
     pub time_since_ignition_s: f64,
     /// The gimbal angles held, rad.
     pub gimbal_applied_rad: Vec<f64>,
@@ -149,7 +143,10 @@ pub struct PathPoint {
 /// # Errors
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
-    if recording.is_from_apogee() { pilot::frame(recording, number) } else { planar::tick(recording, number) }
+    match recording.kind() {
+        FlightKind::FromApogee => pilot::frame(recording, number),
+        FlightKind::Planar => planar::tick(recording, number),
+    }
 }
 
 fn nearest(number: u64, solved: impl Iterator<Item = u64>) -> Option<u64> {

@@ -1,23 +1,22 @@
-//! A frame of a flight computer: every tenth plans the landing while the motor burns.
+//! A frame of a flight computer: every tenth frame plans the landing while the motor burns.
 
-use flight::controller::ControlLevel;
-use flight::dynamics::PlanarState;
-use flight::nmpc::Solution;
-use flight::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::powered::Plane;
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::Plane;
+use flight::vehicle::dynamics::PlanarState;
 use nalgebra::Vector3;
+use nmpc::Solution;
 use prost::Message as _;
 use protocol::log::flight_v1;
 use tick_log::pilot::{input_from_log, tick_to_log};
 
 use super::{InputFacts, PathPoint, TickError, TickReport, active_constraints, nearest, solved_facts};
-use crate::controller::{LoggedPilot, PilotStartError, Replayed as _, settings_in_flight};
+use crate::controller::{LoggedPilot, Replayed as _};
 use crate::log::Recording;
 
 pub(super) fn frame(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
     let (start, frames) = recording.replayable_frames()?;
-    let in_flight = settings_in_flight(&recording.head.run).map_err(PilotStartError::from)?;
-    let mut controller = LoggedPilot::new(recording.profile_toml()?, start, &in_flight)?;
+    let mut controller = LoggedPilot::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
     let place = frames.iter().position(|tick| tick.input.frame == number).ok_or_else(|| {
         let bound = |tick: Option<&flight_v1::PilotTick>| tick.map_or(0, |tick| tick.input.frame);
         TickError::NoTick {
@@ -35,7 +34,7 @@ pub(super) fn frame(recording: &Recording, number: u64) -> Result<TickReport, Ti
     let held = place.checked_sub(1).and_then(|before| frames.get(before));
     let (output, solved) = controller.step_inspected(&input)?;
     let pilot = controller.pilot();
-    let again = tick_to_log(&input, &output, pilot.digest());
+    let again = tick_to_log(&input, &output, controller.digest());
     let warm = solved.as_ref().map(|solved| &solved.warm.solution);
     let state = match &solved {
         Some(solved) => solved.problem.initial,
@@ -76,7 +75,7 @@ fn plans(tick: &flight_v1::PilotTick) -> bool {
     tick.input.frame.is_multiple_of(FRAMES_PER_PLAN) && tick.output.level != idle
 }
 
-/// The estimated motion in the plane of the landing, or before there is one in the world's x-z plane.
+/// The estimated motion in the plane of the landing; before such a plane exists, in the world's x-z plane.
 fn in_plane(pilot: &Pilot) -> PlanarState {
     let nil = Vector3::zeros();
     let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));

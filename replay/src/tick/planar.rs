@@ -1,7 +1,7 @@
 //! A tick of the planar landing's controller.
 
-use flight::controller::ControlLevel;
-use flight::nmpc::{SolveStatus, solve};
+use flight::guidance::controller::ControlLevel;
+use nmpc::{SolveStatus, solve};
 use protocol::log::v1;
 use tick_log::input_from_log;
 
@@ -61,13 +61,13 @@ fn solves(tick: &v1::ControllerTick) -> bool {
     tick.output.solver.status != u32::from(SolveStatus::NotRun.index())
 }
 
-/// The controller keeps what it flies or rehearses.
+/// The controller keeps the plan that it flies or rehearses.
 fn is_kept(tick: &v1::ControllerTick) -> bool {
     let level = u8::try_from(tick.output.level).ok().and_then(ControlLevel::from_index);
     matches!(level, Some(ControlLevel::Rehearsal | ControlLevel::Converged | ControlLevel::BestFeasible))
 }
 
-/// Compares all but the plan, which is not held of a recording; the digest of the memory stands for it.
+/// Compares everything but the plan, which a recording does not hold; the digest of the memory covers it.
 fn identical(recorded: &v1::ControllerTick, again: &v1::ControllerTick) -> bool {
     let mut again = again.clone();
     again.output.plan.states = Vec::new();

@@ -4,8 +4,9 @@
 //! compares every field of what it decides (and the digest of what it remembers) with the record. Measured times
 //! are not compared.
 //!
-//! The log of a flight from apogee to touchdown holds frames of the whole flight computer; they are verified in the same
-//! way, from what it believed when it was let go.
+//! A log of this release has every frame of the whole flight computer from power-up on, for both vehicles. Then the computer
+//! itself is run again: self-test, arming, countdown, gate and abort are compared as well. Older logs, and logs of flights that
+//! begin at their release, have its ticks alone, from the release on, and the report says so.
 //!
 //! The controller remembers its plan, so a tick can be re-executed only if every tick before it can: at a gap the
 //! comparison ends, and the report says so.
@@ -16,9 +17,10 @@
 //! Of a divergence the report says how it grows from tick to tick, and, when a whole file is verified, whether the
 //! landing would end otherwise: for that alone the flight is flown on in simulation from the first tick that differs.
 
-mod computer;
 mod consequence;
 mod difference;
+mod flight;
+mod from_power_up;
 mod growth;
 mod report;
 mod tally;
@@ -28,14 +30,15 @@ mod verifier;
 pub use consequence::Consequence;
 pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
 pub use growth::{Growth, GrowthStep};
-pub use report::{Divergence, FlightPlace, Obstacle, Outcome, VerifyReport};
+pub use report::{FlightPlace, FramesReport, Obstacle, Verification, VerifyReport};
+pub use tally::Divergence;
 pub use unread::Unread;
 pub use verifier::Verifier;
 
 use std::io::Read;
 use std::path::Path;
 
-use computer::Computer;
+use flight::FlightVerifier;
 use report::FileFacts;
 
 use crate::log::{Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
@@ -76,12 +79,12 @@ pub fn verify_log<R: Read>(
     whole_head: impl Fn() -> Result<Head, LogError>,
 ) -> Result<Vec<VerifyReport>, LogError> {
     let mut flights = Flights::default();
-    let mut computers: Vec<Computer> = Vec::new();
+    let mut computers: Vec<FlightVerifier> = Vec::new();
     // What cannot be read before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
         if flights.note(&stamped.entry) {
-            computers.push(Computer::new(!computers.is_empty(), unreadable.take()));
+            computers.push(FlightVerifier::new(!computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
             if let Entry::Unreadable { reason } = stamped.entry {
@@ -92,7 +95,7 @@ pub fn verify_log<R: Read>(
         computer.take(stamped, log, &whole_head)?;
     }
     if computers.is_empty() {
-        computers.push(Computer::new(false, unreadable));
+        computers.push(FlightVerifier::new(false, unreadable));
     }
     let of = computers.len();
     let mut reports = Vec::new();

@@ -4,9 +4,8 @@ use serde::Serialize;
 use tick_log::TickLogError;
 
 use super::consequence::Consequence;
-use super::difference::FieldDifference;
 use super::growth::Growth;
-use super::tally::Tally;
+use super::tally::{Divergence, Tally};
 use super::unread::Unread;
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut};
@@ -14,7 +13,7 @@ use crate::log::{BuildComparison, Cut};
 /// The answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum Verification {
     /// There are ticks, and every one of a whole flight is identical.
     Identical,
     /// Every tick is identical that could be read of a damaged log, or of a flight whose record ends before it did.
@@ -68,6 +67,22 @@ pub enum Obstacle {
         /// Its number.
         tick: u64,
     },
+    /// Frames of the flight computer are missing.
+    #[error(
+        "after frame {after} of the flight computer comes frame {before}: what it remembered there is unknown, and nothing after the gap was compared"
+    )]
+    FramesLost {
+        /// The last frame before the gap.
+        after: u64,
+        /// The first after it.
+        before: u64,
+    },
+    /// A tick was made and is not in the log.
+    #[error("the flight computer made tick {tick}, and the log has lost its record")]
+    TickLost { tick: u64 },
+    /// A tick that no frame of the flight computer made.
+    #[error("tick {tick} belongs to no frame of the flight computer that was run again")]
+    TickWithoutFrame { tick: u64 },
     /// A record cannot be read.
     #[error("a record cannot be read: {reason}")]
     Unreadable {
@@ -95,19 +110,19 @@ impl Serialize for Obstacle {
     }
 }
 
-/// A tick that differs.
+/// The flight computer's frames, compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Divergence {
-    /// Its number.
-    pub tick: u64,
-    /// Vehicle time, s.
-    pub time_s: f64,
-    /// The phase.
-    pub phase: &'static str,
-    /// How many of its fields differ.
-    pub fields_different: usize,
-    /// Those fields, in the record's order; the first few if there are many.
-    pub fields: Vec<FieldDifference>,
+pub struct FramesReport {
+    /// Frames that could be read.
+    pub recorded: u64,
+    /// Frames that were run again and compared.
+    pub compared: u64,
+    /// Frames that differ.
+    pub different: u64,
+    /// The first frame that differs.
+    pub first_divergence: Option<Divergence>,
+    /// Vehicle time of the last frame that was compared, s.
+    pub until_s: Option<f64>,
 }
 
 /// Which flight of a log that holds several.
@@ -136,14 +151,17 @@ pub struct VerifyReport {
     /// Which of its flights, if it holds several.
     pub flight: Option<FlightPlace>,
     /// The answer.
-    pub outcome: Outcome,
+    pub outcome: Verification,
+    /// The frames of the flight computer from power-up on; `None` if the log has none: then only its ticks were compared.
+    pub frames: Option<FramesReport>,
+    /// Whether digests of what the computer remembered were compared as well. Those of another schema are not.
+    pub digests_compared: bool,
     /// Ticks that could be read.
     pub ticks_recorded: u64,
     /// Ticks that were re-executed and compared.
     pub ticks_compared: u64,
     /// Ticks identical in every bit.
     pub ticks_identical: u64,
-    /// Ticks that differ.
     pub ticks_different: u64,
     /// Fields that differ, over all ticks.
     pub fields_different: u64,
@@ -172,25 +190,28 @@ pub struct VerifyReport {
 impl VerifyReport {
     pub(super) fn new(
         facts: FileFacts,
-        ticks_recorded: u64,
-        counts: Tally,
+        (ticks_recorded, counts): (u64, Tally),
+        frames: Option<FramesReport>,
         obstacle: Option<Obstacle>,
     ) -> Self {
         let (first_divergence, growth) = (counts.divergence, counts.growth);
         let FileFacts { file, flight, cut, damage, build } = facts;
-        let outcome = if first_divergence.is_some() {
-            Outcome::Diverged
+        let frame_differs = frames.as_ref().is_some_and(|frames| frames.different > 0);
+        let outcome = if first_divergence.is_some() || frame_differs {
+            Verification::Diverged
         } else if obstacle.is_some() {
-            Outcome::NotReplayable
+            Verification::NotReplayable
         } else if damage.is_some() || cut.is_some() {
-            Outcome::IdenticalReadablePart
+            Verification::IdenticalReadablePart
         } else {
-            Outcome::Identical
+            Verification::Identical
         };
         Self {
             file,
             flight,
             outcome,
+            frames,
+            digests_compared: true,
             ticks_recorded,
             ticks_compared: counts.ticks,
             ticks_identical: counts.ticks - counts.ticks_different,

@@ -2,14 +2,28 @@
 
 use prost::Message;
 use prost_reflect::MessageDescriptor;
+use serde::Serialize;
 
 use super::difference::{FieldDifference, differences};
 use super::growth::{Growth, GrowthStep};
-use super::report::Divergence;
 use crate::controller::Moment;
 
 /// Fields of the first diverged tick that are kept.
 const FIELDS_KEPT: usize = 32;
+
+/// A tick that differs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Divergence {
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    pub phase: &'static str,
+    /// How many of its fields differ.
+    pub fields_different: usize,
+    /// Those fields, in the record's order; the first few if there are many.
+    pub fields: Vec<FieldDifference>,
+}
 
 /// What has been compared so far.
 #[derive(Debug, Clone, Default)]

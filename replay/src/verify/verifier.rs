@@ -19,6 +19,10 @@ impl<C: Replayed> Verifier<C> {
         Self { controller, descriptor: C::descriptor(), tally: Tally::default() }
     }
 
+    pub(super) fn controller(&self) -> &C {
+        &self.controller
+    }
+
     /// Re-executes the next tick and compares it with its record.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Logs that this build does not give: every question says so, lest its answer be put down to the settings.
+//! Tests logs that this build would not produce: every command says so, so that nobody blames the settings for it.
 
 use std::num::NonZeroUsize;
 
@@ -12,14 +12,14 @@ use crate::asked::settings;
 use crate::from_apogee::LANDED;
 use crate::simulated::NOMINAL;
 
-/// What a report says in words.
+/// A report as text.
 fn words(print: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
     let mut output = Vec::new();
     print(&mut output).unwrap();
     String::from_utf8(output).unwrap()
 }
 
-/// The landing with two commands that this build does not give.
+/// The landing, with two commands that this build would not give.
 fn forged() -> Recording {
     let mut recording = NOMINAL.recording();
     for place in [20, 30] {
@@ -29,7 +29,7 @@ fn forged() -> Recording {
 }
 
 #[test]
-fn an_evaluation_counts_what_is_the_builds() {
+fn an_evaluation_counts_differences_caused_by_the_build() {
     let forged = forged();
     let said = format!("with nothing changed this build decides 2 of {} ticks otherwise", forged.ticks.len());
     for given in [&[][..], &["nmpc.weights.w=120"]] {
@@ -41,7 +41,7 @@ fn an_evaluation_counts_what_is_the_builds() {
     let own = evaluate(&NOMINAL.recording(), &settings(&["nmpc.weights.w=120"])).unwrap();
     assert!(own.unchanged_different == 0 && own.commands_different > 0);
     assert!(!words(|output| print_evaluate(&own, output)).contains("with nothing changed"));
-    // The same of a flight computer.
+    // The same for a flight computer.
     let mut flight = Recording::open(&LANDED.log).unwrap();
     flight.frames[50].output.fins_rad[0] += 0.01;
     assert_eq!(evaluate(&flight, &[]).unwrap().unchanged_different, 1);
@@ -82,7 +82,7 @@ fn a_bisection_says_when_the_flight_is_not_reproduced() {
         let text = words(|output| print_bisect(&report, output));
         assert_eq!(text.contains("does not fly it as recorded"), !is_own, "{text}");
     }
-    // Of a flight from apogee a frame before the start tells, and one behind it.
+    // In a flight from apogee, a changed frame before the start shows it, and so does one after the start.
     let options = BisectOptions { path: "truth.impulse_scale".to_owned(), ..options };
     let whole = Recording::open(&LANDED.log).unwrap();
     for place in [99, whole.frames.len() - 300] {

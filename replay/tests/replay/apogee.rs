@@ -1,8 +1,8 @@
-//! A whole flight from apogee, as a campaign logs it: every what-if question asked of it.
+//! Tests every what-if question on a whole flight from apogee, as logged by a campaign.
 
 use std::num::NonZeroUsize;
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use proptest::prelude::*;
 use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::Record;
@@ -12,7 +12,7 @@ use replay::log::Recording;
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 use replay::tick::tick;
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with, with_plant};
 use crate::command_line::{replay, run};
@@ -24,14 +24,14 @@ fn recording() -> Recording {
 }
 
 #[test]
-fn it_landed_and_verifies() {
+fn the_logged_flight_landed_and_verifies() {
     assert!(LANDED.landed && recording().verdict.unwrap().landed);
     let report = only(verify(&LANDED.log).unwrap());
-    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+    assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
 }
 
 #[test]
-fn nothing_changed_decides_nothing_else() {
+fn without_changes_the_decisions_are_the_recorded_ones() {
     let report = evaluate(&recording(), &[]).unwrap();
     assert!(report.kind.starts_with("open loop"));
     assert_eq!((report.commands_different, report.levels_different), (0, 0));
@@ -40,7 +40,7 @@ fn nothing_changed_decides_nothing_else() {
 }
 
 #[test]
-fn other_settings_command_otherwise_from_their_time_on() {
+fn timed_settings_change_the_commands_from_their_time_on() {
     let recording = recording();
     let ignited_s = evaluate(&recording, &[]).unwrap().phases;
     let entered =
@@ -54,13 +54,13 @@ fn other_settings_command_otherwise_from_their_time_on() {
     let report = evaluate(&recording, &settings(&["ignition.fixed_height_m=90.0"])).unwrap();
     let ignition = report.phases.iter().find(|phase| phase.phase == "IGNITION").unwrap();
     assert!(ignition.evaluated_s.unwrap() < ignition.recorded_s.unwrap(), "{ignition:?}");
-    // The estimator can be set up otherwise from the beginning on, not in flight.
+    // The estimator's settings can be changed from the beginning only, not in flight.
     let report = evaluate(&recording, &settings(&["estimator.barometer_offset_walk_m_sqrt_s=1.0"])).unwrap();
     assert!(report.fins_difference_max_rad > 0.0);
 }
 
 #[test]
-fn what_the_flight_computer_does_not_have_is_refused() {
+fn a_setting_that_the_flight_computer_does_not_have_is_refused() {
     let recording = recording();
     let refused = |given| evaluate(&recording, &settings(&[given])).unwrap_err();
     assert!(matches!(refused("leg_limits.tilt_deg=3.0"), EvaluateError::NotTheControllers { .. }));
@@ -71,9 +71,9 @@ fn what_the_flight_computer_does_not_have_is_refused() {
     assert!(message.contains("did you mean `powered.weights.theta`?"), "{message}");
 }
 
-/// Flown again from its landing, from frames before and during the burn: bit for bit the recorded flight.
+/// Flown again from frames before and during the burn, it is the recorded flight bit for bit.
 #[test]
-fn nothing_changed_flies_the_same_bit_for_bit() {
+fn without_changes_the_flight_is_the_same_bit_for_bit() {
     let recording = recording();
     let starts = [
         StartAt::Landing,
@@ -102,12 +102,12 @@ fn nothing_changed_flies_the_same_bit_for_bit() {
 }
 
 #[test]
-fn another_day_turns_the_verdict() {
+fn another_wind_and_motor_change_the_verdict() {
     let recording = recording();
     let report = refly(&recording, &with_plant(&["truth.impulse_scale=0.7"])).unwrap();
     assert_eq!((report.verdict_changed, report.thrust_scale.to_bits()), (Some(true), 0.7_f64.to_bits()));
     assert!(report.margin.unwrap() < 0.0);
-    // Wind and motor from the burn on; the controller is told of neither.
+    // Wind and motor change from the burn on; the controller knows of neither.
     for given in ["truth.wind_m_s=14", "airframe.motor=G33"] {
         let options = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..with_plant(&[given]) };
         let report = refly(&recording, &options).unwrap();
@@ -129,14 +129,14 @@ fn another_controller_flies_the_burn() {
         assert!(report.commands_identical < report.ticks, "{law:?}");
     }
     let refusal = flown_by(Law::Stabiliser).unwrap_err().to_string();
-    assert!(refusal.contains("stabiliser is of a planar landing"), "{refusal}");
+    assert!(refusal.contains("stabiliser is only for a planar landing"), "{refusal}");
     let planar = crate::simulated::NOMINAL.recording();
     let refusal = refly(&planar, &ReflyOptions { law: Law::OpenLoop, ..ReflyOptions::default() });
-    assert!(refusal.unwrap_err().to_string().contains("open-loop is of a flight from apogee"));
+    assert!(refusal.unwrap_err().to_string().contains("open-loop is only for a flight from apogee"));
 }
 
 #[test]
-fn what_cannot_be_flown_again_is_said() {
+fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     let mut recording = recording();
     let refusal = |start| {
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap_err().to_string()
@@ -163,9 +163,9 @@ fn what_cannot_be_flown_again_is_said() {
     assert!(message.contains("apogee.mcap") && message.contains("`flight`"), "{message}");
 }
 
-/// A log that this build's world no longer gives: its forged frame is named, and the flight is flown on all the same.
+/// A log that this build's world would not produce: the forged frame is named, and the flight is still flown on.
 #[test]
-fn another_flight_before_the_start_is_named() {
+fn a_difference_before_the_start_is_reported() {
     let mut recording = recording();
     recording.frames[99].state_digest ^= 1;
     let report = refly(&recording, &ReflyOptions::default()).unwrap();
@@ -189,7 +189,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         let path = LANDED.beside(name);
         write_log(&path, &recording, &options, &report, &flown).unwrap();
         let verified = only(verify(&path).unwrap());
-        assert_eq!((verified.outcome, verified.first_divergence), (Outcome::Identical, None), "{name}");
+        assert_eq!((verified.outcome, verified.first_divergence), (Verification::Identical, None), "{name}");
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict, "{name}");
         assert_eq!(again.truth.len(), 0);
@@ -199,7 +199,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
     }
 }
 
-/// Every frame that plans, solved again alone: the same landing, and the warm start is worth its name.
+/// Every planning frame, solved again: the same landing, and the warm start needs fewer iterations.
 #[test]
 fn every_plan_solved_again_is_the_flown_one() {
     let recording = recording();
@@ -249,7 +249,7 @@ fn a_sweep_does_not_depend_on_jobs() {
     assert!(fly(&flights, 2).unwrap_err().to_string().contains("truth.impulse_scale"));
 }
 
-/// The verdict really is another on the two sides of the value found.
+/// The verdicts on the two sides of the value found really differ.
 #[test]
 fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
     let recording = recording();
@@ -278,7 +278,7 @@ fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
 }
 
 #[test]
-fn every_question_answers_by_the_command() {
+fn every_command_answers_for_a_flight_from_apogee() {
     let log = &LANDED.log;
     let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0"]));
     assert!(code == 0 && stdout.contains("open loop") && stdout.contains("POWERED"), "{stdout}{stderr}");
@@ -306,7 +306,7 @@ fn every_question_answers_by_the_command() {
 
 /// The record claims another command; this build, flying on from there, lands as the vehicle did.
 #[test]
-fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
+fn a_divergence_report_says_whether_the_verdict_would_change() {
     let recording = recording();
     let path = LANDED.beside("forged.mcap");
     let header = LogHeader {
@@ -338,7 +338,7 @@ fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
     );
 }
 
-/// Changes some number of a frame to any bits at all.
+/// Changes some number of a frame to arbitrary bits.
 fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let (input, output) = (&mut tick.input, &mut tick.output);
@@ -369,9 +369,9 @@ fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
-    /// A flight with nonsense in it: every question has an answer or a reason.
+    /// A flight with nonsense in it: every command gives an answer or a reason.
     #[test]
-    fn nonsense_is_answered(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
+    fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
         let mut recording = recording();
         // Around the ignition, where plans begin.
         let lit = |tick: &PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
@@ -393,7 +393,7 @@ proptest! {
     }
 }
 
-/// The C library picks its mathematical kernels by processor; the pilot must not notice.
+/// The C library picks its mathematical kernels by processor; the pilot's results must not depend on that.
 #[test]
 fn its_frames_are_identical_on_a_processor_without_fused_multiply_add() {
     let mut command = replay("verify", &LANDED.log);

@@ -1,4 +1,4 @@
-//! What a test asks to be other.
+//! The changes that a test requests.
 
 use replay::refly::ReflyOptions;
 use replay::settings::Setting;
@@ -12,7 +12,7 @@ pub(crate) fn with(given: &[&str]) -> ReflyOptions {
     ReflyOptions { settings: settings(given), ..ReflyOptions::default() }
 }
 
-/// Those of the plant alone.
+/// The settings of the plant only.
 pub(crate) fn with_plant(given: &[&str]) -> ReflyOptions {
     ReflyOptions { plant_settings: settings(given), ..ReflyOptions::default() }
 }

@@ -1,4 +1,4 @@
-//! The command itself: exit codes, text, JSON, and the same bits on another processor.
+//! Tests the command: exit codes, text, JSON, and the same bits on another processor.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -40,11 +40,11 @@ fn an_identical_log_exits_0_with_the_count() {
     let files = Files::new();
     let (code, stdout, _) = run(&mut replay("verify", &files.file(&WHOLE.bytes)));
     let count = FLIGHT.ticks.len();
-    assert!(stdout.ends_with(&format!("{count} of {count} ticks identical\n")), "{stdout}");
+    assert!(stdout.contains(&format!("{count} of {count} ticks identical\n")), "{stdout}");
     assert_eq!(code, 0);
 }
 
-/// The C library picks its mathematical kernels by processor; the controller must not notice.
+/// The C library picks its mathematical kernels by processor; the controller's results must not depend on that.
 #[test]
 fn the_log_is_identical_on_a_processor_without_fused_multiply_add() {
     let files = Files::new();
@@ -107,11 +107,11 @@ fn a_log_broken_in_the_middle_says_what_span_is_lost() {
     let lost_s = FLIGHT.ticks.len() as f64 * 0.1 - until_s;
     assert_eq!(code, 0);
     assert!(stdout.contains(&format!("readable until {until_s:.3} s")), "{stdout}");
-    assert!(stdout.contains(&format!("{lost_s:.3} s behind that are lost")), "{stdout}");
+    assert!(stdout.contains(&format!("{lost_s:.3} s after that are lost")), "{stdout}");
 }
 
 #[test]
-fn what_cannot_be_answered_exits_2_with_the_reason() {
+fn a_question_without_an_answer_exits_2_with_the_reason() {
     let files = Files::new();
     for bytes in [&b""[..], b"\x89PNG\r\n\x1a\n", &foreign_mcap("/pose"), b"\x89MCAP0\r\n"] {
         let file = files.file(bytes);

@@ -1,4 +1,4 @@
-//! The other questions through the command: exit codes, formats, and what is said when there is no answer.
+//! Tests the other subcommands: exit codes, formats, and the messages if there is no answer.
 
 use crate::command_line::{Files, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
@@ -30,7 +30,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
 
 /// The record claims another command; this build, flying on from there, lands as the vehicle did.
 #[test]
-fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
+fn a_divergence_report_says_whether_the_verdict_would_change() {
     let recording = NOMINAL.recording();
     let path = NOMINAL.beside("forged.mcap");
     let options = replay::refly::ReflyOptions::default();
@@ -44,7 +44,7 @@ fn of_a_divergence_it_is_said_whether_the_verdict_would_change() {
         stdout.contains("verdict: would not change: recorded LANDED, flown on by this build from tick"),
         "{stdout}"
     );
-    // A weak motor that the record knows of is weak again when it is flown on.
+    // A motor that is weak in the record is weak again when the flight is continued.
     let weak = replay::refly::ReflyOptions {
         plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],
         ..options
@@ -123,7 +123,7 @@ fn a_sweep_says_the_same_on_any_processor_and_any_number_of_threads() {
     assert_eq!(sweep("2", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4").1, one);
 }
 
-/// One log among several that cannot be read is an error of its own, and the others are verified all the same.
+/// One unreadable log among several is a separate error, and the others are still verified.
 #[test]
 fn an_unreadable_log_does_not_hide_the_others() {
     let files = Files::new();
@@ -166,15 +166,15 @@ fn a_bisection_is_shown() {
         ["plant.thrust_scale", "--of-plant", "--value", "1", "--lowest", "0.95", "--highest", "1.01"];
     let (code, stdout, _) = run(replay("bisect", &NOMINAL.log).args(arguments));
     assert_eq!(code, 0);
-    assert!(stdout.contains("the smallest change that turns the verdict: -"), "{stdout}");
+    assert!(stdout.contains("the smallest change that changes the verdict: -"), "{stdout}");
     let (code, _, stderr) =
         run(replay("bisect", &NOMINAL.log).args(["a.b", "--lowest", "2", "--highest", "1"]));
     assert!(code == 2 && stderr.contains("must be below"), "{stderr}");
 }
 
-/// Out into every format and in again.
+/// Exports to every format and imports again.
 #[test]
-fn logs_go_out_and_come_in_by_the_command() {
+fn the_command_exports_and_imports_logs() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     for format in ["csv", "parquet"] {
@@ -200,7 +200,7 @@ fn logs_go_out_and_come_in_by_the_command() {
 }
 
 #[test]
-fn a_recovery_is_told_and_never_overwrites() {
+fn a_recovery_is_reported_and_never_overwrites() {
     let files = Files::new();
     let (at, ticks) = WHOLE.synced[4];
     let cut = files.file(&WHOLE.bytes[..usize::try_from(at).unwrap() + 5]);
@@ -220,9 +220,9 @@ fn a_recovery_is_told_and_never_overwrites() {
     assert!(code == 2 && stderr.contains("is not a flight log"), "{stderr}");
 }
 
-/// Every question refuses what is no log, with the file's name and exit code 2.
+/// Every command refuses a file that is not a log, with the file's name and exit code 2.
 #[test]
-fn every_question_refuses_what_is_no_log() {
+fn every_command_refuses_a_file_that_is_not_a_log() {
     let files = Files::new();
     let output = files.directory.path().join("output");
     let output = output.to_str().unwrap();

@@ -1,10 +1,10 @@
-//! Logs that are cut or broken: no panic, everything before the damage is used, and no damage goes unnoticed.
+//! Tests cut and broken logs: no panic, everything before the damage is used, and no damage goes unnoticed.
 
 use proptest::prelude::*;
 use protocol::log::v1::ControllerTick;
 use replay::info::{GradeLevel, info_of};
 use replay::log::{Entry, FlightLog, LogError};
-use replay::verify::Outcome;
+use replay::verify::Verification;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
 
@@ -28,13 +28,13 @@ fn data_end() -> usize {
 #[test]
 fn a_log_cut_anywhere_yields_what_was_synced_before_the_cut() {
     let bytes = &WHOLE.bytes;
-    // A prime number of bytes meets every place inside a record; and exactly at and around each sync.
+    // Cuts at multiples of a prime reach every position inside a record; others are exactly at and around each sync.
     let around_syncs =
         WHOLE.synced.iter().flat_map(|(at, _)| (at - 1)..=(at + 1)).map(|at| usize::try_from(at).unwrap());
     for cut in (1..data_end()).step_by(37).chain(around_syncs) {
         let later = WHOLE.synced.partition_point(|(at, _)| *at <= cut as u64);
         let safe = later.checked_sub(1).map_or(0, |last| WHOLE.synced[last].1);
-        // The messages of a sync are whole some bytes before the sync itself is.
+        // The messages of a sync are complete some bytes before the sync itself.
         let most = WHOLE.synced.get(later).map_or(safe, |(_, ticks)| *ticks);
         match read_ticks(&bytes[..cut]) {
             Ok((ticks, damaged)) => {
@@ -52,7 +52,7 @@ fn the_readable_part_of_a_cut_log_is_verified() {
     for place in [0, 3, 7] {
         let (at, ticks) = WHOLE.synced[place];
         let report = verify_bytes(&WHOLE.bytes[..usize::try_from(at).unwrap() + 11]).unwrap();
-        assert_eq!(report.outcome, Outcome::IdenticalReadablePart);
+        assert_eq!(report.outcome, Verification::IdenticalReadablePart);
         assert_eq!(report.ticks_identical, ticks as u64);
         assert!(report.damage.unwrap().contains("without an end mark"));
     }
@@ -71,7 +71,7 @@ fn a_cut_log_is_described_up_to_the_cut() {
     assert!((until_s - (ticks - 1) as f64 * 0.1).abs() < 1e-6, "{until_s}");
 }
 
-/// Records shorter than their own fields, of every type there is and is not, behind a good beginning.
+/// Records shorter than their fields, of every known and unknown type, after a good beginning.
 #[test]
 fn a_record_too_short_for_its_type_ends_the_reading() {
     let beginning = &WHOLE.bytes[..usize::try_from(WHOLE.synced[0].0).unwrap()];
@@ -83,7 +83,7 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
             bytes.extend(std::iter::repeat_n(0, usize::from(length)));
             let (ticks, damaged) = read_ticks(&bytes).unwrap();
             assert_eq!(ticks.len(), WHOLE.synced[0].1, "type {opcode}, {length} bytes");
-            // An end of data of four bytes, with no checksum, is one.
+            // An end-of-data record of four bytes, without a checksum, is valid.
             assert!(damaged || opcode == mcap::records::op::DATA_END, "type {opcode}, {length} bytes");
         }
     }
@@ -126,16 +126,16 @@ proptest! {
         }
     }
 
-    /// Behind the data there is only what this reader does not need.
+    /// After the data there is only what this reader does not need.
     #[test]
-    fn a_broken_summary_costs_nothing(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
+    fn a_broken_summary_loses_no_tick(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
         let mut bytes = WHOLE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
         let (ticks, damaged) = read_ticks(&bytes).unwrap();
         prop_assert_eq!((ticks.len(), damaged), (FLIGHT.ticks.len(), false));
     }
 
-    /// Whole stretches of another file.
+    /// Overwrites stretches of the log with bytes of another file.
     #[test]
     fn an_overwritten_stretch_is_survived(
         place in 8..data_end(), stretch in prop::collection::vec(any::<u8>(), 1..400),

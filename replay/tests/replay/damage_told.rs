@@ -1,4 +1,4 @@
-//! A log with a flipped byte: whoever asks is told what was not read, and a build server sees no green pass.
+//! Tests a log with a flipped byte: every command says what was not read, and a build server does not see a pass.
 
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String
 }
 
 #[test]
-fn a_flipped_byte_is_no_green_pass() {
+fn a_log_with_a_flipped_byte_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
     for log in [&LANDED.log, &NOMINAL.log] {
         let all = Held::read(log).ticks();
@@ -63,14 +63,14 @@ fn a_flipped_byte_is_no_green_pass() {
         assert!(failure["message"].contains(&unread), "{xml}");
         assert!(xml.contains("unreadable near byte"), "{xml}");
 
-        // Whoever wants the readable part alone says so, and the XML says it too.
+        // A user can ask for the readable part only, and then the XML says so.
         let (code, xml, _) = run(replay("verify", &path).args(["--junit", "--strict=false"]));
         assert_eq!(code, 0, "{xml}");
         assert!(xml.contains("failures=\"0\"") && xml.contains(&unread), "{xml}");
     }
 }
 
-/// Whatever question reads a damaged log says so.
+/// Every command that reads a damaged log says so.
 #[test]
 fn no_command_is_silent_about_damage() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,8 +1,8 @@
-//! One changed bit in one recorded output is found at its tick and field.
+//! Tests that one changed bit in one recorded output is found at its tick and field.
 
 use proptest::prelude::*;
 use protocol::log::v1::ControllerTick;
-use replay::verify::{FieldValue, Outcome};
+use replay::verify::{FieldValue, Verification};
 
 use crate::flown::{FLIGHT, WHOLE, verify_bytes, verify_ticks};
 
@@ -81,7 +81,7 @@ const FIELDS: [(&str, Flip); 21] = [
 #[test]
 fn the_flight_is_identical() {
     let report = verify_bytes(&WHOLE.bytes).unwrap();
-    assert_eq!(report.outcome, Outcome::Identical, "{report:?}");
+    assert_eq!(report.outcome, Verification::Identical, "{report:?}");
     assert_eq!(report.ticks_identical, FLIGHT.ticks.len() as u64);
     assert!(report.ticks_compared > 50, "a whole landing is compared");
     assert_eq!(report.build.differences, []);
@@ -94,8 +94,8 @@ fn every_kind_of_field_is_compared() {
         flip(tick, 0);
     }
     let report = verify_ticks(&ticks);
-    assert_eq!(report.outcome, Outcome::Diverged);
-    assert_eq!(report.ticks_different, FIELDS.len() as u64, "one change a tick, and none spreads");
+    assert_eq!(report.outcome, Verification::Diverged);
+    assert_eq!(report.ticks_different, FIELDS.len() as u64, "one change in each tick, and none spreads");
     assert_eq!(report.fields_different, FIELDS.len() as u64);
     assert_eq!(report.first_divergence.unwrap().tick, 1);
 }
@@ -122,7 +122,7 @@ fn measured_times_are_not_compared() {
     assert_eq!((report.ticks_different, report.obstacle), (0, None));
 }
 
-/// An input that is not a number reaches the controller with its payload and leads to the same fallback again.
+/// A NaN input reaches the controller with its payload and leads to the same fallback again.
 #[test]
 fn an_input_that_is_not_a_number_is_replayed_like_any_other() {
     let payload = f64::from_bits(0x7ff8_dead_beef_0001);
@@ -130,7 +130,7 @@ fn an_input_that_is_not_a_number_is_replayed_like_any_other() {
     ticks[7].input.state.u_m_s = payload;
     let report = verify_ticks(&ticks);
     assert_eq!(report.ticks_compared, 8);
-    assert_eq!(report.first_divergence.unwrap().tick, 7, "the recorded output was that of another input");
+    assert_eq!(report.first_divergence.unwrap().tick, 7, "the recorded output belonged to another input");
 }
 
 proptest! {
@@ -144,7 +144,7 @@ proptest! {
         let mut ticks = FLIGHT.ticks[..25].to_vec();
         flip(&mut ticks[place], bit);
         let report = verify_ticks(&ticks);
-        prop_assert_eq!(report.outcome, Outcome::Diverged);
+        prop_assert_eq!(report.outcome, Verification::Diverged);
         prop_assert_eq!((report.ticks_different, report.fields_different), (1, 1));
         let first = report.first_divergence.unwrap();
         prop_assert_eq!(first.tick, place as u64);

@@ -1,15 +1,13 @@
-//! A short landing flown by the real controller against its own model, and logs of it.
+//! Flies a short landing with the real controller against its own model, and writes logs of it.
 
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
 use std::sync::LazyLock;
 
-use flight::controller::{ControllerConfig, ControllerInput, ControllerState, step};
-use flight::dynamics::PlanarModel;
-use flight::phase::Phase;
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::guidance::controller::{ControllerConfig, ControllerInput, ControllerState, step};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
@@ -32,15 +30,15 @@ pub(crate) struct Flight {
 /// The landing every test starts from, flown once.
 pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| fly(|_| ()));
 
-/// Pad, release and landing burn to the ground; the plant is the controller's own model, stepped at 1 ms. What the
-/// controller is told may be changed.
+/// Pad, release and landing burn to the ground; the plant is the controller's own model, stepped at 1 ms. The
+/// controller's inputs may be changed.
 pub(crate) fn fly(tell: impl Fn(&mut ControllerInput)) -> Flight {
-    let profile = Profile::builtin(PROFILE).unwrap();
+    let profile = vehicles::profile::builtin(PROFILE).unwrap();
     let config = ControllerConfig::from_profile(&profile);
-    let model = PlanarModel::from_profile(&profile);
+    let model = profile.planar_model();
     let mut controller = ControllerState::new(&config);
     let mut plant = profile.start.planar_state();
-    // What a tick commands is held during the next one.
+    // The command of a tick is held during the next one.
     let mut held_rad = 0.0;
     let mut ticks = Vec::new();
     for tick in 0..1000_u64 {
@@ -83,7 +81,7 @@ pub(crate) fn fly(tell: impl Fn(&mut ControllerInput)) -> Flight {
     panic!("the test flight has not come down");
 }
 
-/// What a log is written with.
+/// Options of a log.
 pub(crate) struct Recipe {
     pub(crate) profile_toml: Option<String>,
     pub(crate) with_frames: bool,
@@ -91,14 +89,14 @@ pub(crate) struct Recipe {
 
 impl Default for Recipe {
     fn default() -> Self {
-        Self { profile_toml: Profile::builtin_toml(PROFILE).map(str::to_owned), with_frames: true }
+        Self { profile_toml: vehicles::profile::builtin_toml(PROFILE).map(str::to_owned), with_frames: true }
     }
 }
 
 /// A written log.
 pub(crate) struct Written {
     pub(crate) bytes: Vec<u8>,
-    /// After how many bytes how many ticks were safe on the disk.
+    /// File size and number of ticks at each sync.
     pub(crate) synced: Vec<(u64, usize)>,
 }
 
@@ -192,6 +190,6 @@ pub(crate) fn verify_ticks(ticks: &[v1::ControllerTick]) -> VerifyReport {
 pub(crate) fn idle_tick(number: u64) -> v1::ControllerTick {
     let mut tick = FLIGHT.ticks[0].clone();
     tick.input.tick = number;
-    tick.input.state = state_to_log(&Profile::builtin(PROFILE).unwrap().start.planar_state());
+    tick.input.state = state_to_log(&vehicles::profile::builtin(PROFILE).unwrap().start.planar_state());
     tick
 }

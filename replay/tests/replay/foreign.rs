@@ -1,4 +1,4 @@
-//! Files that are no flight logs: what was found and what would be accepted.
+//! Tests files that are not flight logs: the message says what was found and what would be accepted.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

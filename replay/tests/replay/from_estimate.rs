@@ -1,6 +1,6 @@
-//! A flight from apogee, flown again from where its flight computer believed to be.
+//! Tests a flight from apogee that is flown again from its estimated position.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use replay::log::Recording;
 use replay::refly::{From, ReflyOptions, StartAt, refly};
 
@@ -16,7 +16,7 @@ fn the_vehicle_is_where_the_estimate_was() {
     let (true_one, believed) = (at(From::Truth).unwrap(), at(From::Estimate).unwrap());
     assert_eq!((believed.start.from, believed.start.tick), (From::Estimate, true_one.start.tick));
     assert_eq!(believed.reached, true_one.reached);
-    // The estimate is off, by what such an estimate is off.
+    // The estimate has an error of plausible size.
     let off_m =
         (believed.start.x_m - true_one.start.x_m).abs() + (believed.start.z_m - true_one.start.z_m).abs();
     assert!(off_m > 1e-6 && off_m < 5.0, "{off_m} m");
@@ -25,7 +25,7 @@ fn the_vehicle_is_where_the_estimate_was() {
 }
 
 #[test]
-fn where_nothing_was_estimated_it_is_refused() {
+fn a_start_without_an_estimate_is_refused() {
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.frames.last().unwrap().input.frame;
     for (tick, reason) in [(1, "estimated nothing yet"), (last, "on the ground already")] {

@@ -1,4 +1,4 @@
-//! Logs that are too long, hollow, or full of numbers that no flight has: an answer or a reason, in bounded memory.
+//! Tests logs that are too long, sparse, or full of impossible numbers: an answer or a reason, in bounded memory.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -18,7 +18,7 @@ use replay::tick::tick;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 
-/// Runs the command with so much memory and no more; the answer, and what it said.
+/// Runs the command with limited memory; returns the result and the output.
 fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
     let kilobytes = 1024 * megabytes;
     let command = format!("ulimit -v {kilobytes}; exec \"$@\"");
@@ -32,7 +32,7 @@ fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
     (output.status.code().unwrap(), String::from_utf8(said).unwrap())
 }
 
-/// Ten gigabytes, nearly all of them a hole: what stands before it is used.
+/// Ten gigabytes, nearly all of them a hole: everything before the hole is used.
 #[test]
 fn a_hollow_log_is_used_up_to_its_hole() {
     let directory = tempfile::tempdir().unwrap();
@@ -63,7 +63,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     assert!(code == 2 && said.contains("is not a flight log"), "{said}");
 }
 
-/// Writes a log of so many bytes or a little more; how many ticks it has.
+/// Writes a log of at least this many bytes; returns its number of ticks.
 fn write_long_log(path: &Path, bytes: u64) -> u64 {
     let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
     let mut writer = LogWriter::new(file, &LogHeader::default()).unwrap();
@@ -87,7 +87,7 @@ fn write_long_log(path: &Path, bytes: u64) -> u64 {
     number
 }
 
-/// Whether a log is described in so much memory and no more.
+/// Whether `info` works within this much memory.
 fn assert_described_within(megabytes: u32, bytes: u64) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.mcap");
@@ -124,7 +124,7 @@ fn a_gigabyte_is_described_within_200_megabytes() {
     assert_described_within(200, 1 << 30);
 }
 
-/// Changes some number of a tick to any bits at all.
+/// Changes some number of a tick to arbitrary bits.
 fn spoil(tick: &mut ControllerTick, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let input = &mut tick.input;
@@ -150,9 +150,9 @@ fn spoil(tick: &mut ControllerTick, field: usize, bits: u64) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// A log whose checksums hold and whose numbers are nonsense: every question has an answer or a reason.
+    /// A log with correct checksums and nonsense numbers: every command gives an answer or a reason.
     #[test]
-    fn nonsense_is_answered(spoilt in prop::collection::vec((0_usize..30, 0_usize..15, any::<u64>()), 1..12)) {
+    fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..30, 0_usize..15, any::<u64>()), 1..12)) {
         let mut ticks = FLIGHT.ticks[..30].to_vec();
         for (place, field, bits) in spoilt {
             spoil(&mut ticks[place], field, bits);
@@ -174,9 +174,9 @@ proptest! {
         }
         prop_assert!(report(&path).unwrap().html.ends_with("</html>\n"));
         let flown = Flown::open(&path).unwrap();
-        // A flight is equal to itself, in all that stands in order and before a cut.
+        // A flight is equal to itself, in all samples that are in order and before a cut.
         let compared = compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap();
-        let of_record = |failure: &String| failure.contains("behind later ones") || failure.contains("INCOMPLETE");
+        let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
         let points = grid(&["nmpc.weights.w=50:90:2".parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(2);

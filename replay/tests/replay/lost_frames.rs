@@ -1,4 +1,4 @@
-//! Frames that a damaged log has lost: no restart of the flight computer, for any question.
+//! Tests frames that a damaged log has lost: no command takes them for a restart of the flight computer.
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
@@ -10,7 +10,7 @@ use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
 use replay::tick::{TickError, tick};
-use replay::verify::{Obstacle, Outcome, verify};
+use replay::verify::{Obstacle, Verification, verify};
 
 use crate::command_line::{replay, run};
 use crate::flown::only;
@@ -29,7 +29,7 @@ pub(crate) static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
     recovered
 });
 
-/// The last frame before the loss, the first behind it, and the last of all.
+/// The last frame before the loss, the first after it, and the last of all.
 fn around_the_loss(recording: &Recording) -> (u64, u64, u64) {
     let gap = recording.gap().unwrap();
     let last = recording.frames.last().unwrap().input.frame;
@@ -42,25 +42,25 @@ fn verify_ends_at_the_loss() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before, _) = around_the_loss(&recording);
     let report = only(verify(&RECOVERED).unwrap());
-    assert_eq!(report.outcome, Outcome::NotReplayable, "{report:?}");
+    assert_eq!(report.outcome, Verification::NotReplayable, "{report:?}");
     assert_eq!(report.obstacle, Some(Obstacle::Gap { after, before }));
     assert_eq!((report.first_divergence, report.ticks_identical), (None, after));
 }
 
 #[test]
-fn what_is_evaluated_ends_at_the_loss_and_that_is_said() {
+fn an_evaluation_ends_at_the_loss_and_says_so() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before, _) = around_the_loss(&recording);
     let evaluated = evaluate(&recording, &[]).unwrap();
     assert_eq!(evaluated.ticks.last().unwrap().tick, after);
     assert!(evaluated.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
     let (code, _, stderr) = run(&mut replay("evaluate", &RECOVERED));
-    let warning = format!("after tick {after} comes tick {before}; nothing behind the gap was run again");
+    let warning = format!("after tick {after} comes tick {before}; nothing after the gap was run again");
     assert!(code == 0 && stderr.contains(&warning), "{stderr}");
 }
 
 #[test]
-fn a_tick_behind_the_loss_is_refused() {
+fn a_tick_after_the_loss_is_refused() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before, _) = around_the_loss(&recording);
     assert!(tick(&recording, after).unwrap().identical);
@@ -80,9 +80,9 @@ fn the_grade_says_how_far_it_goes() {
     assert_eq!((frames.restarts, frames.lost, frames.first_lost), (0, 0, None));
 }
 
-/// The flight is flown again from what it was drawn from; frames on both sides of the loss are held against it.
+/// The flight is flown again from its draw and compared with the frames on both sides of the loss.
 #[test]
-fn a_flight_is_flown_again_over_the_loss() {
+fn a_flight_is_flown_again_across_the_loss() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let flown = refly(&recording, &ReflyOptions::default()).unwrap();
     let reached = flown.reached.unwrap();
@@ -97,7 +97,7 @@ fn the_report_says_how_far_it_goes() {
     assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");
 }
 
-/// Where the very first frames are lost, nothing can be run again.
+/// If the first frames are lost, nothing can be executed again.
 #[test]
 fn without_its_first_frames_nothing_is_run_again() {
     let mut recording = Recording::open(&LANDED.log).unwrap();

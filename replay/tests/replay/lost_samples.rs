@@ -1,4 +1,4 @@
-//! Comparisons of flights of which one has lost records: what is missing counts, whichever of the two lost it.
+//! Tests comparisons in which one flight has lost records: missing samples count, whichever flight lost them.
 
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ fn a_flight_that_lost_half_its_ticks_does_not_pass() {
         let (code, stdout, _) = run(replay("compare", log).arg(&thinned));
         assert_eq!(code, 1, "{stdout}");
         assert!(stdout.contains(&format!("{truth}: ")) && stdout.contains("samples are missing"), "{stdout}");
-        // The other way round the samples are too many, which is the same loss.
+        // The other way round there are too many samples, which is the same loss.
         let (code, stdout, _) = run(replay("compare", &thinned).arg(log));
         assert_eq!(code, 1, "{stdout}");
         assert!(stdout.contains("samples are added"), "{stdout}");
@@ -97,7 +97,7 @@ fn a_lost_topic_does_not_pass() {
     }
 }
 
-/// Two logs with the same damage agree in all that could be read, which is not all there was.
+/// Two logs with the same damage agree in everything that could be read, but that is not the whole flight.
 #[test]
 fn a_damaged_log_does_not_pass_unless_that_is_tolerated() {
     let directory = tempfile::tempdir().unwrap();

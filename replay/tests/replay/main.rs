@@ -1,4 +1,4 @@
-//! Logs of a flown landing, whole, changed, cut and broken, through the library and through the command.
+//! Tests with logs of a landing, whole, changed, cut and broken, through the library and through the command.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod aborted;
@@ -10,10 +10,12 @@ mod commands;
 mod damage;
 mod damage_told;
 mod divergence;
+mod earlier_releases;
 mod flown;
 mod foreign;
 mod from_apogee;
 mod from_estimate;
+mod from_power_up;
 mod limits;
 mod lost_frames;
 mod lost_samples;

@@ -1,4 +1,4 @@
-//! Logs whose ticks cannot all be re-executed: the reason is named, and what can be compared is.
+//! Tests logs whose ticks cannot all be re-executed: the reason is named, and the other ticks are compared.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use protocol::log::v1::ControllerTick;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info_of};
 use replay::log::{FlightLog, Recording};
-use replay::verify::{Obstacle, Outcome};
+use replay::verify::{Obstacle, Verification};
 
 use crate::flown::{FLIGHT, PROFILE, Recipe, WHOLE, verify_bytes, verify_ticks, write_log};
 
@@ -15,47 +15,47 @@ fn info_of_bytes(bytes: &[u8]) -> Info {
 }
 
 #[test]
-fn no_ticks() {
+fn a_log_without_ticks_is_refused() {
     let bytes = write_log(&[], &Recipe::default()).bytes;
     let report = verify_bytes(&bytes).unwrap();
-    assert_eq!((report.outcome, report.obstacle), (Outcome::NotReplayable, Some(Obstacle::NoTicks)));
+    assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoTicks)));
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::TelemetryOnly);
 }
 
 #[test]
-fn no_profile() {
+fn a_log_without_a_profile_is_refused() {
     let bytes = write_log(&FLIGHT.ticks[..3], &Recipe { profile_toml: None, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
-    assert_eq!((report.outcome, report.obstacle), (Outcome::NotReplayable, Some(Obstacle::NoProfile)));
+    assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoProfile)));
     assert_eq!(report.ticks_recorded, 3);
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::Numeric);
 }
 
 #[test]
-fn a_profile_of_another_kind() {
+fn a_profile_of_another_kind_is_refused() {
     let profile_toml = Some("name = \"x\"\nwings = 2\n".to_owned());
     let bytes = write_log(&FLIGHT.ticks[..3], &Recipe { profile_toml, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
-    assert_eq!(report.outcome, Outcome::NotReplayable);
+    assert_eq!(report.outcome, Verification::NotReplayable);
     let reason = report.obstacle.unwrap().to_string();
     assert!(reason.contains("profile.toml"), "{reason}");
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::Numeric);
 }
 
 #[test]
-fn the_beginning_is_missing() {
+fn a_log_without_its_first_ticks_is_refused() {
     let report = verify_ticks(&FLIGHT.ticks[2..5]);
     assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing { first: 2 }));
-    assert_eq!((report.outcome, report.ticks_compared), (Outcome::NotReplayable, 0));
+    assert_eq!((report.outcome, report.ticks_compared), (Verification::NotReplayable, 0));
 }
 
 #[test]
-fn up_to_a_gap_the_ticks_are_compared() {
+fn ticks_before_a_gap_are_compared() {
     let mut ticks = FLIGHT.ticks[..9].to_vec();
     ticks.drain(4..6);
     let report = verify_ticks(&ticks);
     assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 3, before: 6 }));
-    assert_eq!((report.outcome, report.ticks_identical), (Outcome::NotReplayable, 4));
+    assert_eq!((report.outcome, report.ticks_identical), (Verification::NotReplayable, 4));
 
     let info = info_of_bytes(&write_log(&ticks, &Recipe::default()).bytes);
     assert_eq!((info.completeness.complete, info.completeness.ticks_missing), (false, 2));
@@ -63,11 +63,11 @@ fn up_to_a_gap_the_ticks_are_compared() {
 
     ticks[2].output.gimbal_command_rad = 0.5;
     let report = verify_ticks(&ticks);
-    assert_eq!(report.outcome, Outcome::Diverged, "a difference before the gap is still a difference");
+    assert_eq!(report.outcome, Verification::Diverged, "a difference before the gap is still a difference");
 }
 
 #[test]
-fn ticks_in_another_order_are_put_in_theirs() {
+fn ticks_out_of_order_are_sorted() {
     let mut ticks = FLIGHT.ticks[..9].to_vec();
     ticks[1..7].reverse();
     let report = verify_ticks(&ticks);
@@ -75,26 +75,26 @@ fn ticks_in_another_order_are_put_in_theirs() {
 }
 
 #[test]
-fn a_tick_twice() {
+fn a_repeated_tick_is_reported() {
     let mut ticks = FLIGHT.ticks[..4].to_vec();
     ticks.push(ticks[2].clone());
     let report = verify_ticks(&ticks);
     assert_eq!(report.obstacle, Some(Obstacle::Repeated { tick: 2 }));
-    assert_eq!((report.outcome, report.ticks_identical), (Outcome::NotReplayable, 4));
+    assert_eq!((report.outcome, report.ticks_identical), (Verification::NotReplayable, 4));
 }
 
 #[test]
-fn a_phase_of_another_version() {
+fn a_phase_of_another_version_is_refused() {
     let mut ticks = FLIGHT.ticks[..4].to_vec();
     ticks[3].input.phase = 77;
     let report = verify_ticks(&ticks);
-    assert_eq!((report.outcome, report.ticks_identical), (Outcome::NotReplayable, 3));
+    assert_eq!((report.outcome, report.ticks_identical), (Verification::NotReplayable, 3));
     assert!(report.obstacle.unwrap().to_string().contains("phase 77"));
 }
 
-/// A tick with a field that this build does not know was decided by something that this build cannot run.
+/// A tick with an unknown field was decided by code that this build does not have.
 #[test]
-fn a_tick_of_a_newer_version() {
+fn a_tick_of_a_newer_version_is_refused() {
     let mut writer =
         mcap::WriteOptions::new().library("touchdown test").create(Cursor::new(Vec::new())).unwrap();
     let schema = writer.add_schema("touchdown.log.v1.ControllerTick", "protobuf", &[]).unwrap();
@@ -109,7 +109,7 @@ fn a_tick_of_a_newer_version() {
     writer.finish().unwrap();
     let bytes = writer.into_inner().into_inner();
     let report = verify_bytes(&bytes).unwrap();
-    assert_eq!(report.outcome, Outcome::NotReplayable);
+    assert_eq!(report.outcome, Verification::NotReplayable);
     let reason = report.obstacle.unwrap().to_string();
     assert!(reason.contains("newer version"), "{reason}");
     let recording =

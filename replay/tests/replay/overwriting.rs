@@ -1,4 +1,4 @@
-//! No command overwrites a file that is there, a log least of all, and none leaves half a file under a whole one's name.
+//! Tests that no command overwrites an existing file, and that none leaves an incomplete file under its final name.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,7 @@ use crate::simulated::{NOMINAL, WITH_FRAMES};
 
 const OTHERS: &[u8] = b"somebody else's bytes";
 
-/// The commands that write a file, with the name of what they write.
+/// The commands that write a file, with the name of that file.
 fn writers() -> Vec<(&'static [&'static str], &'static str)> {
     vec![
         (&["report", "--output"], "page.html"),
@@ -29,7 +29,7 @@ fn listed(directory: &Path) -> Vec<String> {
     names
 }
 
-/// A copy of a log in a directory of its own.
+/// A copy of a log in a new directory.
 fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("flight.mcap");
@@ -57,7 +57,7 @@ fn nothing_that_is_there_is_overwritten_without_force() {
     }
 }
 
-/// Not even with --force, by any name that it has.
+/// Not even with --force or under another name of the same file.
 #[test]
 fn the_log_that_is_read_is_never_written() {
     for (arguments, _) in writers() {
@@ -94,7 +94,7 @@ fn tables_and_imports_overwrite_nothing_either() {
         let (code, _, stderr) = run(&mut command);
         assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
         assert_eq!(std::fs::read(&table).unwrap(), OTHERS);
-        assert_eq!(listed(&at("tables")), before, "no table stands beside one that was refused");
+        assert_eq!(listed(&at("tables")), before, "no other table is written if one was refused");
         let (code, _, stderr) = run(command.arg("--force"));
         assert_eq!(code, 0, "{stderr}");
         assert_ne!(std::fs::read(&table).unwrap(), OTHERS);
@@ -102,7 +102,7 @@ fn tables_and_imports_overwrite_nothing_either() {
     let tlog = at("flight.tlog");
     run(replay("export", &log).args(["--to", "tlog", "--output"]).arg(&tlog));
     let before = std::fs::read(&log).unwrap();
-    // Its output's name, left out, is that of the flight's own log.
+    // Without an output name, the default name is that of the flight's own log.
     let (code, _, stderr) = run(&mut replay("import", &tlog));
     assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
     assert_eq!(std::fs::read(&log).unwrap(), before);
@@ -112,7 +112,7 @@ fn tables_and_imports_overwrite_nothing_either() {
     assert_eq!(code, 0, "{stderr}");
 }
 
-/// The page of a flight whose name is left out does not replace one that was edited.
+/// A page with the default name does not replace one that was edited.
 #[test]
 fn a_report_twice_needs_force() {
     let (_directory, log) = copied(&NOMINAL.log);
@@ -122,14 +122,14 @@ fn a_report_twice_needs_force() {
     assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
     let (code, ..) = run(replay("report", &log).arg("--force"));
     assert_eq!(code, 0);
-    // A device is no file that could be lost.
+    // A device has no content that could be lost.
     let (code, stdout, stderr) = run(replay("report", &log).args(["--output", "/dev/stdout"]));
     assert!(code == 0 && stdout.contains("</html>"), "{stderr}");
 }
 
-/// A command that fails on its way leaves what was there, and nothing half.
+/// A command that fails keeps the old file and leaves no incomplete one.
 #[test]
-fn what_fails_on_the_way_replaces_nothing() {
+fn a_command_that_fails_replaces_nothing() {
     let files = Files::new();
     // Cut before its first record.
     let broken = files.file(&WHOLE.bytes[..8]);
@@ -147,14 +147,14 @@ fn what_fails_on_the_way_replaces_nothing() {
     }
 }
 
-/// A disk that is full before the output is whole.
+/// The disk is full before the output is complete.
 #[test]
 fn half_an_output_replaces_nothing() {
     for (arguments, name) in writers() {
         let (directory, log) = copied(&WITH_FRAMES.log);
         let output = directory.path().join(name);
         std::fs::write(&output, OTHERS).unwrap();
-        // Files of a few kilobytes and no more; what is written behind that fails.
+        // File size is limited to a few kilobytes; writing more fails.
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_replay")]);
         command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output).arg("--force");
@@ -171,9 +171,9 @@ fn half_an_output_replaces_nothing() {
     assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
 }
 
-/// Another sweep's state, or any other file, is never continued with.
+/// The state of another sweep, or any other file, is never continued.
 #[test]
-fn a_sweeps_state_spares_other_files() {
+fn a_sweep_state_never_replaces_other_files() {
     let (directory, log) = copied(&NOMINAL.log);
     for state in [log.clone(), directory.path().join("notes.txt")] {
         if state != log {

@@ -1,4 +1,4 @@
-//! The report of a flight: well-formed, self-contained, and with what it promises.
+//! Tests the report of a flight: well-formed, self-contained and complete.
 
 use quick_xml::events::Event as Xml;
 use replay::report::report;
@@ -7,7 +7,7 @@ use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::LANDED;
 use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
 
-/// Every tag is closed, and nothing outside the page is named.
+/// Every tag is closed, and the page refers to nothing outside itself.
 fn check(page: &str) {
     let mut reader = quick_xml::Reader::from_str(page);
     reader.config_mut().check_end_names = true;
@@ -61,7 +61,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
     assert!(report(&WITH_FRAMES.log).unwrap().html.contains("/mavlink/tx/raw"));
 }
 
-/// A flight from apogee is seen in the plane of its landing; its plans are those that the flight computer makes again.
+/// A flight from apogee is shown in the plane of its landing; the flight computer is run again to get its plans.
 #[test]
 fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
     let page = report(&LANDED.log).unwrap().html;
@@ -88,7 +88,7 @@ fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
     assert!(page.contains(">planned<"));
 }
 
-/// Ticks alone, a log that is cut, one of no flight at all, and names that are markup.
+/// Logs with ticks only, a cut log, a log without a flight, and names that contain markup.
 #[test]
 fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let directory = tempfile::tempdir().unwrap();
@@ -109,7 +109,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     assert!(page.contains("without an end mark") && page.contains("cut &lt;b&gt;&amp;.mcap"));
     let page =
         page_of("empty.mcap", &write_log(&[], &Recipe { with_frames: false, ..Recipe::default() }).bytes);
-    assert!(page.contains("does not tell where the vehicle was"));
+    assert!(page.contains("has no positions of the vehicle"));
     let path = directory.path().join("no.mcap");
     std::fs::write(&path, b"something else").unwrap();
     assert!(report(&path).is_err());
@@ -124,5 +124,5 @@ fn telemetry_alone_makes_a_page() {
     replay::import::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
-    assert!(page.contains("From what a ground station heard") && page.contains("LANDED at"));
+    assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED at"));
 }

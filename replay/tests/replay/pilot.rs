@@ -1,19 +1,20 @@
-//! Logs of the flight computer from apogee on: its frames are executed again, over restarts, bit for bit.
+//! Tests logs of the flight computer from apogee: its frames are executed again, across restarts, bit for bit.
 
 use std::io::{Cursor, Read as _, Seek as _};
 use std::sync::LazyLock;
 
-use flight::estimator::{ImuSample, Measurements, StartUncertainty};
-use flight::mission::Mission;
-use flight::pilot::{Pilot, PilotInput, Sensed};
-use flight::rigid::RigidState;
+use flight::computer::pilot::{PilotInput, Sensed};
+use flight::computer::{Computer, Input};
+use flight::estimation::estimator::{ImuSample, Measurements};
+use flight::guidance::baseline::Law;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{UnitQuaternion, Vector3};
 use protocol::log::flight_v1::{PilotStart, PilotTick};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::info::{GradeLevel, Info, info_of};
 use replay::log::FlightLog;
-use replay::verify::{Obstacle, Outcome};
+use replay::verify::{Obstacle, Verification};
 use tick_log::pilot::{state_to_log, tick_to_log};
 
 use crate::flown::verify_bytes;
@@ -29,24 +30,24 @@ struct Fall {
 }
 
 fn mission_toml() -> &'static str {
-    let (_, text) = flight::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap();
+    let (_, text) = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap();
     text
 }
 
-/// Two seconds of falling with sensors that feel nothing, and a restart on the way.
+/// Two seconds of free fall with sensors that measure nothing, and a restart on the way.
 static FALL: LazyLock<Fall> = LazyLock::new(|| {
-    let mission = Mission::from_toml(mission_toml(), "test").unwrap();
+    let mission = vehicles::mission::from_toml(mission_toml(), "test").unwrap();
     let believed = RigidState {
         position_m: Vector3::new(0.0, 0.0, 120.0),
         velocity_m_s: Vector3::new(2.0, 0.0, 0.0),
         world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -1.2),
         rate_rad_s: Vector3::zeros(),
     };
-    let mut pilot = Pilot::at_apogee(&mission, 0.0, &believed, &StartUncertainty::at_apogee()).unwrap();
+    let mut computer = Computer::in_space(&mission, Law::Nmpc, &believed).released();
     let mut ticks = Vec::new();
     for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
         if frame == DEAD.end() + 1 {
-            pilot = pilot.restarted((frame - 1) as f64 * 5.0 * 1e-3);
+            computer.restart((frame - 1) as f64 * 5.0 * 1e-3);
         }
         let time_s = frame as f64 * 5.0 * 1e-3;
         let imu = ImuSample {
@@ -69,8 +70,9 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             igniter_continuity: true,
             abort: false,
         };
-        let output = pilot.step(&input);
-        ticks.push(tick_to_log(&input, &output, pilot.digest()));
+        computer.step(&Input::in_the_air(&input));
+        let (_, output) = computer.piloted().unwrap();
+        ticks.push(tick_to_log(&input, output, computer.flight_digest()));
     }
     let start = PilotStart {
         time_s: 0.0,
@@ -105,8 +107,8 @@ fn described(bytes: &[u8]) -> Info {
 fn frames_are_identical_over_a_restart() {
     let bytes = write(Some(&FALL.start), &FALL.ticks, Some(mission_toml()));
     let report = verify_bytes(&bytes).unwrap();
-    // All that was recorded; but it was falling still.
-    assert_eq!((report.outcome, report.obstacle), (Outcome::IdenticalReadablePart, None));
+    // Everything recorded was read, but the vehicle was still falling.
+    assert_eq!((report.outcome, report.obstacle), (Verification::IdenticalReadablePart, None));
     assert!((report.cut.unwrap().time_s - 2.0).abs() < 1e-9);
     assert_eq!(report.ticks_identical, FALL.ticks.len() as u64);
     assert_eq!(report.span, Some((1, 400)));
@@ -126,29 +128,29 @@ fn one_changed_bit_is_found_at_its_frame() {
     let command_rad = &mut ticks[place].output.fins_rad[2];
     *command_rad = f64::from_bits(command_rad.to_bits() ^ 1);
     let report = verify_bytes(&write(Some(&FALL.start), &ticks, Some(mission_toml()))).unwrap();
-    assert_eq!((report.outcome, report.ticks_different), (Outcome::Diverged, 1));
+    assert_eq!((report.outcome, report.ticks_different), (Verification::Diverged, 1));
     let first = report.first_divergence.unwrap();
     assert_eq!((first.tick, first.fields_different), (200, 1));
     assert_eq!(first.fields[0].path, "output.fins_rad[2]");
     assert_eq!(first.fields[0].ulps, Some(1));
-    // A lost frame is taken for a restart, after which nothing is as it was.
+    // A lost frame looks like a restart, and everything after it differs.
     let mut lost = FALL.ticks.clone();
     lost.remove(50);
     let report = verify_bytes(&write(Some(&FALL.start), &lost, Some(mission_toml()))).unwrap();
-    assert_eq!(report.outcome, Outcome::Diverged);
+    assert_eq!(report.outcome, Verification::Diverged);
     assert_eq!(report.first_divergence.unwrap().tick, 52);
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn a_missing_record_is_named_in_the_report() {
     let refused = |bytes: Vec<u8>| {
         let report = verify_bytes(&bytes).unwrap();
-        assert_eq!(report.outcome, Outcome::NotReplayable);
+        assert_eq!(report.outcome, Verification::NotReplayable);
         report.obstacle.unwrap()
     };
     assert_eq!(refused(write(None, &FALL.ticks, Some(mission_toml()))), Obstacle::NoStart);
     assert_eq!(refused(write(Some(&FALL.start), &FALL.ticks, None)), Obstacle::NoProfile);
-    let planar = flight::profile::Profile::builtin_toml("paper-calibrated");
+    let planar = vehicles::profile::builtin_toml("paper-calibrated");
     let reason = refused(write(Some(&FALL.start), &FALL.ticks, planar)).to_string();
     assert!(reason.contains("profile.toml"), "{reason}");
     let mut twice = FALL.ticks.clone();

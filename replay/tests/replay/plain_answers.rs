@@ -1,4 +1,4 @@
-//! Answers that could be taken for more than they are: of two kinds of flight, of telemetry alone, of a cut log.
+//! Tests answers that could mislead: two kinds of flight, telemetry only, and a cut log.
 
 use std::path::PathBuf;
 
@@ -18,23 +18,26 @@ fn a_planar_landing_has_no_wind_and_says_so() {
     for given in ["truth.wind_m_s=4", "plant.wind_m_s=4", "wind=4"] {
         let refusal = refly(&recording, &with_plant(&[given])).unwrap_err().to_string();
         assert!(refusal.starts_with(given), "{refusal}");
-        assert!(refusal.contains("of a flight from apogee") && refusal.contains("still air"), "{refusal}");
+        assert!(
+            refusal.contains("only for a flight from apogee") && refusal.contains("still air"),
+            "{refusal}"
+        );
     }
 }
 
-/// A planar landing and a flight from apogee have not one signal in common: that is no agreement.
+/// A planar landing and a flight from apogee have no signal in common, which does not count as agreement.
 #[test]
 fn flights_with_nothing_in_common_are_not_within_tolerance() {
     let (code, stdout, _) = run(replay("compare", &NOMINAL.log).arg(&LANDED.log));
     assert_eq!(code, 1, "{stdout}");
     assert!(stdout.contains("- the logs have no signal in common: nothing was compared"), "{stdout}");
-    // The verdicts stand side by side all the same, each with its own limits.
+    // The verdicts are still printed side by side, each with its own limits.
     for name in ["| pitch error | ", "| vertical speed | - | "] {
         assert!(stdout.contains(name), "{name} is not in\n{stdout}");
     }
 }
 
-/// What is no flight log leaves nothing behind.
+/// A file that is not a flight log leaves no output behind.
 #[test]
 fn a_foreign_file_exports_to_no_folder() {
     let (foreign, tables) = (NOMINAL.beside("foreign.mcap"), NOMINAL.beside("no-tables"));
@@ -52,7 +55,7 @@ fn telemetry_only() -> PathBuf {
 }
 
 #[test]
-fn telemetry_alone_is_refused_for_want_of_ticks() {
+fn telemetry_alone_is_refused_because_it_has_no_ticks() {
     let log = telemetry_only();
     let mut tick = replay("tick", &log);
     tick.arg("3");
@@ -67,9 +70,9 @@ fn telemetry_alone_is_refused_for_want_of_ticks() {
     }
 }
 
-/// Of a log that ends early only what it holds can be the same.
+/// In a log that ends early, only the recorded part can be identical.
 #[test]
-fn a_cut_log_is_held_against_what_it_holds() {
+fn a_cut_log_is_compared_up_to_its_end() {
     let mut recording = Recording::open(&LANDED.log).unwrap();
     let whole = refly(&recording, &ReflyOptions::default()).unwrap();
     assert_eq!((whole.commands_recorded, whole.commands_identical), (whole.ticks, whole.ticks));

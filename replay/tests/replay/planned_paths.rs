@@ -1,4 +1,4 @@
-//! The paths that a flight computer plans, made again from its log, against where the rocket went.
+//! Compares the planned paths, recomputed from the log, with the path of the rocket.
 
 use replay::controller::{LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
 
@@ -14,12 +14,13 @@ fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// Each begins where the rocket is, as well as it knows, and the last ends where it came down.
+/// Each path begins at the estimated position of the rocket, and the last one ends at its touchdown.
 #[test]
 fn val_flown_paths_begin_at_the_rocket_and_the_last_ends_at_its_touchdown() {
     let recording = MK2.recording();
     let (start, frames) = recording.replayable_frames().unwrap();
-    let mut pilot = LoggedPilot::new(recording.profile_toml().unwrap(), start, &[]).unwrap();
+    let mut pilot =
+        LoggedPilot::recorded(recording.profile_toml().unwrap(), start, &recording.head.run, &[]).unwrap();
     let (mut plans, mut paths) = (NewPlans::default(), Vec::new());
     for tick in frames {
         let again = pilot.run_again(tick).unwrap();

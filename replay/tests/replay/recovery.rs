@@ -1,11 +1,11 @@
-//! Whole logs out of damaged ones.
+//! Tests the recovery of whole logs from damaged ones.
 
 use std::path::Path;
 
 use proptest::prelude::*;
 use replay::log::Recording;
 use replay::recover::recover;
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::flown::{WHOLE, only};
 use crate::simulated::DISPERSED;
@@ -29,7 +29,7 @@ fn a_whole_log_recovers_whole() {
     assert_eq!((again.ticks, again.truth, again.verdict), (then.ticks, then.truth, then.verdict));
     assert_eq!(again.damage, None);
     let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
-    assert_eq!(verified.outcome, Outcome::Identical, "profile and all");
+    assert_eq!(verified.outcome, Verification::Identical, "profile and all");
 }
 
 /// The log of a killed recorder: everything that was synced, and the result is a whole log.
@@ -42,15 +42,15 @@ fn a_cut_log_recovers_what_was_synced() {
         assert_eq!((again.ticks.len(), again.damage), (*ticks, None), "cut after {at}");
         assert!(!recovery.ended);
         let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
-        // What was not yet on the disk is missing, though no checksum shows it any more.
-        assert_eq!(verified.outcome, Outcome::IdenticalReadablePart);
+        // Data that was not yet on the disk is missing, although no checksum shows it any more.
+        assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
         assert_eq!((verified.ticks_identical, verified.cut.unwrap().contact_s), (*ticks as u64, None));
     }
 }
 
-/// One broken chunk costs itself alone; where it lay is said.
+/// One broken chunk loses only itself, and its position is reported.
 #[test]
-fn what_lies_behind_a_broken_chunk_is_kept() {
+fn chunks_after_a_broken_chunk_are_kept() {
     let directory = tempfile::tempdir().unwrap();
     let mut bytes = WHOLE.bytes.clone();
     let (at, before) = WHOLE.synced[3];
@@ -66,7 +66,7 @@ fn what_lies_behind_a_broken_chunk_is_kept() {
 
 /// The length of a record is broken, so nobody knows where the next begins; the summary at the end does.
 #[test]
-fn behind_a_broken_frame_the_summary_shows_the_way() {
+fn after_a_broken_record_the_summary_locates_the_next_chunk() {
     let directory = tempfile::tempdir().unwrap();
     let mut bytes = WHOLE.bytes.clone();
     let (at, before) = WHOLE.synced[3];

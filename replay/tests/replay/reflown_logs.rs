@@ -1,34 +1,34 @@
-//! The log of a flight from apogee flown again is one flight from its first frame to its last.
+//! Tests that the log of a re-flown flight from apogee is one flight from its first frame to its last.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, StartAt, refly_flight, write_log};
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::lost_frames::RECOVERED;
 
-/// Flies again, writes the log, and holds it against this build.
+/// Flies again, writes the log, and verifies it with this build.
 fn written(name: &str, recording: &Recording, options: &ReflyOptions) -> Recording {
     let (report, flown) = refly_flight(recording, options).unwrap();
     let path = LANDED.beside(name);
     write_log(&path, recording, options, &report, &flown).unwrap();
     let verified = only(verify(&path).unwrap());
-    assert_eq!((verified.outcome, verified.first_divergence), (Outcome::Identical, None), "{name}");
+    assert_eq!((verified.outcome, verified.first_divergence), (Verification::Identical, None), "{name}");
     assert_eq!(verified.obstacle, None, "{name}");
     Recording::open(&path).unwrap()
 }
 
-/// Numbers of the frames, which must leave none out.
+/// The frame numbers; none may be left out.
 fn assert_whole(again: &Recording) {
     assert!(again.frames.iter().map(|tick| tick.input.frame).eq(1..=again.frames.len() as u64));
 }
 
-/// Where another build flew otherwise before the start, its frames are not put before those of this build.
+/// If another build flew differently before the start, its frames are not put before those of this build.
 #[test]
-fn of_a_log_by_another_build_the_log_is_this_builds_from_the_first_frame_on() {
+fn a_reflown_log_holds_only_frames_of_this_build() {
     let whole = Recording::open(&LANDED.log).unwrap();
     let mut forged = whole.clone();
     forged.frames[99].state_digest ^= 1;
@@ -41,7 +41,7 @@ fn of_a_log_by_another_build_the_log_is_this_builds_from_the_first_frame_on() {
 
 /// Frames that the log has lost are flown again too: the new log says nothing of a restart.
 #[test]
-fn of_a_recovered_log_the_log_has_no_hole() {
+fn a_log_reflown_from_a_recovered_log_has_no_gap() {
     let recovered = Recording::open(&RECOVERED).unwrap();
     assert!(recovered.gap().is_some());
     let last = recovered.frames.last().unwrap().input.frame;
@@ -51,9 +51,9 @@ fn of_a_recovered_log_the_log_has_no_hole() {
     assert_eq!(again.frames, Recording::open(&LANDED.log).unwrap().frames);
 }
 
-/// What is to hold from a time before the start holds from the start on, in the flight and in its log.
+/// A setting with a time before the start applies from the start, in the flight and in its log.
 #[test]
-fn a_setting_of_a_time_before_the_start_holds_from_the_start() {
+fn a_setting_timed_before_the_start_applies_from_the_start() {
     let recording = Recording::open(&LANDED.log).unwrap();
     let start = StartAt::Phase(Phase::AeroDescent);
     let timed = ReflyOptions { start: start.clone(), ..with(&["ignition.fixed_height_m=80@0.1"]) };

@@ -1,4 +1,4 @@
-//! A sweep that goes on where another run of it stopped.
+//! Tests a sweep that continues where an earlier run stopped.
 
 use std::num::NonZeroUsize;
 
@@ -9,9 +9,9 @@ use replay::sweep::{State, SweepReport, grid, sweep};
 use crate::from_apogee::LANDED;
 use crate::simulated::NOMINAL;
 
-/// Only what is missing is made ready: a flight whose outcomes are known need not even be one that can be flown again.
+/// Only flights with missing jobs are prepared: if all outcomes are known, the flight need not even be flyable.
 #[test]
-fn a_flight_that_nothing_is_missing_of_is_not_flown_up_to_its_start() {
+fn a_finished_flight_is_not_prepared_again() {
     let points = grid(&["nmpc.weights.w=50,110".parse().unwrap()], &[]).unwrap();
     let fly = |flight: &Recording, state: &mut State| -> Result<SweepReport, String> {
         let flights = std::slice::from_ref(flight);

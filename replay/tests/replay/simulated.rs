@@ -1,14 +1,14 @@
-//! Flights flown by the simulated vehicle, with the logs that it writes itself.
+//! Flies the simulated vehicle, with the logs that it writes itself.
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly, load_profile, log_header};
-use onboard_sim::vehicle::DeadlinePolicy;
+use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
 use protocol::log::recorder::Recorder;
-use protocol::transport::Endpoint;
+use protocol::transport::LinkAddress;
 use replay::log::Recording;
+use sim::plane::DeadlinePolicy;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
@@ -30,7 +30,7 @@ pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("pa
 /// A rocket from apogee, flown as the vehicle flies it.
 pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 1, &[]));
 
-/// The nominal landing with its telemetry going nowhere, so that its log has raw frames.
+/// The nominal landing with telemetry to no receiver, so that its log has raw frames.
 pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
@@ -49,10 +49,10 @@ impl Simulated {
 }
 
 /// Flies a profile to the ground and writes its log.
-pub(crate) fn simulate(profile: &str, seed: u64, links: &[Endpoint]) -> Simulated {
+pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simulated {
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("flight.mcap");
-    let profile = load_profile(profile).unwrap();
+    let profile = load_flight(profile).unwrap();
     let recorder = Recorder::create(&log, &log_header("onboard-sim", &profile, seed, START_UNIX_NS)).unwrap();
     let options = FlyOptions {
         system_id: 1,

@@ -1,9 +1,9 @@
-//! How long the flight computer of a flown rocket took: measured beside it, and no part of what is compared.
+//! Tests the solve times of a flown rocket: they are measured outside the flight computer and are not compared.
 
 use replay::info::info;
 use replay::log::Recording;
 use replay::report::report;
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::command_line::{replay, run};
 use crate::flown::only;
@@ -15,7 +15,7 @@ fn a_flown_rockets_solve_times_are_those_of_its_log() {
     let recording = MK2.recording();
     let mut times_s: Vec<f64> = recording.timings.iter().map(|timing| timing.solve_time_s).collect();
     assert!(times_s.len() > 50 && times_s.iter().all(|time_s| *time_s > 0.0), "{times_s:?}");
-    // Each belongs to a recorded frame that plans.
+    // Each belongs to a recorded planning frame.
     for timing in &recording.timings {
         let place = recording.frames.binary_search_by_key(&timing.frame, |tick| tick.input.frame).unwrap();
         let input = &recording.frames[place].input;
@@ -33,24 +33,22 @@ fn a_flown_rockets_solve_times_are_those_of_its_log() {
 }
 
 #[test]
-fn they_are_no_part_of_what_is_verified() {
+fn solve_times_are_not_verified() {
     let report = only(verify(&MK2.log).unwrap());
-    assert_eq!((report.outcome, report.obstacle), (Outcome::Identical, None));
+    assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
     assert_eq!(report.ticks_compared as usize, MK2.recording().frames.len());
 }
 
 #[test]
-fn they_are_said_where_they_were_measured_and_nowhere_else() {
+fn solve_times_are_printed_only_if_they_were_measured() {
     let (code, stdout, _) = run(&mut replay("info", &MK2.log));
     let count = MK2.recording().timings.len();
     assert!(code == 0 && stdout.contains("deadline 5 ms"), "{stdout}");
     assert!(stdout.contains(&format!("of {count} frames that planned")), "{stdout}");
     let page = report(&MK2.log).unwrap().html;
-    for part in [
-        "solve time, 99 of 100 within",
-        "frames over their deadline",
-        "Time that each frame with a plan took",
-    ] {
+    for part in
+        ["solve time, 99 of 100 within", "frames over their deadline", "Duration of each frame with a plan"]
+    {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("without a clock"));

@@ -1,4 +1,4 @@
-//! Comparisons, exports and imports of simulated flights.
+//! Tests comparisons, exports and imports of simulated flights.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use replay::import::{ImportError, import_tlog};
 use replay::info::{GradeLevel, info};
 use replay::log::{FlightLog, Recording};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::simulated::{DISPERSED, NOMINAL, Simulated, WITH_FRAMES};
 
@@ -178,7 +178,7 @@ fn tlog(flight: &Simulated, name: &str) -> std::path::PathBuf {
     path
 }
 
-/// Out as a `.tlog` and in again: the same frames, and what a ground station would have known.
+/// Exported as `.tlog` and imported again: the same frames, and the telemetry that a ground station would have had.
 #[test]
 fn a_tlog_goes_out_and_comes_in_again() {
     let path = tlog(&WITH_FRAMES, "out.tlog");
@@ -200,8 +200,8 @@ fn a_tlog_goes_out_and_comes_in_again() {
         let near = |x: f64, y: f64| (x - y).abs() <= 1e-5 * (1.0 + x.abs());
         assert!(a.name == b.name && near(a.value, b.value) && near(a.maximum, b.maximum), "{a:?} {b:?}");
     }
-    assert_eq!(verify(&imported_path).unwrap()[0].outcome, Outcome::NotReplayable);
-    // Into a file that is there it does not go.
+    assert_eq!(verify(&imported_path).unwrap()[0].outcome, Verification::NotReplayable);
+    // An existing file is not overwritten.
     assert!(matches!(import_tlog(&path, &imported_path, &mut |_| {}), Err(ImportError::Create { .. })));
 }
 

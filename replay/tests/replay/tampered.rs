@@ -1,4 +1,4 @@
-//! Logs rewritten with some messages left out, changed or taken from another log: whole files whose checksums hold.
+//! Rewrites logs with messages left out, changed or taken from another log: whole files with correct checksums.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -75,7 +75,7 @@ impl Held {
         self.messages.retain(wanted);
     }
 
-    /// Everything of another log behind what is there, that much later.
+    /// Appends everything of another log, with this delay.
     pub(crate) fn append(&mut self, other: &Self, later_ns: u64) {
         self.about.extend(other.about.iter().cloned());
         self.messages.extend(other.messages.iter().map(|message| message.at(message.log_time_ns + later_ns)));

@@ -1,21 +1,21 @@
-//! Other settings on recorded flights: open loop, closed loop, single ticks, sweeps.
+//! Tests other settings on recorded flights: open loop, closed loop, single ticks, sweeps.
 
 use std::num::NonZeroUsize;
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::refly::{From, Law, ReflyOptions, StartAt, margin, refly, refly_flight, write_log};
 use replay::sweep::{BisectOptions, State, bisect, grid, random, sweep};
 use replay::tick::tick;
-use replay::verify::{Outcome, verify};
+use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with, with_plant};
 use crate::flown::only;
 use crate::simulated::{DISPERSED, NOMINAL, Simulated};
 
 #[test]
-fn nothing_changed_commands_nothing_else() {
+fn without_changes_the_commands_are_the_recorded_ones() {
     let report = evaluate(&NOMINAL.recording(), &[]).unwrap();
     assert!(report.kind.starts_with("open loop"));
     assert_eq!((report.commands_different, report.levels_different), (0, 0));
@@ -31,13 +31,13 @@ fn a_timed_change_holds_from_its_time_on() {
     };
     assert!(report.ticks.iter().all(|tick| tick.time_s >= 7.999 || tick.recorded == tick.evaluated));
     assert!(differs(8.0), "a weight of the cost changes the cost at least");
-    // From the beginning on it is another evaluation.
+    // From the beginning the evaluation differs.
     let whole = evaluate(&recording, &settings(&["nmpc.weights.w=120"])).unwrap();
     assert!(whole.commands_different > report.commands_different);
 }
 
 #[test]
-fn what_is_not_the_controllers_is_refused_in_open_loop() {
+fn settings_of_the_plant_are_refused_in_open_loop() {
     let recording = NOMINAL.recording();
     let refused = |given| evaluate(&recording, &settings(&[given])).unwrap_err();
     assert!(matches!(refused("plant.thrust_scale=0.9"), EvaluateError::NotTheControllers { .. }));
@@ -47,7 +47,7 @@ fn what_is_not_the_controllers_is_refused_in_open_loop() {
 
 /// The simulated flight, flown again with nothing changed, from its release and from several moments of its burn.
 #[test]
-fn nothing_changed_flies_the_same_bit_for_bit() {
+fn without_changes_the_flight_is_the_same_bit_for_bit() {
     for flight in [&NOMINAL, &DISPERSED] {
         let recording = flight.recording();
         let recorded = recording.verdict.clone().unwrap();
@@ -82,7 +82,7 @@ fn nothing_changed_flies_the_same_bit_for_bit() {
 }
 
 #[test]
-fn a_weak_motor_that_the_controller_does_not_know_of_turns_the_verdict() {
+fn a_weak_motor_unknown_to_the_controller_changes_the_verdict() {
     let recording = NOMINAL.recording();
     let report = refly(&recording, &with_plant(&["plant.thrust_scale=0.95"])).unwrap();
     assert_eq!(report.verdict_changed, Some(true));
@@ -93,7 +93,7 @@ fn a_weak_motor_that_the_controller_does_not_know_of_turns_the_verdict() {
     assert_eq!(refly(&recording, &late).unwrap().verdict_changed, Some(true));
 }
 
-/// Full thrust straight up stops the fall above the ground and burns out there; only tilting throws the surplus away.
+/// Full thrust straight up stops the fall above the ground and burns out there; only tilting wastes the surplus thrust.
 #[test]
 fn the_upright_law_alone_does_not_land_the_nominal_flight() {
     let options = ReflyOptions { law: Law::Stabiliser, ..ReflyOptions::default() };
@@ -102,7 +102,7 @@ fn the_upright_law_alone_does_not_land_the_nominal_flight() {
 }
 
 #[test]
-fn what_cannot_be_started_from_is_refused_with_what_can() {
+fn an_impossible_start_is_refused_with_the_possible_ones() {
     let recording = NOMINAL.recording();
     let refusal = |start| {
         let options = ReflyOptions { start, ..ReflyOptions::default() };
@@ -129,13 +129,13 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         let path = DISPERSED.beside(name);
         write_log(&path, &recording, &options, &report, &flown).unwrap();
         let verified = only(verify(&path).unwrap());
-        assert_eq!(verified.outcome, Outcome::Identical, "{name}");
+        assert_eq!(verified.outcome, Verification::Identical, "{name}");
         assert_eq!(verified.ticks_identical as usize, flown.before.len() + flown.ticks.len());
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict);
         assert_eq!(evaluate(&again, &[]).unwrap().unchanged_different, 0, "{name}");
         assert!(tick(&again, 40).unwrap().identical, "{name}");
-        // Flown again as it is, it is the same once more, with what was changed on its way.
+        // Flown again unchanged, it comes out the same again, including its timed changes.
         let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
         let once_more = refly_flight(&again, &unchanged).unwrap().1;
         assert_eq!(once_more.verdict, flown.verdict, "{name}");
@@ -143,7 +143,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
     }
 }
 
-/// Every tick of a flight, solved again from nothing: the same problem, and the warm start is worth its name.
+/// Every tick of a flight, solved again with a cold start: the same problem, and the warm start needs fewer iterations.
 #[test]
 fn every_tick_solved_again_is_the_recorded_one() {
     let recording = DISPERSED.recording();
@@ -218,7 +218,7 @@ fn an_unknown_name_ends_a_sweep_with_the_nearest() {
     assert!(chain.contains("did you mean `nmpc.weights.w`"), "{chain}");
 }
 
-/// The verdict really is another on the two sides of the value found.
+/// The verdicts on the two sides of the value found really differ.
 #[test]
 fn a_bisection_brackets_the_change_of_the_verdict() {
     let recording = NOMINAL.recording();
@@ -246,7 +246,7 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
         let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
         bisect(&recording, &options).unwrap_err().to_string()
     };
-    // A name that the profile leaves out, and one that no profile has.
+    // A key that the profile leaves out, and an unknown one.
     assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));
     let unknown = refused("nmpc.wieghts.w");
     assert!(unknown.contains("did you mean `nmpc.weights.w`?"), "{unknown}");

@@ -1,5 +1,5 @@
-//! Verification of logs that look whole and are not, or that hold more than one flight: nothing compared is never
-//! "identical", every flight has a verdict of its own, and a flight without its end is said to be cut.
+//! Tests the verification of logs that only look whole, or hold several flights: a log without comparisons is never
+//! "identical", every flight gets its own verdict, and a flight without its end is reported as cut.
 
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ fn a_whole_log_that_was_only_rewritten_is_identical() {
     }
 }
 
-/// The start record once more behind all frames, every one of which was changed.
+/// The start record again after all frames, all of which were changed.
 #[test]
 fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     let directory = tempfile::tempdir().unwrap();
@@ -74,7 +74,7 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     assert!(stdout.contains(&format!("DIVERGED: {count} of {count} ticks differ")), "{stdout}");
     assert!(!stdout.contains("0 of 0"), "{stdout}");
 
-    // Nothing follows the copy: of that no word "identical" may be said.
+    // Nothing follows the copy, so it must not be called "identical".
     let (code, stdout, _) = verify(&honest, &[]);
     assert_eq!(code, 2, "{stdout}");
     assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} ticks identical")), "{stdout}");
@@ -84,7 +84,7 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     assert!(stdout.contains("tests=\"2\"") && stdout.contains("errors=\"1\""), "{stdout}");
 }
 
-/// The start record once more in the middle: what follows begins with no start of its own.
+/// The start record again in the middle: the frames after it do not begin a new flight.
 #[test]
 fn a_start_copied_into_the_middle_is_no_flight() {
     let directory = tempfile::tempdir().unwrap();
@@ -112,7 +112,7 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
         };
         let path = both(&b, "both.mcap");
         let (code, stdout, _) = verify(&path, &["--strict"]);
-        // The planar flights are of two profiles, whose attachments stand before both.
+        // The planar flights have two profiles, whose attachments come before both flights.
         if first == LANDED.log {
             assert_eq!(code, 0, "{stdout}");
             assert!(
@@ -138,7 +138,7 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
     }
 }
 
-/// Of the same profile, so that either controller is the right one.
+/// Both flights have the same profile, so that either controller is the right one.
 #[test]
 fn a_planar_flight_twice_in_one_file_is_verified_twice() {
     let directory = tempfile::tempdir().unwrap();
@@ -153,9 +153,9 @@ fn a_planar_flight_twice_in_one_file_is_verified_twice() {
     }
 }
 
-/// Questions that take a log for one flight refuse two, and do not answer about a mixture.
+/// Commands that need one flight refuse a log with two.
 #[test]
-fn who_asks_about_one_flight_is_not_given_two() {
+fn commands_for_one_flight_refuse_a_log_with_two() {
     let directory = tempfile::tempdir().unwrap();
     for log in logs() {
         let a = Held::read(log);
@@ -174,7 +174,7 @@ fn who_asks_about_one_flight_is_not_given_two() {
     }
 }
 
-/// A log rewritten without its last frames: with and without the verdict behind them.
+/// A log rewritten without its last frames: with and without the verdict after them.
 #[test]
 fn a_log_without_its_last_ticks_is_not_complete() {
     let directory = tempfile::tempdir().unwrap();

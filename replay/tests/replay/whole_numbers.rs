@@ -1,4 +1,4 @@
-//! Settings that take whole numbers, in a sweep and in a bisection.
+//! Tests settings that take whole numbers, in a sweep and in a bisection.
 
 use std::num::NonZeroUsize;
 

@@ -1,6 +1,6 @@
 // Opens a log in Foxglove's own application in a browser without a window:
-// node open_in_foxglove.mjs BROWSER LOG HEIGHT GIMBAL PICTURE, where the middle two are the message paths of its two plots.
-// Prints JSON once the whole log is plotted: the page's words, and how many pixels each plot's line covers.
+// node open_in_foxglove.mjs BROWSER LOG HEIGHT GIMBAL PICTURE, where HEIGHT and GIMBAL are the message paths of its two plots.
+// Prints JSON once the whole log is plotted: the text of the page, and how many pixels the line of each plot covers.
 import { createServer } from "node:http";
 import { createReadStream, existsSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -9,7 +9,7 @@ import { fileURLToPath, pathToFileURL } from "node:url";
 
 const [browserPath, log, height, gimbal, picture] = process.argv.slice(2);
 const PATIENCE_MS = 120_000;
-// All but the lines is grey.
+// Everything but the lines is grey.
 const COLORFUL = 60;
 const LINE_PIXELS_MIN = 300;
 
@@ -26,7 +26,7 @@ function fileOf(url) {
   const root = url.startsWith("/react") ? modules : studio;
   return path.join(root, url.replace("/assets/", "/"));
 }
-// A log is read piece by piece, which takes a server that knows ranges.
+// Foxglove reads a log piece by piece, so the server must support ranges.
 const server = createServer((request, response) => {
   const file = fileOf(new URL(request.url, "http://here").pathname);
   if (!existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end();
@@ -57,7 +57,7 @@ try {
   await tab.goto(`${origin}/?${new URLSearchParams({ height, gimbal })}`);
   const counter = await browser.newPage();
 
-  // The plots are drawn by a worker: a picture of the page is the only way to their pixels.
+  // A worker draws the plots, so only a picture of the page shows their pixels.
   async function covered() {
     const bytes = await tab.screenshot({ encoding: "base64" });
     const boxes = await tab.$$eval("canvas", (all) =>
@@ -88,7 +88,7 @@ try {
   const deadline = Date.now() + PATIENCE_MS;
   let pixels = [];
   let before = "";
-  // Drawn, and the same twice: everything is read.
+  // When two pictures in a row are the same, everything is read.
   for (;;) {
     await tab.bringToFront();
     await new Promise((resolve) => setTimeout(resolve, 2000));

@@ -1,5 +1,5 @@
-// Reads a log as Foxglove does: @mcap/core for the file, protobufjs with each channel's own schema. Every message of every
-// protobuf channel is decoded. Prints a line a channel: topic, schema, messages, numbers in the last message.
+// Reads a log as Foxglove does: @mcap/core for the file, protobufjs with each channel's own schema. Decodes every message
+// of every protobuf channel. Prints a line for each channel: topic, schema, number of messages, numbers in the last message.
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import path from "node:path";
@@ -34,7 +34,7 @@ for await (const message of reader.readMessages()) {
   known.count += 1;
 }
 
-// What a plot can show: numbers, also in messages and lists.
+// Counts what a plot can show: numbers, also inside messages and lists.
 function numbers(value) {
   if (typeof value === "number") return 1;
   if (protobuf.util.Long?.isLong(value)) return 1;

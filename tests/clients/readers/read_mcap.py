@@ -1,4 +1,4 @@
-"""Reads a log with the mcap library and its protobuf decoder; prints messages a topic and the last gimbal command."""
+"""Reads a log with the mcap library and its protobuf decoder; prints the number of messages of each topic and the last gimbal command."""
 import collections
 import sys
 

@@ -1,4 +1,4 @@
-"""Reads a table with pandas, polars and pyarrow; prints rows, columns and one number of each."""
+"""Reads a table with pandas, polars and pyarrow; prints rows, columns and one number that each of them read."""
 import sys
 
 import pandas

@@ -1,4 +1,4 @@
-"""Reads a .tlog as MAVProxy and Mission Planner's tools do; prints how many frames had which known message."""
+"""Reads a .tlog as MAVProxy and Mission Planner's tools do; prints how many frames of some messages it has."""
 import collections
 import sys
 

@@ -1,11 +1,13 @@
-//! Other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and Parquet, a browser.
+//! Runs other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and Parquet, a
+//! browser.
 //!
-//! Python and Node packages are installed by name, with pinned versions, into `target/clients` and nowhere else. Programs
-//! are taken as the machine has them. One that is not here fails its test and says what to install: nobody who asks for
-//! these tests is told that they passed when they did not run.
+//! Python and Node packages are installed with pinned versions into `target/clients` and nowhere else. Other programs
+//! must be on the machine. If one is missing, its test fails and says what to install, so that a test that did not
+//! run never counts as passed.
 //!
-//! Every one of these programs runs with settings of its own ([`outside`]): what a user has set for it (plugins, paths,
-//! preferences) plays no part.
+//! Each program runs with settings of its own ([`outside`]), independent of the user's plugins, paths and
+//! preferences.
+#![expect(clippy::missing_panics_doc, reason = "a function that panics fails its test, which is its purpose")]
 
 mod install;
 mod run;
@@ -15,7 +17,8 @@ pub use run::{found, outside, tshark, tshark_folder};
 
 use std::path::{Path, PathBuf};
 
-/// MAVProxy asks for plotting and vision packages that its command line does not need.
+/// Without dependencies, because MAVProxy depends on plotting and vision packages that its command line does not
+/// need.
 pub static PYMAVLINK: PythonPackages = PythonPackages::without_dependencies(
     "pymavlink",
     &[
@@ -54,28 +57,28 @@ pub static READERS: PythonPackages = PythonPackages::with_dependencies(
     ],
 );
 
-/// Rerun, with its command.
+/// Rerun with its command-line program.
 pub static RERUN: PythonPackages = PythonPackages::with_dependencies("rerun", &["rerun-sdk==0.36.3"]);
 
 /// A MAVLink library for Node.
 pub static NODE_MAVLINK: NodePackages = NodePackages::new("node-mavlink", &["node-mavlink@2.3.0"]);
 
-/// What Foxglove reads MCAP with.
+/// The libraries with which Foxglove reads MCAP.
 pub static NODE_MCAP: NodePackages =
     NodePackages::new("node-mcap", &["@mcap/core@2.2.2", "@mcap/support@1.1.0", "protobufjs@8.8.1"]);
 
-/// Foxglove's application, the last that is open source, and what drives a browser.
+/// The last open-source version of Foxglove's application, and a library that controls a browser.
 pub static FOXGLOVE: NodePackages = NodePackages::new(
     "foxglove",
     &["@foxglove/studio-base@1.48.0", "react@17.0.2", "react-dom@17.0.2", "puppeteer-core@24.43.1"],
 );
 
-/// A file of this package.
+/// The path of a file of this package.
 pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// The MAVLink definitions of our own.
+/// The path of our MAVLink definitions.
 pub fn dialect() -> PathBuf {
     file("../../protocol/dialect/touchdown.xml")
 }

@@ -1,4 +1,4 @@
-//! Programs that the machine has, run with settings of their own.
+//! Finds programs on the machine and runs them with settings of their own.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -6,13 +6,10 @@ use std::process::Command;
 
 use crate::install::clients;
 
-/// The account without rights; its number is the same on every Linux.
+/// The user id of `nobody`, which is the same on every Linux.
 const NOBODY: u32 = 65_534;
 
-/// The first of these programs that is on the path.
-///
-/// # Panics
-/// There is none; the message names the Debian package that has it.
+/// Finds the first of these programs on the path. If there is none, the test fails with the Debian package to install.
 pub fn found(names: &[&str], package: &str) -> PathBuf {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -22,11 +19,8 @@ pub fn found(names: &[&str], package: &str) -> PathBuf {
     })
 }
 
-/// A program that sees none of the user's settings: a bare environment, and a home of ours below the target folder. A home
-/// that does not exist would not do: run by root, these programs make it.
-///
-/// # Panics
-/// The folder for its home cannot be made.
+/// A program that sees none of the user's settings: it has a bare environment and a home folder of ours below the
+/// target folder. The home must exist, because these programs create it if root runs them.
 pub fn outside(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.env_clear();
@@ -38,17 +32,18 @@ pub fn outside(program: impl AsRef<OsStr>) -> Command {
     let home = clients().join("home");
     std::fs::create_dir_all(&home).expect("a folder");
     command.env("HOME", home).env("LANG", "C.UTF-8");
-    // Lines come as they are written, and no file is left beside our scripts.
+    // Python writes lines at once and leaves no files beside our scripts.
     command.env("PYTHONUNBUFFERED", "1").env("PYTHONDONTWRITEBYTECODE", "1");
     command
 }
 
-/// Wireshark without a window, in a folder of [`tshark_folder`]. It takes no script from root, so nobody runs it then.
+/// Wireshark without a window, in a folder made with [`tshark_folder`]. It runs no scripts as root, so root runs it
+/// as `nobody`.
 pub fn tshark(folder: &Path) -> Command {
     let mut command = outside(found(&["tshark"], "tshark"));
-    // Names are not looked up: a reader of files asks nobody.
+    // `-n` turns name resolution off.
     command.arg("-n").current_dir(folder).env("HOME", folder.join("no-home"));
-    // A dissector that was installed for the whole machine may have our dissector's name.
+    // A dissector installed for the whole machine may have the name of ours.
     command.env("WIRESHARK_PLUGIN_DIR", folder.join("no-plugins"));
     if nix::unistd::geteuid().is_root() {
         use std::os::unix::process::CommandExt as _;
@@ -57,7 +52,7 @@ pub fn tshark(folder: &Path) -> Command {
     command
 }
 
-/// A folder that nobody can read; the usual one for temporary files may be root's alone.
+/// Makes a folder readable for `nobody`; the usual folder for temporary files may be readable by root only.
 ///
 /// # Errors
 /// As [`std::fs::set_permissions`].

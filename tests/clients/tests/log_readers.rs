@@ -1,5 +1,5 @@
-//! The files that replay writes, read by other people's programs: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core` and application,
-//! Rerun, pandas, polars, pyarrow, pymavlink.
+//! Other people's programs read the files that replay writes: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core` and
+//! application, Rerun, pandas, polars, pyarrow, pymavlink.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 #[path = "../../../replay/tests/replay/from_apogee.rs"]
@@ -33,7 +33,7 @@ fn hex(number: f64) -> String {
     said(READERS.python().arg("-c").arg(print)).trim().to_owned()
 }
 
-/// The recorder's log, one flown again and one recovered; and of a flight from apogee.
+/// Logs of the recorder, one flown again, one recovered, and one of a flight from apogee.
 static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     let recording = NOMINAL.recording();
     let options = ReflyOptions::default();
@@ -42,7 +42,7 @@ static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     write_log(&again, &recording, &options, &report, &flight).unwrap();
     let cut = NOMINAL.beside("cut.mcap");
     let bytes = std::fs::read(&NOMINAL.log).unwrap();
-    // In the middle of the messages.
+    // This cuts the file in the middle of the messages.
     std::fs::write(&cut, &bytes[..bytes.len() * 4 / 5]).unwrap();
     let recovered = NOMINAL.beside("recovered.mcap");
     recover(&cut, &recovered).unwrap();
@@ -51,7 +51,7 @@ static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     flown.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
 });
 
-/// A topic's messages, and the last gimbal command, rad.
+/// The topic of the controller's ticks, their number, and the last gimbal command, rad.
 fn commands(recording: &Recording) -> (&'static str, usize, f64) {
     if let Some(last) = recording.frames.last() {
         return ("/pilot/tick", recording.frames.len(), last.output.gimbal_rad[0]);
@@ -75,7 +75,7 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
     }
 }
 
-/// What Foxglove is built on decodes every message by the schema in the log, and what is to be plotted is numbers.
+/// Foxglove's library decodes every message by the schema in the log, and the values to plot are numbers.
 #[test]
 fn logs_are_read_by_foxgloves_library() {
     for log in LOGS.iter() {
@@ -85,9 +85,13 @@ fn logs_are_read_by_foxgloves_library() {
         let of_commands = channels.clone().find(|channel| channel[0] == topic).unwrap();
         assert_eq!(of_commands[2], count.to_string(), "{read}");
         assert!(read.contains("/tf foxglove.FrameTransform"), "{read}");
-        // Every one but the words of events and operators has something to plot.
+        // Every channel except the texts of events and operators has something to plot.
         let plottable = |channel: Vec<&str>| {
-            let least = if channel[0] == "/pilot/timing" { 4 } else { 8 };
+            let least = match channel[0] {
+                "/pilot/timing" => 4,
+                "/computer/start" => 6,
+                _ => 8,
+            };
             channel[3].parse::<u32>().unwrap() >= least
         };
         let wordy = |channel: &Vec<&str>| matches!(channel[0], "/events" | "/operator/actions");
@@ -95,7 +99,7 @@ fn logs_are_read_by_foxgloves_library() {
     }
 }
 
-/// Foxglove's own application lists every topic with its messages, and draws what it is asked to plot.
+/// Foxglove's application lists every topic with its messages, and plots what it is asked to.
 #[test]
 fn logs_open_in_foxglove_with_plots() {
     let browser = found(&["chromium", "chromium-browser", "google-chrome"], "chromium");
@@ -121,7 +125,7 @@ fn logs_open_in_foxglove_with_plots() {
     }
 }
 
-/// A count as Foxglove writes it, with commas at the thousands.
+/// A number as Foxglove writes it, with commas between thousands.
 fn grouped(count: u64) -> String {
     if count < 1000 { count.to_string() } else { format!("{},{:03}", grouped(count / 1000), count % 1000) }
 }

@@ -1,4 +1,5 @@
-//! Where packages go, and what a program sees, whatever the user has set for Python, pip, Node and npm.
+//! Tests that the user's settings for Python, pip, Node and npm change neither where packages are installed nor what
+//! a program sees.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::process::Command;
 
 use clients::{NodePackages, PythonPackages, found, outside};
 
-/// Names the folder to install into, where this test runs once more with a user's settings.
+/// When this variable is set, this test program installs into the folder that it names.
 const INSTALLS_HERE: &str = "TOUCHDOWN_INSTALLS_HERE";
 
 static PYSERIAL: PythonPackages = PythonPackages::without_dependencies("pyserial", &["pyserial==3.5"]);
@@ -21,11 +22,11 @@ fn said(command: &mut Command) -> String {
 }
 
 #[test]
-fn a_users_own_settings_of_python_and_node_play_no_part() {
+fn a_users_settings_of_python_and_node_have_no_effect() {
     if let Some(folder) = std::env::var_os(INSTALLS_HERE) {
         return install_and_look(Path::new(&folder));
     }
-    // A project that has other packages of the same names, and takes every folder below it for its own.
+    // A project with other packages of the same names, which claims every folder below it.
     let project = tempfile::tempdir().unwrap();
     let at = |name: &str| project.path().join(name);
     std::fs::create_dir_all(at("node_modules/react")).unwrap();
@@ -37,7 +38,7 @@ fn a_users_own_settings_of_python_and_node_play_no_part() {
         std::fs::write(at("python").join(module).with_extension("py"), other).unwrap();
     }
     let mut again = Command::new(std::env::current_exe().unwrap());
-    again.args(["--exact", "a_users_own_settings_of_python_and_node_play_no_part"]);
+    again.args(["--exact", "a_users_settings_of_python_and_node_have_no_effect"]);
     again.env(INSTALLS_HERE, at("target")).current_dir(project.path());
     for (name, value) in [
         ("PYTHONPATH", at("python")),
@@ -81,6 +82,6 @@ fn install_and_look(folder: &Path) {
 #[should_panic(
     expected = "NOT RUN: there is no such-program-is-nowhere here (Debian: apt-get install such-package)"
 )]
-fn a_program_that_is_not_here_fails_its_test_and_says_what_to_install() {
+fn a_missing_program_fails_its_test_and_names_what_to_install() {
     found(&["such-program-is-nowhere"], "such-package");
 }

@@ -1,4 +1,4 @@
-//! Wireshark reads what the vehicle sends, whatever its user has made of it.
+//! Wireshark reads what the vehicle sends, whatever its user has configured.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::collections::BTreeSet;
@@ -8,11 +8,11 @@ use std::process::Command;
 use clients::{PYMAVLINK, dialect, tshark, tshark_folder};
 use e2e::{BareGround, Program, Running, program, raw_frames_of};
 
-/// A dissector generated from our XML by pymavlink's generator reads every frame of whole flights, and between the two
-/// vehicles every message of ours is among them.
+/// A dissector that pymavlink's generator made of our XML reads every frame of whole flights. The flights of the two
+/// vehicles together contain every message of ours.
 #[test]
 fn val_wireshark_finds_no_malformed_frame() {
-    // The usual folder for temporary files may be one that only root may enter.
+    // The usual folder for temporary files may be readable by root only.
     let folder = tempfile::tempdir_in("/tmp").unwrap();
     tshark_folder(folder.path()).unwrap();
     let mut generator = PYMAVLINK.program("mavgen.py");
@@ -23,11 +23,11 @@ fn val_wireshark_finds_no_malformed_frame() {
     // HEARTBEAT, SYS_STATUS, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, VFR_HUD, EXTENDED_SYS_STATE, STATUSTEXT.
     let both = [0, 1, 31, 32, 74, 245, 253];
     let planar = dissected(folder.path(), "paper-calibrated");
-    // Besides: ESTIMATOR_STATUS, TD_DESCENT.
+    // The spatial flight also has ESTIMATOR_STATUS and TD_DESCENT.
     let spatial = dissected(folder.path(), "mk2");
     for (ids, more) in [(&planar, &[][..]), (&spatial, &[230, 54_008])] {
         for id in both.iter().chain(more) {
-            assert!(ids.contains(id), "message {id} is in the flight: {ids:?}");
+            assert!(ids.contains(id), "message {id} is not among {ids:?}");
         }
     }
     let text = std::fs::read_to_string(dialect()).unwrap();
@@ -37,7 +37,7 @@ fn val_wireshark_finds_no_malformed_frame() {
     assert!(!ours.is_empty() && ours.is_subset(&seen), "{ours:?} of ours, {seen:?} seen");
 }
 
-/// Flies this profile and has Wireshark read every frame of the vehicle; the messages' numbers.
+/// Flies this profile and lets Wireshark read every frame of the vehicle; returns the message ids.
 fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
     let (log, capture) = (format!("{profile}.mcap"), format!("{profile}.pcap"));
     let flown = Running::to_end(
@@ -59,7 +59,7 @@ fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
     };
     let found = read(&["-Y", "mavlink_proto", "-T", "fields", "-e", "mavlink_proto.msgid"]);
     let ids: Vec<u32> = found.lines().filter_map(|line| line.parse().ok()).collect();
-    assert_eq!(ids.len(), frames.len(), "every frame is read");
+    assert_eq!(ids.len(), frames.len(), "some frames were not read");
     let malformed = read(&["-V", "-Y", "_ws.malformed || _ws.lua.error || _ws.expert.severity >= error"]);
     let lines: Vec<&str> = malformed.lines().filter(|line| !line.starts_with("Running as user")).collect();
     assert!(lines.is_empty(), "{}", lines.join("\n"));
@@ -90,10 +90,10 @@ fn capture_of(frames: &[Vec<u8>]) -> Vec<u8> {
     capture
 }
 
-/// The same once more for a user who has plugins, preferences and paths of Wireshark's: a dissector of another project
-/// with our dissector's name, which cannot even be read, and MAVLink's port given to it.
+/// Runs the same test for a user with Wireshark plugins, preferences and paths, among them another project's
+/// dissector with our dissector's name, which is broken.
 #[test]
-fn a_users_own_wireshark_settings_play_no_part() {
+fn a_users_wireshark_settings_have_no_effect() {
     let home = tempfile::tempdir_in("/tmp").unwrap();
     tshark_folder(home.path()).unwrap();
     let (settings, plugins) =
@@ -105,7 +105,7 @@ fn a_users_own_wireshark_settings_play_no_part() {
     std::fs::write(settings.join("init.lua"), OTHER_DISSECTOR).unwrap();
     std::fs::write(settings.join("disabled_protos"), "udp\n").unwrap();
     std::fs::write(settings.join("preferences"), "gui.column.format: \"No.\", \"%m\"\n").unwrap();
-    // Built and installed with the user's real settings; Cargo keeps its own below the home.
+    // The programs are built and installed with the user's real settings; Cargo keeps its own below the home folder.
     program(Program::OnboardSim);
     PYMAVLINK.installed();
     let cargo = std::env::home_dir().unwrap().join(".cargo");

@@ -1,10 +1,16 @@
-//! Numbers, texts and frames to bytes and back.
+//! Writes numbers, texts and frames as bytes, and reads them back.
 
 use std::time::Duration;
 
 use protocol::frame::{Frame, Framer};
 
-use super::{CodecError, PREFIX_LEN};
+/// Bytes of the length that stands before every message.
+pub(super) const PREFIX_LEN: usize = 4;
+
+/// The bytes are no valid message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unexpected bytes on the socket: {0}")]
+pub struct CodecError(pub(super) &'static str);
 
 pub(super) struct Writer {
     bytes: Vec<u8>,
@@ -43,7 +49,7 @@ impl Writer {
         self.u64(value.to_bits())
     }
 
-    /// At most 4,000 bytes of it: nothing here is longer but by somebody's intent.
+    /// Writes at most 4,000 bytes of the text; no valid text is longer.
     pub(super) fn text(&mut self, text: &str) -> &mut Self {
         let mut end = text.len().min(4_000);
         while !text.is_char_boundary(end) {
@@ -101,7 +107,7 @@ impl Reader<'_> {
         framer.next_frame().ok_or(CodecError("not a frame"))
     }
 
-    /// What follows is not read.
+    /// Ignores the remaining bytes.
     pub(super) fn skip(&mut self) {
         self.0 = &[];
     }

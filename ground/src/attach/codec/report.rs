@@ -1,13 +1,12 @@
-//! How each link does: `u32` links, each with its figures and its components; then what signatures did.
+//! Encodes the link reports: a `u32` count, each link with its rates and components, then the signature counts.
 
 use std::time::Duration;
 
 use protocol::identity::Address;
-use protocol::link::{LinkFigures, SourceFigures};
+use protocol::link_stats::{LinkFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 
-use super::CodecError;
-use super::bytes::{Reader, Writer};
+use super::bytes::{CodecError, Reader, Writer};
 use crate::model::link::LinkReport;
 
 pub(super) fn encode(links: &[LinkReport], signing: Option<&SigningCounters>, out: &mut Writer) {
@@ -31,11 +30,11 @@ pub(super) fn encode(links: &[LinkReport], signing: Option<&SigningCounters>, ou
     }
 }
 
-/// Links and signatures.
+/// Link reports and signature counts.
 type Report = (Vec<LinkReport>, Option<SigningCounters>);
 
 pub(super) fn decode(rest: &mut Reader) -> Result<Report, CodecError> {
-    // Not reserved for: a count that lies ends where the bytes end.
+    // No memory is reserved by the count: a wrong count ends with the bytes.
     let links = (0..rest.u32()?).map(|_| link(rest)).collect::<Result<_, _>>()?;
     let signing = match rest.u8()? {
         0 => None,

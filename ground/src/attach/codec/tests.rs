@@ -1,4 +1,4 @@
-//! There and back; and that no bytes panic.
+//! Every message decodes to what was encoded, and no bytes cause a panic.
 
 use super::*;
 use proptest::collection::vec;
@@ -7,45 +7,48 @@ use proptest::prelude::*;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::{Address, VEHICLE};
-use protocol::link::{LinkFigures, SourceFigures};
+use protocol::link_stats::{LinkFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 
 use crate::model::link::LinkReport;
 
-fn back(told: &Told, now: Duration) -> (Told, Duration) {
-    let bytes = encode_told(told, now).unwrap();
+fn back(told: &ToScreen, now: Duration) -> (ToScreen, Duration) {
+    let bytes = encode_to_screen(told, now).unwrap();
     let (prefix, rest) = bytes.split_first_chunk().unwrap();
     assert_eq!(length(*prefix).unwrap(), rest.len());
-    decode_told(rest).unwrap()
+    decode_to_screen(rest).unwrap()
 }
 
 #[test]
-fn hello_and_live_come_back_the_same() {
-    let hello = Told::Hello(Hello { version: VERSION, link_name: "a".to_owned(), ..Hello::default() });
+fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
+    let hello = ToScreen::Hello(Hello { version: VERSION, link_name: "a".to_owned(), ..Hello::default() });
     assert_eq!(back(&hello, Duration::ZERO).0, hello);
-    assert_eq!(back(&Told::Live, Duration::ZERO).0, Told::Live);
-    let status = Status { pid: 7, at_risk: true, phase: "PAD_ARMED".to_owned(), ..Status::default() };
-    assert_eq!(back(&Told::Status(status.clone()), Duration::ZERO).0, Told::Status(status));
-    let stopping = Told::Stopping { stops: false, words: "armed".to_owned() };
+    assert_eq!(back(&ToScreen::Live, Duration::ZERO).0, ToScreen::Live);
+    let status =
+        StationStatus { pid: 7, at_risk: true, phase: "PAD_ARMED".to_owned(), ..StationStatus::default() };
+    assert_eq!(back(&ToScreen::Status(status.clone()), Duration::ZERO).0, ToScreen::Status(status));
+    let stopping = ToScreen::Stopping { stops: false, words: "armed".to_owned() };
     assert_eq!(back(&stopping, Duration::ZERO).0, stopping);
 }
 
-/// Whatever else it says: a screen must be able to tell its crew to update.
+/// A screen must be able to tell its crew which program to update.
 #[test]
-fn a_station_of_another_version_is_known_by_it() {
+fn a_greeting_of_another_version_decodes_to_its_version() {
     let hello = Hello { version: VERSION + 1, link_name: "a".to_owned(), ..Hello::default() };
-    let Told::Hello(known) = back(&Told::Hello(hello), Duration::ZERO).0 else { panic!("a greeting") };
+    let ToScreen::Hello(known) = back(&ToScreen::Hello(hello), Duration::ZERO).0 else {
+        panic!("a greeting")
+    };
     assert_eq!(known, Hello { version: VERSION + 1, ..Hello::default() });
 }
 
 #[test]
-fn a_stations_own_keys_stay_with_it() {
-    assert_eq!(encode_told(&Told::Msg(Msg::Key(crate::key::Key::Enter)), Duration::ZERO), None);
+fn a_stations_own_keys_are_not_sent() {
+    assert_eq!(encode_to_screen(&ToScreen::Msg(Msg::Key(crate::key::Key::Enter)), Duration::ZERO), None);
 }
 
-/// A screen lets go of a station that sends what it does not believe; so nothing of the kind is sent.
+/// A screen disconnects on a message that is too long, so none is sent.
 #[test]
-fn what_is_too_long_is_not_told() {
+fn a_message_that_is_too_long_is_not_sent() {
     let long = LinkReport {
         name: "x".repeat(4_000),
         figures: LinkFigures::default(),
@@ -54,25 +57,25 @@ fn what_is_too_long_is_not_told() {
         copies: 0,
         trouble: None,
     };
-    let links = |count| Told::Msg(Msg::Links { links: vec![long.clone(); count], signing: None });
+    let links = |count| ToScreen::Msg(Msg::Links { links: vec![long.clone(); count], signing: None });
     assert_eq!(back(&links(16), Duration::ZERO).0, links(16));
-    assert_eq!(encode_told(&links(17), Duration::ZERO), None);
+    assert_eq!(encode_to_screen(&links(17), Duration::ZERO), None);
 }
 
 #[test]
-fn what_is_asked_comes_back_the_same() {
+fn messages_to_a_station_survive_the_round_trip() {
     let asked = [
-        Asked::Hello { watch: true, operator: "anna on pts/3".to_owned() },
-        Asked::Status,
-        Asked::Stop { force: true, operator: "anna".to_owned() },
-        Asked::Command(CommandKind::Arm),
-        Asked::Acknowledge(AlarmKind::Held),
-        Asked::Acknowledge(AlarmKind::Refused(CommandKind::Abort)),
-        Asked::Parameters,
-        Asked::Key("Ctrl-X".to_owned()),
+        ToStation::Hello { watch: true, operator: "anna on pts/3".to_owned() },
+        ToStation::Status,
+        ToStation::Stop { force: true, operator: "anna".to_owned() },
+        ToStation::Request(Request::Command(CommandKind::Arm)),
+        ToStation::Request(Request::Acknowledge(AlarmKind::Held)),
+        ToStation::Request(Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort))),
+        ToStation::Request(Request::Parameters),
+        ToStation::Key("Ctrl-X".to_owned()),
     ];
     for asked in asked {
-        assert_eq!(decode_asked(&encode_asked(&asked)[4..]), Ok(asked));
+        assert_eq!(decode_to_station(&encode_to_station(&asked)[4..]), Ok(asked));
     }
 }
 
@@ -125,7 +128,7 @@ fn seat() -> impl Strategy<Value = Seat> {
     (any::<u32>(), any::<String>()).prop_map(|(screen, operator)| Seat { screen, operator })
 }
 
-/// Every message that the station's model takes from outside its own terminal.
+/// Every message that a station forwards to its screens.
 fn msg() -> impl Strategy<Value = Msg> {
     let heartbeat = any::<u32>().prop_map(|custom_mode| {
         let data = HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() };
@@ -140,7 +143,7 @@ fn msg() -> impl Strategy<Value = Msg> {
     prop_oneof![
         prop::sample::select(vec![
             Msg::Tick,
-            Msg::Acknowledged(AlarmKind::LinkLost),
+            Msg::AlarmAcknowledged(AlarmKind::LinkLost),
             Msg::ParametersWanted,
             Msg::ScreenGone
         ]),
@@ -163,27 +166,27 @@ fn msg() -> impl Strategy<Value = Msg> {
 
 proptest! {
     #[test]
-    fn what_is_told_comes_back_the_same(msg in msg(), now_ns in any::<u64>()) {
-        let (told, now) = (Told::Msg(msg), Duration::from_nanos(now_ns));
+    fn messages_to_a_screen_survive_the_round_trip(msg in msg(), now_ns in any::<u64>()) {
+        let (told, now) = (ToScreen::Msg(msg), Duration::from_nanos(now_ns));
         prop_assert_eq!(back(&told, now), (told, now));
     }
 
     #[test]
-    fn no_bytes_panic(bytes in vec(any::<u8>(), 0..80), kind in 0_u8..33) {
-        let _ = decode_told(&bytes);
-        let _ = decode_asked(&bytes);
+    fn arbitrary_bytes_do_not_panic(bytes in vec(any::<u8>(), 0..80), kind in 0_u8..33) {
+        let _ = decode_to_screen(&bytes);
+        let _ = decode_to_station(&bytes);
         let mut aimed = vec![kind, 0, 0, 0, 0, 0, 0, 0, 0];
         aimed.extend(&bytes);
-        let _ = decode_told(&aimed);
-        let _ = decode_asked(&aimed);
+        let _ = decode_to_screen(&aimed);
+        let _ = decode_to_station(&aimed);
     }
 
-    /// Bytes that were right, but for one.
+    /// A valid message with one changed byte.
     #[test]
-    fn no_changed_byte_panics(msg in msg(), place in any::<prop::sample::Index>(), byte in any::<u8>()) {
-        let mut bytes = encode_told(&Told::Msg(msg), Duration::ZERO).unwrap();
+    fn a_changed_byte_does_not_panic(msg in msg(), place in any::<prop::sample::Index>(), byte in any::<u8>()) {
+        let mut bytes = encode_to_screen(&ToScreen::Msg(msg), Duration::ZERO).unwrap();
         let place = 4 + place.index(bytes.len() - 4);
         bytes[place] = byte;
-        let _ = decode_told(&bytes[4..]);
+        let _ = decode_to_screen(&bytes[4..]);
     }
 }

@@ -1,4 +1,4 @@
-//! Every alarm that holds or that nobody has acknowledged, each to be acknowledged by itself.
+//! The alarms page: every alarm that holds or is not acknowledged, to be acknowledged one by one.
 
 use std::time::Duration;
 
@@ -6,26 +6,26 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
-use crate::view::alarms::{State, cut, state};
-use crate::view::theme::{Role, Theme};
+use crate::view::alarm_line::{State, cut, state};
+use crate::view::theme::{TextRole, Theme};
 
-/// Columns of `ended alarm: `.
+/// Columns of `ended alarm: ` and shorter words.
 const WORD_COLUMNS: usize = 13;
 
-/// The keys, then one alarm a line, the oldest first; the one that Space acknowledges is marked.
+/// The keys, then one alarm per line, the oldest first. The one that Space acknowledges is marked.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let list = model.alarms.list();
     if list.is_empty() {
-        return vec![Line::styled(" no alarm holds, and none waits to be seen", theme.style(Role::Good))];
+        return vec![Line::styled(" no active or unacknowledged alarm", theme.style(TextRole::Good))];
     }
     let chosen = model.pointed_at().map(|alarm| alarm.kind);
     let head = Line::from(vec![
-        Span::styled(" Space", theme.style(Role::Key)),
-        Span::styled(" acknowledges the marked one; ", theme.style(Role::Label)),
-        Span::styled("Up Down", theme.style(Role::Key)),
+        Span::styled(" Space", theme.style(TextRole::Key)),
+        Span::styled(" acknowledges the marked one; ", theme.style(TextRole::Label)),
+        Span::styled("Up Down", theme.style(TextRole::Key)),
         Span::styled(
             format!(" choose; {} of {} not seen", model.alarms.unacknowledged(), list.len()),
-            theme.style(Role::Label),
+            theme.style(TextRole::Label),
         ),
     ]);
     let mut marked = 0;
@@ -44,9 +44,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
             let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
             let text = cut(&alarm.text, room);
             Line::from(vec![
-                Span::styled(mark, theme.style(Role::Key)),
+                Span::styled(mark, theme.style(TextRole::Key)),
                 Span::styled(format!("{word:<WORD_COLUMNS$}"), theme.style(role)),
-                Span::styled(format!("{text:<room$} {age}{lasted}"), theme.style(Role::Plain)),
+                Span::styled(format!("{text:<room$} {age}{lasted}"), theme.style(TextRole::Plain)),
             ])
         })
         .collect();

@@ -1,4 +1,4 @@
-//! The way down: height and speed against the ignition band, the countdown, fins from above, the wind.
+//! The descent page: height gauge with the ignition band, values of the descent, fins from above, side view.
 
 use std::time::Duration;
 
@@ -11,17 +11,17 @@ use super::titled;
 use crate::model::vehicle::Sample;
 use crate::model::{Model, words};
 use crate::view::number::{age_mark, row, text_row};
-use crate::view::theme::{Role, Theme};
-use crate::view::{draw_lines, fins, gauge, happenings, lost, side};
+use crate::view::theme::{TextRole, Theme};
+use crate::view::{draw_lines, fins, gauge, link_line, lost_position, side_view};
 
 /// Columns of the height gauge.
 const GAUGE_COLUMNS: u16 = 27;
-/// Columns of the numbers.
+/// Columns of the values.
 const NUMBER_COLUMNS: u16 = 28;
-/// Rows of the numbers, their title included.
+/// Rows of the values, with their title.
 const NUMBER_ROWS: u16 = 18;
 
-/// Gauge on the left, numbers in the middle, fins and side view on the right.
+/// Draws the gauge on the left, the values in the middle, fins and side view on the right.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
         Constraint::Length(GAUGE_COLUMNS),
@@ -32,23 +32,23 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     draw_lines(frame, inside, &gauge::lines(model, theme, now, usize::from(inside.height)));
     let [numbers, below] =
         middle.layout(&Layout::vertical([Constraint::Length(NUMBER_ROWS), Constraint::Fill(1)]));
-    let title = if lost::is_lost(model, now) { "PREDICTED, not heard" } else { "Descent" };
+    let title = if lost_position::is_lost(model, now) { "PREDICTED, not heard" } else { "Descent" };
     let inside = titled(title, theme, frame, numbers);
     draw_lines(frame, inside, &lines(model, theme, now));
-    draw_lines(frame, below, &[happenings::link(model, theme, now, usize::from(below.width))]);
+    draw_lines(frame, below, &[link_line::link(model, theme, now, usize::from(below.width))]);
     let [fin_area, picture] =
         right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
     let inside = titled(&fins::title(model, now), theme, frame, fin_area);
     fins::draw(model, theme, now, frame, inside);
-    for (from, title, area) in side::pictures(model, picture) {
+    for (from, title, area) in side_view::pictures(model, picture) {
         let inside = titled(title, theme, frame, area);
-        side::draw(model, (side::Part::Whole, from), theme, now, frame, inside);
+        side_view::draw(model, (side_view::FlightPart::Whole, from), theme, now, frame, inside);
     }
 }
 
-/// The numbers, the most important first.
+/// The values, the most important first.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = lost::rows(model, theme, now);
+    let mut lines = lost_position::rows(model, theme, now);
     let descent = model.vehicle.descent.as_ref();
     let motion = model.vehicle.best_motion();
     let of = |pick: fn(&TD_DESCENT_DATA) -> f32| {
@@ -60,8 +60,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         value.zip(motion.map(|motion| motion.received_at)).map(|(value, at)| Sample::new(value, at))
     };
     lines.push(band_word(model, theme, now));
-    // What is predicted stands above; a second height beside it would be another value for the same.
-    if !lost::is_lost(model, now) {
+    // A prediction is shown above; a second height would be another value for the same quantity.
+    if !lost_position::is_lost(model, now) {
         lines.push(row(theme, "height", model.vehicle.height_m(), 1, "m", now));
         lines.push(row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
     }
@@ -85,44 +85,44 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines
 }
 
-/// Where the height stands against the band and the commit height, in words.
+/// Compares the height with the ignition band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
-        return Line::styled(" NO BURN: motor inhibited", theme.style(Role::Alarm));
+        return Line::styled(" NO BURN: motor inhibited", theme.style(TextRole::Alarm));
     }
     let Some(descent) = model.vehicle.descent.as_ref() else {
-        return Line::styled(" ignition band: no data", theme.style(Role::Caution));
+        return Line::styled(" ignition band: no data", theme.style(TextRole::Caution));
     };
     let (mark, stale) = age_mark(descent, now);
     let d = &descent.value;
     let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
     let (words, role) = if !(height_m.is_finite() && low_m.is_finite() && high_m.is_finite()) {
-        ("band not known", Role::Caution)
+        ("band not known", TextRole::Caution)
     } else if low_m > high_m {
-        ("NO HEIGHT LANDS", Role::Alarm)
+        ("NO HEIGHT LANDS", TextRole::Alarm)
     } else if height_m < low_m {
-        ("BELOW the band", Role::Alarm)
+        ("BELOW the band", TextRole::Alarm)
     } else if height_m > high_m {
-        ("above the band", Role::Plain)
+        ("above the band", TextRole::Plain)
     } else {
-        ("INSIDE the band", Role::Good)
+        ("INSIDE the band", TextRole::Good)
     };
     let committed = height_m < f64::from(d.commit_height_m);
     let commit = if committed { ", committed" } else { "" };
-    let role = if stale == Role::Stale { stale } else { role };
+    let role = if stale == TextRole::Stale { stale } else { role };
     Line::styled(format!("{mark}{words}{commit}"), theme.style(role))
 }
 
 fn chute(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = descent else { return text_row(theme, "chute", " ", "no data", Role::Label, "") };
+    let Some(descent) = descent else { return text_row(theme, "chute", " ", "no data", TextRole::Label, "") };
     let (mark, stale) = age_mark(descent, now);
     let text = words::lower_case(&descent.value.chute, "TD_CHUTE_");
     let role = match descent.value.chute {
-        TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => Role::Caution,
-        _ => Role::Plain,
+        TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => TextRole::Caution,
+        _ => TextRole::Plain,
     };
-    text_row(theme, "chute", mark, &text, if stale == Role::Stale { stale } else { role }, "")
+    text_row(theme, "chute", mark, &text, if stale == TextRole::Stale { stale } else { role }, "")
 }
 
 fn wind_speed(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
@@ -131,7 +131,7 @@ fn wind_speed(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> 
     speed.is_finite().then(|| Sample::new(speed, descent.received_at))
 }
 
-/// Where it blows from, as weather reports say it: 0 north, 90 east.
+/// The direction that the wind comes from, as in weather reports: 0 is north, 90 is east.
 fn wind_from(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
     let descent = descent?;
     let (north, east) = (f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));

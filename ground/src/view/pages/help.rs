@@ -1,8 +1,7 @@
-//! The keys, explained.
+//! The help page: the keys and the marks.
 
 use ratatui::text::Line;
 
-/// The screen's lines.
 pub fn lines() -> Vec<Line<'static>> {
     [
         " A               open the arming dialog (step 1);",
@@ -11,8 +10,8 @@ pub fn lines() -> Vec<Line<'static>> {
         " D, Enter        disarm",
         " Ctrl-X Enter    ABORT, from anywhere: Enter within 2 s, or Ctrl-X again;",
         "                 a held key is one press. Sent until the vehicle has latched it",
-        " Space           acknowledge the alarm of the line; 9 lists them, Up Down choose",
-        " 1 to 9          show a screen and hold it; h holds the present one; ? these keys",
+        " Space           acknowledge the shown alarm; 9 lists them, Up Down choose",
+        " 1 to 9          show a page and hold it; h holds the present one; ? this help",
         " 0 or Esc        follow the flight again",
         " Up Down PgUp PgDn Home End   scroll a list",
         " Ctrl-L          draw the screen again",
@@ -20,9 +19,9 @@ pub fn lines() -> Vec<Line<'static>> {
         " q, Ctrl-C       quit; armed or in flight only with QUIT and Enter",
         " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
         " observed are three facts; armed is what HEARTBEAT says.",
-        " o command, # actual. A line is flown, dots are planned; after the",
-        " loss of the link the position is a PREDICTION, + and the circle that holds it",
-        " 19 times in 20. From above N is north, P the way to the pad. * computed here.",
+        " o command, # actual. The line is flown, the dots are planned. After a loss",
+        " of the link, + is the PREDICTED position, with a circle that contains it in",
+        " 19 of 20 cases. Fins: N is north, P points to the pad. * computed on ground.",
     ]
     .into_iter()
     .map(Line::raw)

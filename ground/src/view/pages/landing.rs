@@ -1,4 +1,4 @@
-//! The burn: flight, controller, touchdown, actuators, side view.
+//! The landing page: flight, controller, touchdown, actuators, events and side view.
 
 use std::time::Duration;
 
@@ -11,12 +11,15 @@ use crate::model::Model;
 use crate::model::motion::BodySpeed;
 use crate::model::vehicle::Sample;
 use crate::view::number::{STALE_MARK, fixed};
-use crate::view::theme::{Role, Theme};
-use crate::view::{actuators, big, controller, draw_lines, flight, happenings, lost, side, top, touchdown};
+use crate::view::theme::{TextRole, Theme};
+use crate::view::{
+    actuators, big_letters, controller, draw_lines, event_list, flight, link_line, lost_position, side_view,
+    top_lines, touchdown,
+};
 
-/// Rows of the three panels at the top, their title included.
+/// Rows of the three panels at the top, with their title.
 const PANEL_ROWS: u16 = 9;
-/// Rows of the actuators, their title included.
+/// Rows of the actuators, with their title.
 const ACTUATOR_ROWS: u16 = 5;
 /// Columns left of the side view at 80 columns.
 const LEFT_COLUMNS: u16 = 54;
@@ -30,23 +33,23 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let [left, right] =
         below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
     draw_left(model, theme, now, frame, left);
-    let shows = if lost::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
-    for (from, title, area) in side::pictures(model, right) {
+    let shows = if lost_position::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
+    for (from, title, area) in side_view::pictures(model, right) {
         let title = match from {
-            side::From::East => format!("{title}: {shows}"),
-            side::From::South => format!("{title}: flown"),
+            side_view::Viewpoint::East => format!("{title}: {shows}"),
+            side_view::Viewpoint::South => format!("{title}: flown"),
         };
         let inside = titled(&title, theme, frame, area);
-        side::draw(model, (side::Part::Burn, from), theme, now, frame, inside);
+        side_view::draw(model, (side_view::FlightPart::Burn, from), theme, now, frame, inside);
     }
 }
 
 fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [first, second, third] =
         area.layout(&Layout::horizontal([Constraint::Fill(27), Constraint::Fill(26), Constraint::Fill(27)]));
-    if lost::is_lost(model, now) {
+    if lost_position::is_lost(model, now) {
         let inside = titled("PREDICTED, not heard", theme, frame, first);
-        draw_lines(frame, inside, &lost::rows(model, theme, now));
+        draw_lines(frame, inside, &lost_position::rows(model, theme, now));
     } else {
         let inside = titled("Flight", theme, frame, first);
         draw_lines(frame, inside, &flight::rows(model, theme, now));
@@ -74,48 +77,48 @@ fn draw_left(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
         let inside = titled("Gimbal", theme, frame, gimbal);
         draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
     }
-    frame.render_widget(happenings::link(model, theme, now, usize::from(link.width)), link);
+    frame.render_widget(link_line::link(model, theme, now, usize::from(link.width)), link);
     let inside = titled("Events", theme, frame, events);
-    let lines = happenings::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
 }
 
 fn draw_verdict(landed: bool, theme: Theme, frame: &mut Frame, area: Rect) {
     let word = if landed { "LANDED" } else { "NOT LANDED" };
-    let role = if landed { Role::Good } else { Role::Caution };
-    let lines = big::word(word).map(|line| Line::styled(format!(" {line}"), theme.style(role)));
+    let role = if landed { TextRole::Good } else { TextRole::Caution };
+    let lines = big_letters::word(word).map(|line| Line::styled(format!(" {line}"), theme.style(role)));
     let below = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
     draw_lines(frame, below, &lines);
 }
 
-/// The same facts as lines, the most important first.
+/// The same content as lines, the most important first.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let mut lines = vec![motion(model, theme, now)];
-    if lost::is_lost(model, now) {
-        lines = lost::rows(model, theme, now);
+    if lost_position::is_lost(model, now) {
+        lines = lost_position::rows(model, theme, now);
     }
-    // The newest event earns a line before anything else does.
+    // The newest event comes before everything else.
     lines.extend(newest_event(model, theme));
-    // An abort has its place above.
-    if let Some(track) = top::open_command(model, now) {
-        lines.push(top::facts_short(track, theme, now));
+    // An abort is shown in the top lines.
+    if let Some(track) = top_lines::open_command(model, now) {
+        lines.push(top_lines::command_facts_short(track, theme, now));
     }
     lines.push(attitude(model, theme, now));
     let (title, touchdown) = touchdown::panel(model, theme, now);
-    let mut verdict = Line::styled(format!(" {title}: "), theme.style(Role::Label));
+    let mut verdict = Line::styled(format!(" {title}: "), theme.style(TextRole::Label));
     verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
         let style = line.style;
         line.spans.into_iter().map(move |span| span.patch_style(style))
     }));
     lines.push(verdict);
     lines.extend(controller::rows(model, theme, now).into_iter().take(2));
-    // In the plane command and actual, in space either plane's.
+    // For a planar vehicle command and measurement; in space one row of each gimbal plane.
     let gimbal = actuators::gimbal_rows(model, theme, now).into_iter();
     lines.extend(gimbal.step_by(if model.vehicle.in_space { 2 } else { 1 }).take(2));
     lines.extend(actuators::fin_rows(model, theme, now));
-    lines.push(happenings::link(model, theme, now, columns));
+    lines.push(link_line::link(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
-    lines.extend(happenings::events(model, theme, columns, room));
+    lines.extend(event_list::events(model, theme, columns, room));
     lines
 }
 
@@ -129,9 +132,9 @@ fn value(
     let text = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
     let stale = sample.is_some_and(|sample| sample.is_stale(now));
     let mark = if stale { STALE_MARK } else { "" };
-    let role = if stale { Role::Stale } else { Role::Plain };
+    let role = if stale { TextRole::Stale } else { TextRole::Plain };
     vec![
-        Span::styled(format!(" {label} "), theme.style(Role::Label)),
+        Span::styled(format!(" {label} "), theme.style(TextRole::Label)),
         Span::styled(format!("{mark}{text}"), theme.style(role)),
     ]
 }
@@ -164,5 +167,5 @@ fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let event = model.events.newest(1).next()?;
-    Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(Role::Plain)))
+    Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(TextRole::Plain)))
 }

@@ -1,29 +1,30 @@
-//! The link: what it carries, what it loses, and how old everything is.
+//! The link page: rates and losses, rejected frames, and the age of every message.
 
 use std::time::Duration;
 
 use protocol::dialect::message_name;
 use protocol::identity::Address;
-use protocol::link::{LinkFigures, SourceFigures};
+use protocol::link_stats::{LinkFigures, SourceFigures};
 use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
-use crate::model::link::{LinkReport, LinkState};
+use crate::model::link::LinkReport;
+use crate::model::link_state::LinkState;
 use crate::model::uplink::refusal;
 use crate::model::vehicle::STALE_AFTER;
-use crate::view::happenings::{self, percent};
+use crate::view::link_line::{link, percent};
 use crate::view::number::{STALE_MARK, seconds};
-use crate::view::theme::{Role, Theme};
+use crate::view::theme::{TextRole, Theme};
 
-/// Above this share the loss is marked.
+/// A loss above this share is marked.
 const LOSS_MARKED: f64 = 0.05;
-/// From this width on, figures stand in columns below their names.
+/// From this width on the values are in columns.
 const TABLE_COLUMNS: usize = 76;
 const NAME_WIDTH: usize = 27;
-/// The longest name of a message that the screens live by, and an age.
+/// The width of a message name with its age.
 const AGE_CELL_WIDTH: usize = 35;
-/// What the vehicle sends all the time, and the screens live by.
+/// The messages that the vehicle sends regularly.
 const REGULAR: [&str; 13] = [
     "HEARTBEAT",
     "SYS_STATUS",
@@ -40,9 +41,9 @@ const REGULAR: [&str; 13] = [
     "TD_PREDICTED_PATH",
 ];
 
-/// The figures in all, of each link and of each component; then the age of every message.
+/// The rates of all links together, of each link and of each component; then the age of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let mut lines = vec![happenings::link(model, theme, now, columns)];
+    let mut lines = vec![link(model, theme, now, columns)];
     lines.push(directions(model, theme, now));
     lines.extend(rejected(model, theme));
     lines.push(heading(theme, columns));
@@ -54,15 +55,15 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     }
     lines.push(Line::styled(
         format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
-        theme.style(Role::Title),
+        theme.style(TextRole::Title),
     ));
     lines.extend(age_lines(model, theme, now, columns));
-    // Up goes back towards the first line.
+    // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
     window(lines, start, rows)
 }
 
-/// The ages of both directions, and what the vehicle refuses.
+/// The age of the last frame in both directions, and what the vehicle refuses.
 fn directions(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let age = |state: LinkState| match state {
         LinkState::NeverHeard => "never".to_owned(),
@@ -75,20 +76,20 @@ fn directions(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         format!("; it refused {} of {system_id}/{component_id}, {since} ago: {why}", refused.count)
     });
     Line::from(vec![
-        Span::styled(" heard    ", theme.style(Role::Label)),
+        Span::styled(" heard    ", theme.style(TextRole::Label)),
         Span::styled(
             format!("down {} ago, up {} ago{refused}", age(model.link.state(now)), age(uplink.state(now))),
-            theme.style(Role::Plain),
+            theme.style(TextRole::Plain),
         ),
     ])
 }
 
-/// What was thrown away, by why.
+/// Counts of rejected frames by reason.
 fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let row = |label: &str, value: String| {
         Line::from(vec![
-            Span::styled(format!(" {label:<9}"), theme.style(Role::Label)),
-            Span::styled(value, theme.style(Role::Plain)),
+            Span::styled(format!(" {label:<9}"), theme.style(TextRole::Label)),
+            Span::styled(value, theme.style(TextRole::Plain)),
         ])
     };
     let framing = &model.link.framing;
@@ -120,7 +121,7 @@ fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     lines
 }
 
-/// All links together as they are now; where there are several, also each as it was reported.
+/// All links together; if there are several, also each link as last reported.
 fn reports(model: &Model, now: Duration) -> Vec<LinkReport> {
     let link = &model.link;
     let several = link.reports.len() > 1;
@@ -153,13 +154,13 @@ fn heading(theme: Theme, columns: usize) -> Line<'static> {
     } else {
         " Over 10 s: rate, loss, age".to_owned()
     };
-    Line::styled(text, theme.style(Role::Title))
+    Line::styled(text, theme.style(TextRole::Title))
 }
 
 fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
     let name = &report.name;
     if let Some(why) = &report.trouble {
-        return Line::styled(format!(" {name} DOWN {why}"), theme.style(Role::Alarm));
+        return Line::styled(format!(" {name} DOWN {why}"), theme.style(TextRole::Alarm));
     }
     let LinkFigures { rx_bytes_s, tx_bytes_s, rx_frames_s, loss } = report.figures;
     let loss = (rx_frames_s > 0.0).then_some(loss);
@@ -195,11 +196,11 @@ fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: 
     } else {
         format!(" {name} {rx_frames_s:.1}/s {loss_words} {mark}{age_words}")
     };
-    let role = if age > STALE_AFTER { Role::Stale } else { loss_role(loss) };
+    let role = if age > STALE_AFTER { TextRole::Stale } else { loss_role(loss) };
     Line::styled(text, theme.style(role))
 }
 
-/// What a component is, as far as its ids say. Component ids: MAVLink's `MAV_COMPONENT`.
+/// What a component is, by its ids (MAVLink's `MAV_COMPONENT`).
 fn what(address: Address, vehicle: Address) -> &'static str {
     match address {
         _ if address == vehicle => "vehicle",
@@ -209,11 +210,11 @@ fn what(address: Address, vehicle: Address) -> &'static str {
     }
 }
 
-fn loss_role(loss: Option<f64>) -> Role {
-    if loss.is_some_and(|loss| loss > LOSS_MARKED) { Role::Caution } else { Role::Plain }
+fn loss_role(loss: Option<f64>) -> TextRole {
+    if loss.is_some_and(|loss| loss > LOSS_MARKED) { TextRole::Caution } else { TextRole::Plain }
 }
 
-/// As many columns of them as there is room for.
+/// The ages in as many columns as fit.
 fn age_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let ages = ages(model, now);
     let across = (columns / AGE_CELL_WIDTH).max(1);
@@ -228,17 +229,17 @@ fn age_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<
 
 fn age_cell(name: &str, age: Option<Duration>, theme: Theme) -> [Span<'static>; 2] {
     let (text, role) = match age {
-        None => (" never".to_owned(), Role::Label),
-        Some(age) if age > STALE_AFTER => (format!("{STALE_MARK}{}", seconds(age)), Role::Stale),
-        Some(age) => (format!(" {}", seconds(age)), Role::Plain),
+        None => (" never".to_owned(), TextRole::Label),
+        Some(age) if age > STALE_AFTER => (format!("{STALE_MARK}{}", seconds(age)), TextRole::Stale),
+        Some(age) => (format!(" {}", seconds(age)), TextRole::Plain),
     };
     [
-        Span::styled(format!(" {name:<24.24}"), theme.style(Role::Label)),
+        Span::styled(format!(" {name:<24.24}"), theme.style(TextRole::Label)),
         Span::styled(format!("{text:<10}"), theme.style(role)),
     ]
 }
 
-/// What is sent all the time, heard or not; then whatever else was heard, by its number.
+/// The regular messages, received or not; then every other message that was received, by its id.
 fn ages(model: &Model, now: Duration) -> Vec<(&'static str, Option<Duration>)> {
     let heard: Vec<(&'static str, Duration)> = model
         .link

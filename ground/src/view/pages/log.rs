@@ -1,49 +1,49 @@
-//! The recording.
+//! The log page: whether the flight is recorded, and where.
 
 use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
-use crate::model::{self, Model};
+use crate::model::{Model, Role};
 use crate::view::number::seconds;
-use crate::view::theme::{Role, Theme};
+use crate::view::theme::{TextRole, Theme};
 
-/// Where it goes, and whether it holds everything.
+/// The state of the recording, its files and counts.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let row = |label: &str, value: String, role: Role| {
+    let row = |label: &str, value: String, role: TextRole| {
         Line::from(vec![
-            Span::styled(format!(" {label:<14}"), theme.style(Role::Label)),
+            Span::styled(format!(" {label:<14}"), theme.style(TextRole::Label)),
             Span::styled(value, theme.style(role)),
         ])
     };
-    if model.settings.role == model::Role::Replaying {
+    if model.settings.role == Role::Replaying {
         return vec![
-            row("state", "a recorded flight; nothing is written".to_owned(), Role::Plain),
-            row("log", model.settings.log_path.clone().unwrap_or_default(), Role::Plain),
-            row("events", model.events.total().to_string(), Role::Plain),
+            row("state", "a recorded flight; nothing is written".to_owned(), TextRole::Plain),
+            row("log", model.settings.log_path.clone().unwrap_or_default(), TextRole::Plain),
+            row("events", model.events.total().to_string(), TextRole::Plain),
         ];
     }
     let state = match (&model.settings.log_path, model.log.failed, model.log.dropped) {
-        (None, _, _) => row("state", "NOT RECORDING: --log none".to_owned(), Role::Caution),
-        (Some(_), true, _) => row("state", "FAILED: nothing more is recorded".to_owned(), Role::Alarm),
-        (Some(_), false, 0) => row("state", "recording; nothing lost".to_owned(), Role::Good),
-        (Some(_), false, lost) => row("state", format!("recording; {lost} records LOST"), Role::Caution),
+        (None, _, _) => row("state", "NOT RECORDING: --log none".to_owned(), TextRole::Caution),
+        (Some(_), true, _) => row("state", "FAILED: nothing more is recorded".to_owned(), TextRole::Alarm),
+        (Some(_), false, 0) => row("state", "recording; nothing lost".to_owned(), TextRole::Good),
+        (Some(_), false, lost) => row("state", format!("recording; {lost} records LOST"), TextRole::Caution),
     };
     let none = || "none".to_owned();
     vec![
         state,
-        row("log", model.settings.log_path.clone().unwrap_or_else(none), Role::Plain),
-        row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), Role::Plain),
-        row("running for", seconds(now), Role::Plain),
-        row("events", model.events.total().to_string(), Role::Plain),
+        row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
+        row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
+        row("running for", seconds(now), TextRole::Plain),
+        row("events", model.events.total().to_string(), TextRole::Plain),
         Line::default(),
         Line::styled(
             " Both directions of the link, every key, command and event are recorded.",
-            theme.style(Role::Label),
+            theme.style(TextRole::Label),
         ),
         Line::styled(
-            " What is older than 0.2 s is on the disk, whatever happens to this program.",
-            theme.style(Role::Label),
+            " Records older than 0.2 s are on disk, even if this program crashes.",
+            theme.style(TextRole::Label),
         ),
     ]
 }

@@ -1,4 +1,4 @@
-//! One room a screen. Each gives its lines for small terminals; those with panels also draw them.
+//! One module per page. Each gives its content as lines for small terminals; pages with panels also draw them.
 
 pub mod alarms;
 pub mod descent;
@@ -19,11 +19,11 @@ use ratatui::text::Line;
 use ratatui::widgets::{Block, Borders};
 
 use super::draw_lines;
-use super::theme::{Role, Theme};
+use super::theme::{TextRole, Theme};
 use crate::model::Model;
 use crate::model::page::Page;
 
-/// Draws the present screen between the top lines and the alarm line.
+/// Draws the present page between the top lines and the alarm line.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     match model.page() {
         Page::Pad => pad::draw(model, theme, now, frame, area),
@@ -36,7 +36,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     }
 }
 
-/// The present screen as lines, the most important first.
+/// The page as lines, the most important first.
 pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
@@ -55,14 +55,14 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
 
 /// Draws a title with a rule and returns the area below it.
 pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let title = Line::styled(format!(" {title} "), theme.style(Role::Title));
-    let block = Block::new().borders(Borders::TOP).border_style(theme.style(Role::Label)).title(title);
+    let title = Line::styled(format!(" {title} "), theme.style(TextRole::Title));
+    let block = Block::new().borders(Borders::TOP).border_style(theme.style(TextRole::Label)).title(title);
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
     inside
 }
 
-/// So many lines from a place on.
+/// This many lines from a start line on.
 fn window(lines: Vec<Line<'static>>, start: usize, rows: usize) -> Vec<Line<'static>> {
     lines.into_iter().skip(start).take(rows).collect()
 }

@@ -1,4 +1,4 @@
-//! Before the flight: every arming check with its value and reason, and the ladder that arms.
+//! The pad page: every arming check with its value, and the arming ladder (the steps from link to countdown).
 
 use std::time::Duration;
 
@@ -13,17 +13,17 @@ use crate::model::command::CommandKind;
 use crate::model::vehicle::{Vehicle, is_on_pad};
 use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
-use crate::view::theme::{Role, Theme};
-use crate::view::{draw_lines, flight, happenings, next, top};
+use crate::view::theme::{TextRole, Theme};
+use crate::view::{draw_lines, event_list, flight, link_line, next_event, top_lines};
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
-/// Rows of the checks, title and summary included.
+/// Rows of the checks, with title and summary.
 const CHECK_ROWS: u16 = 16;
-/// Rows of the ladder, its title included.
+/// Rows of the ladder, with its title.
 const LADDER_ROWS: u16 = 10;
 
-/// Checks and ladder side by side, the events below.
+/// Draws checks and ladder side by side, the events below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [upper, events] =
         area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
@@ -38,32 +38,32 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let inside = titled("Now", theme, frame, picture);
     let mut lines = flight::rows(model, theme, now);
     lines.truncate(2);
-    lines.push(happenings::link(model, theme, now, usize::from(inside.width)));
+    lines.push(link_line::link(model, theme, now, usize::from(inside.width)));
     draw_lines(frame, inside, &lines);
     let inside = titled("Events", theme, frame, events);
-    let lines = happenings::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
 }
 
-/// The failing checks first: they are what a small screen must show.
+/// Failing checks first, because a small screen must show them.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    // What is next in flight stands above already.
-    let mut lines: Vec<Line> = match next::line(model, theme, now) {
+    // In flight the next event is already shown above.
+    let mut lines: Vec<Line> = match next_event::line(model, theme, now) {
         Some(_) => Vec::new(),
-        None => vec![top::command(model, theme, now)],
+        None => vec![top_lines::command(model, theme, now)],
     };
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
-    // Before the first command both begin with the same words.
+    // Before the first command two lines may be equal.
     lines.dedup_by_key(|line| line.to_string());
     lines.extend(ladder(model, theme, now));
     lines
 }
 
-/// One line a check: GO or NO, its name, the value found, and why it refuses.
+/// One line per check: GO or NO, its name, the value found, and why it fails.
 fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    // Off the pad the vehicle checks nothing of this, and sends no failing check either.
+    // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let status = model.vehicle.status.as_ref().filter(|_| !off_pad);
     let stale = status.is_some_and(|status| status.is_stale(now));
@@ -71,45 +71,48 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         .iter_names()
         .map(|(name, bit)| {
             let (word, role) = match status {
-                None => (" ?  ", Role::Label),
-                Some(status) if status.value.checks_failed.contains(bit) => (" NO ", Role::Alarm),
-                Some(_) => (" GO ", Role::Good),
+                None => (" ?  ", TextRole::Label),
+                Some(status) if status.value.checks_failed.contains(bit) => (" NO ", TextRole::Alarm),
+                Some(_) => (" GO ", TextRole::Good),
             };
             let mark = if stale { STALE_MARK } else { " " };
             let name = words::lower_case(&NameOf(name), "TD_CHECK_");
             let failing = status.is_some_and(|status| status.value.checks_failed.contains(bit));
-            let reason = if failing { why(bit) } else { "" };
+            let reason = if failing { failure(bit) } else { "" };
             let passing = status.is_some() && !failing;
             let found = match found(&model.vehicle, bit) {
-                none if none.is_empty() && passing => holds(bit).to_owned(),
+                none if none.is_empty() && passing => passing_word(bit).to_owned(),
                 found => found,
             };
             Line::from(vec![
                 Span::styled(word, theme.style(role)),
-                Span::styled(format!("{mark}{name:<19.19}"), theme.style(Role::Plain)),
-                Span::styled(format!("{found:>10} "), theme.style(Role::Plain)),
-                Span::styled(reason, theme.style(Role::Caution)),
+                Span::styled(format!("{mark}{name:<19.19}"), theme.style(TextRole::Plain)),
+                Span::styled(format!("{found:>10} "), theme.style(TextRole::Plain)),
+                Span::styled(reason, theme.style(TextRole::Caution)),
             ])
         })
         .collect();
     let summary = match status {
         None if off_pad => {
-            Line::styled(" off the pad nothing is checked for arming", theme.style(Role::Label))
+            Line::styled(" off the pad nothing is checked for arming", theme.style(TextRole::Label))
         }
-        None => Line::styled(" the vehicle has not said how its checks stand", theme.style(Role::Caution)),
+        None => Line::styled(" the vehicle has not reported its checks", theme.style(TextRole::Caution)),
         Some(status) if stale || status.value.checks_failed.is_empty() => {
-            top::readiness(model, theme, now).unwrap_or_default()
+            top_lines::readiness(model, theme, now).unwrap_or_default()
         }
         Some(status) => {
             let count = status.value.checks_failed.iter_names().count();
-            Line::styled(format!(" NO-GO: {count} of {} checks fail", lines.len()), theme.style(Role::Alarm))
+            Line::styled(
+                format!(" NO-GO: {count} of {} checks fail", lines.len()),
+                theme.style(TextRole::Alarm),
+            )
         }
     };
     lines.insert(0, summary);
     lines
 }
 
-/// A bit's name, printed as it is.
+/// Prints the name of a bit as it is.
 struct NameOf<'a>(&'a str);
 
 impl std::fmt::Debug for NameOf<'_> {
@@ -118,7 +121,7 @@ impl std::fmt::Debug for NameOf<'_> {
     }
 }
 
-/// What telemetry shows of a check; empty where it shows nothing.
+/// The value that telemetry shows for a check; empty if there is none.
 fn found(vehicle: &Vehicle, check: TdCheck) -> String {
     let locks = vehicle.interlocks();
     let yes_no = |bit: TdInterlock, yes: &'static str, no: &'static str| {
@@ -156,8 +159,8 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
     }
 }
 
-/// What a passing check says that telemetry has no number for.
-fn holds(check: TdCheck) -> &'static str {
+/// The word for a passing check without a value in telemetry.
+fn passing_word(check: TdCheck) -> &'static str {
     match check {
         TdCheck::TD_CHECK_SELF_TEST => "passed",
         TdCheck::TD_CHECK_ESTIMATOR => "settled",
@@ -169,8 +172,8 @@ fn holds(check: TdCheck) -> &'static str {
     }
 }
 
-/// Why a failing check refuses, in the dialect's words.
-fn why(check: TdCheck) -> &'static str {
+/// Why a check fails.
+fn failure(check: TdCheck) -> &'static str {
     match check {
         TdCheck::TD_CHECK_ABORT_LATCH => "power cycle",
         TdCheck::TD_CHECK_PIN => "pull the pin",
@@ -190,7 +193,7 @@ fn why(check: TdCheck) -> &'static str {
     }
 }
 
-/// The rungs from link to countdown, and which stand.
+/// The steps from link to countdown, and which are done.
 fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
     let phase = vehicle.phase().map(|phase| phase.value);
@@ -212,23 +215,23 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines: Vec<Line> = rungs
         .into_iter()
         .map(|(stands, words)| {
-            let (mark, role) = if stands { (" [x] ", Role::Good) } else { (" [ ] ", Role::Label) };
+            let (mark, role) = if stands { (" [x] ", TextRole::Good) } else { (" [ ] ", TextRole::Label) };
             Line::from(vec![
                 Span::styled(mark, theme.style(role)),
-                Span::styled(words, theme.style(Role::Plain)),
+                Span::styled(words, theme.style(TextRole::Plain)),
             ])
         })
         .collect();
     lines.push(match model.settings.role.why_not_command() {
-        Some(why) => Line::styled(format!(" {why}"), theme.style(Role::Label)),
+        Some(why) => Line::styled(format!(" {why}"), theme.style(TextRole::Label)),
         None => Line::from(vec![
-            Span::styled(" D", theme.style(Role::Key)),
-            Span::styled(" disarm   ", theme.style(Role::Label)),
-            Span::styled(top::ABORT_KEY, theme.style(Role::Key)),
-            Span::styled(" ABORT", theme.style(Role::Label)),
+            Span::styled(" D", theme.style(TextRole::Key)),
+            Span::styled(" disarm   ", theme.style(TextRole::Label)),
+            Span::styled(top_lines::ABORT_KEY, theme.style(TextRole::Key)),
+            Span::styled(" ABORT", theme.style(TextRole::Label)),
         ]),
     });
     let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
-    lines.extend(arming.map(|track| top::facts_short(track, theme, now)));
+    lines.extend(arming.map(|track| top_lines::command_facts_short(track, theme, now)));
     lines
 }

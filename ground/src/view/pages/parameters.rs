@@ -1,38 +1,38 @@
-//! The vehicle's parameters.
+//! The parameters page: the vehicle's parameters by name.
 
 use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
 use crate::view::number::shortest;
-use crate::view::theme::{Role, Theme};
+use crate::view::theme::{TextRole, Theme};
 
-/// How many are known, then one a line, from the first.
+/// How many are known, then one parameter per line.
 pub fn lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
     let parameters = &model.parameters;
     let of = parameters.count.map_or_else(|| "?".to_owned(), |count| count.to_string());
     let state = if parameters.is_empty() && parameters.asked {
-        " asked for; nothing heard yet".to_owned()
+        " requested; no answer yet".to_owned()
     } else if parameters.is_empty() {
-        " not asked for yet".to_owned()
+        " not requested yet".to_owned()
     } else {
         format!(" {} of {of} known", parameters.len())
     };
     let head = Line::from(vec![
-        Span::styled(state, theme.style(Role::Plain)),
-        Span::styled("   r", theme.style(Role::Key)),
-        Span::styled(" asks the vehicle again; read only here", theme.style(Role::Label)),
+        Span::styled(state, theme.style(TextRole::Plain)),
+        Span::styled("   r", theme.style(TextRole::Key)),
+        Span::styled(" asks the vehicle again; read-only here", theme.style(TextRole::Label)),
     ]);
     let list: Vec<Line> = parameters
         .iter()
         .map(|(name, value)| {
             Line::from(vec![
-                Span::styled(format!("  {name:<18}"), theme.style(Role::Label)),
-                Span::styled(format!("{:>14}", shortest(value)), theme.style(Role::Plain)),
+                Span::styled(format!("  {name:<18}"), theme.style(TextRole::Label)),
+                Span::styled(format!("{:>14}", shortest(value)), theme.style(TextRole::Plain)),
             ])
         })
         .collect();
-    // Up goes back towards the first: the list begins at its top.
+    // Scrolling up goes towards the first line.
     let start = list.len().saturating_sub(rows.saturating_sub(1)).min(model.pages.scroll);
     std::iter::once(head).chain(window(list, start, rows.saturating_sub(1))).collect()
 }

@@ -1,4 +1,4 @@
-//! After the flight: the verdict against each limit, the timeline, the greatest values.
+//! The review page after a flight: verdict, limits, greatest values and timeline.
 
 use std::time::Duration;
 
@@ -6,15 +6,15 @@ use ratatui::text::{Line, Span};
 
 use crate::model::{Model, words};
 use crate::view::number::fixed;
-use crate::view::theme::{Role, Theme};
+use crate::view::theme::{TextRole, Theme};
 use crate::view::{touchdown, verdict};
 
-/// Columns of the plan's end beside the greatest values.
+/// Columns of the predicted touchdown beside the greatest values.
 const PLAN_COLUMNS: usize = 37;
 /// Columns of the greatest values.
 const MAXIMA_COLUMNS: usize = 34;
 
-/// The word that decides, then limits and maxima, then the timeline.
+/// The verdict, then limits and greatest values, then the timeline.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let (head, limits, limit_columns) = if let Some(judged) = &model.vehicle.verdict {
         (
@@ -24,21 +24,24 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<
         )
     } else {
         let (title, mut limits) = touchdown::panel(model, theme, now);
-        limits.insert(0, Line::styled(title, theme.style(Role::Title)));
-        let none = Line::styled(" no verdict of the vehicle yet", theme.style(Role::Caution));
+        limits.insert(0, Line::styled(title, theme.style(TextRole::Title)));
+        let none = Line::styled(" no verdict received yet", theme.style(TextRole::Caution));
         (none, limits, PLAN_COLUMNS)
     };
     let mut lines = vec![head];
     let mut maxima = maxima(model, theme);
-    maxima.insert(0, Line::styled(" Greatest values in flight", theme.style(Role::Title)));
+    maxima.insert(0, Line::styled(" Greatest values in flight", theme.style(TextRole::Title)));
     if columns > limit_columns + MAXIMA_COLUMNS {
         lines.extend(beside(limits, limit_columns + 1, maxima));
     } else {
         lines.extend(limits);
         lines.extend(maxima);
     }
-    lines.push(Line::styled(" leg load   no data: the vehicle does not report it", theme.style(Role::Label)));
-    lines.push(Line::styled(" Timeline", theme.style(Role::Title)));
+    lines.push(Line::styled(
+        " leg load   no data: the vehicle does not report it",
+        theme.style(TextRole::Label),
+    ));
+    lines.push(Line::styled(" Timeline", theme.style(TextRole::Title)));
     lines.extend(timeline(model, theme));
     lines
 }
@@ -67,9 +70,9 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
         let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
         Line::from(vec![
-            Span::styled(format!(" {label:<18}"), theme.style(Role::Label)),
-            Span::styled(format!("{text:>9}"), theme.style(Role::Plain)),
-            Span::styled(format!(" {unit}"), theme.style(Role::Label)),
+            Span::styled(format!(" {label:<18}"), theme.style(TextRole::Label)),
+            Span::styled(format!("{text:>9}"), theme.style(TextRole::Plain)),
+            Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
         ])
     };
     let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
@@ -95,7 +98,7 @@ fn timeline(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         .map(|(phase, at)| format!("{:>8.1} {:<14}", at.as_secs_f64(), words::phase(*phase)))
         .collect();
     if entries.is_empty() {
-        return vec![Line::styled("  nothing heard", theme.style(Role::Label))];
+        return vec![Line::styled("  nothing heard", theme.style(TextRole::Label))];
     }
-    entries.chunks(3).map(|chunk| Line::styled(chunk.concat(), theme.style(Role::Plain))).collect()
+    entries.chunks(3).map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain))).collect()
 }

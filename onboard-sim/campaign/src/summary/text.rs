@@ -1,4 +1,4 @@
-//! The summary for people: plain text and Markdown.
+//! The summary as plain text and as Markdown.
 
 use core::fmt::{self, Write};
 
@@ -6,7 +6,7 @@ use super::{Distribution, Summary};
 use crate::order::{Manifest, Shard};
 use crate::statistics::Share;
 
-/// As plain text.
+/// The summary as plain text.
 pub fn to_text(summary: &Summary) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
@@ -14,7 +14,7 @@ pub fn to_text(summary: &Summary) -> String {
     out
 }
 
-/// As Markdown, with the pictures beside it.
+/// The summary as Markdown, with links to the pictures in the same directory.
 pub fn to_markdown(summary: &Summary) -> String {
     let mut out = String::new();
     let _ = markdown(summary, &mut out);

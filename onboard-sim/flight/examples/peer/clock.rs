@@ -1,4 +1,4 @@
-//! The thread's own processor time: what others run in between does not count.
+//! The thread's own processor time, without the time of other threads.
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -8,7 +8,7 @@ pub(crate) fn thread_ns() -> i64 {
     now.tv_sec * 1_000_000_000 + now.tv_nsec
 }
 
-/// Time of one run, ns: the shortest of some repeats of the mean over some runs.
+/// Time of one run, ns: the mean over some runs, and the smallest of these means over some repeats.
 pub(crate) fn best_of(repeats: u32, runs: u32, mut work: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..repeats {

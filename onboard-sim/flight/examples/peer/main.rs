@@ -1,7 +1,7 @@
-//! The landing controller's solver on a pipe, for a comparison with other solvers that takes turns problem by problem.
+//! The landing controller's solver behind a pipe, to compare it with other solvers problem by problem.
 //!
-//! One command a line on standard input, one line of answer each. A state is `x z theta u w q`, in m, rad, m/s and
-//! rad/s. The problem is the landing paper's own (no box at the end but its distance and height), N = 50.
+//! Each line on standard input is a command and gets one line as its answer. A state is `x z theta u w q`, in m, rad,
+//! m/s and rad/s. The problem is the landing paper's own (only distance and height are limited at the end), N = 50.
 //!
 //! ```text
 //! cold STATE          solve the whole horizon from the solver's own two bent guesses
@@ -11,10 +11,10 @@
 //! peak                time the arithmetic of this machine
 //! ```
 //!
-//! A solve runs twice and the second is timed, in the thread's own processor time: interruptions do not count. It is
-//! answered by `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad; `sweep` by
-//! the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one iteration;
-//! `peak` by Gflop/s and the latencies of addition, multiplication, division and root in ns.
+//! A solve runs twice, and the second run is timed in the thread's own processor time, so interruptions do not count.
+//! Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad. The answer
+//! to `sweep` is the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one
+//! iteration. The answer to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
@@ -26,13 +26,14 @@ use std::io::{BufRead, Write as _};
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
-use flight::dynamics::PlanarState;
-use flight::nmpc::{Problem, Solution, WarmStart, Workspace, solve, solve_into};
-use flight::profile::Profile;
+use flight::guidance::landing::landing_problem;
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::profile::Profile;
+use nmpc::{Problem, Solution, WarmStart, Workspace, solve, solve_into};
 
 const HORIZON: usize = 50;
 
-/// Fewest runs that are averaged, and how often that is repeated, for the layers of an iteration.
+/// Number of runs that are averaged, and of repeats, when the layers of an iteration are timed.
 const RUNS: u32 = 50;
 const REPEATS: u32 = 40;
 
@@ -57,7 +58,7 @@ struct Peer {
 impl Peer {
     fn new() -> Result<Self> {
         let mut profile =
-            Profile::builtin("paper-calibrated").context("built-in profile paper-calibrated")?;
+            vehicles::profile::builtin("paper-calibrated").context("built-in profile paper-calibrated")?;
         profile.nmpc.limits.final_box = None;
         profile.nmpc.limits.altitude_min_m = None;
         Ok(Self {
@@ -95,7 +96,7 @@ impl Peer {
     }
 
     fn problem(&self, start: PlanarState, intervals: usize) -> Problem {
-        Problem::from_profile(&self.profile, start, 0.0, intervals, 1.0)
+        landing_problem(&self.profile, start, 0.0, intervals, 1.0)
     }
 
     fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> Result<String> {

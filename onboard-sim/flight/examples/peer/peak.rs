@@ -1,4 +1,4 @@
-//! What this machine's arithmetic does at best, in the same portable code and vector width as the solver's.
+//! The peak arithmetic of this machine, with the same portable code and vector width as the solver.
 
 use core::array::from_fn;
 use core::fmt;
@@ -9,7 +9,7 @@ use crate::clock::best_of;
 /// Numbers in a vector register of the target.
 const WIDTH: usize = if cfg!(target_feature = "avx") { 4 } else { 2 };
 
-/// Independent chains: enough to hide the latency, few enough for sixteen registers.
+/// Number of independent chains: enough to hide the latency, few enough for sixteen registers.
 const CHAINS: usize = 12;
 
 const STEPS: u32 = 20_000;
@@ -43,7 +43,7 @@ pub(crate) fn measured() -> Peak {
     }
 }
 
-/// Multiplications and additions in equal numbers, every result the next step's operand.
+/// Equal numbers of multiplications and additions; every result is the operand of the next step.
 fn multiply_add(factor: f64, term: f64) {
     let mut sums: [[f64; WIDTH]; CHAINS] = from_fn(|chain| [chain as f64; WIDTH]);
     for _ in 0..STEPS {
@@ -54,7 +54,7 @@ fn multiply_add(factor: f64, term: f64) {
     black_box(sums);
 }
 
-/// One operation after the other.
+/// A chain of dependent operations.
 fn chain(operation: impl Fn(f64) -> f64) {
     let mut value = black_box(1.5);
     for _ in 0..STEPS {

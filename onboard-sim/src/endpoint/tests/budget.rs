@@ -1,4 +1,4 @@
-//! What the downlink carries in any one second, whatever is asked.
+//! Tests that the downlink stays within its budget in any one second, whatever is requested.
 
 use protocol::dialect::{LOCAL_POSITION_NED_DATA, MavModeFlag, MavState, STATUSTEXT_DATA};
 
@@ -40,20 +40,20 @@ impl Sent {
     }
 }
 
-impl Bench {
+impl Wire {
     fn signed() -> Self {
-        let mut bench = Self { endpoint: VehicleEndpoint::sending_signed(&STANDARD), ..Self::new() };
-        bench.run(2.0);
-        bench
+        let mut wire = Self { endpoint: VehicleEndpoint::sending_signed(&STANDARD), ..Self::new() };
+        wire.run(2.0);
+        wire
     }
 
-    /// Runs for this long, with what `ask` asks in each frame of 20 ms.
+    /// Runs for this long, with the requests of `ask` in each frame of 20 ms.
     fn run_asked(&mut self, duration_s: f64, mut ask: impl FnMut(u64) -> Vec<CommandRequest>) -> Sent {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = Vec::new();
         for frame in 0.. {
             for request in ask(frame) {
-                self.endpoint.on_command(0, &request, &mut self.vehicle);
+                self.endpoint.on_command(0, &request, &self.vehicle);
             }
             sent.extend(self.run(0.001).into_iter().map(|frame| (self.vehicle.time_s(), frame)));
             if self.vehicle.time_s() >= end_s {
@@ -77,16 +77,16 @@ fn twenty_hz(frame: u64) -> bool {
 
 #[test]
 fn twenty_refused_commands_a_second_cost_no_position_and_are_counted() {
-    let mut bench = Bench::new();
-    bench.run(2.0);
-    // A start that nobody armed for: the vehicle refuses it with words.
-    let sent = bench
+    let mut wire = Wire::new();
+    wire.run(2.0);
+    // A start without arming: the vehicle refuses it with a text.
+    let sent = wire
         .run_asked(10.0, |frame| if twenty_hz(frame) { vec![from(255, 300, 0.0, 0.0)] } else { Vec::new() });
     let worst = sent.worst_second(0);
     assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
     let positions = sent.count(LOCAL_POSITION_NED_DATA::ID);
     assert!(positions >= 99, "{positions} positions in 10 s at 10 Hz");
-    // Eight at once, then two a second; said once, then counted every 5 s.
+    // Eight answers at once, then two a second; the reason once, then a count every 5 s.
     let (answers, texts_sent) = (sent.count(77), sent.count(STATUSTEXT_DATA::ID));
     assert!((26..=29).contains(&answers), "{answers} answers");
     assert!((2..=8).contains(&texts_sent), "{texts_sent} chunks of text");
@@ -99,7 +99,7 @@ fn twenty_refused_commands_a_second_cost_no_position_and_are_counted() {
     assert!(words[1].contains("start refused") && words[1].contains("more)"), "{words:?}");
 }
 
-/// Of everything too much: refused and obeyed commands of many stations, questions, requests.
+/// Too much of everything: refused and accepted commands of many stations, questions, requests.
 fn flood(frame: u64) -> Vec<CommandRequest> {
     let station = (frame % 40) as u8 + 100;
     vec![
@@ -114,12 +114,12 @@ fn flood(frame: u64) -> Vec<CommandRequest> {
 
 #[test]
 fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messages_come() {
-    for (new, signature_len) in [(Bench::new as fn() -> Bench, 0), (Bench::signed, SIGNATURE_LEN)] {
-        let mut bench = new();
-        let sent = bench.run_asked(12.0, flood);
+    for (new, signature_len) in [(Wire::new as fn() -> Wire, 0), (Wire::signed, SIGNATURE_LEN)] {
+        let mut wire = new();
+        let sent = wire.run_asked(12.0, flood);
         let worst = sent.worst_second(signature_len);
         assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
-        assert!(worst > 1_500, "the flood was one: {worst} B");
+        assert!(worst > 1_500, "the flood was large enough: {worst} B");
         let pause_s = sent.longest_pause_s(HEARTBEAT_DATA::ID);
         assert!(pause_s <= 1.05, "{pause_s} s without a heartbeat");
         let pause_s = sent.longest_pause_s(TD_FLIGHT_STATUS_DATA::ID);
@@ -129,13 +129,13 @@ fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messag
 
 #[test]
 fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
-    for new in [Bench::new, Bench::signed] {
-        let mut bench = new();
-        assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-        bench.run_asked(5.0, flood);
-        bench.endpoint.on_command(0, &from(255, 185, 1.0, 0.0), &mut bench.vehicle);
-        let aborted_at_s = bench.vehicle.time_s();
-        let sent = bench.run_asked(3.0, |frame| {
+    for new in [Wire::new, Wire::signed] {
+        let mut wire = new();
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+        wire.run_asked(5.0, flood);
+        wire.endpoint.on_command(0, &from(255, 185, 1.0, 0.0), &wire.vehicle);
+        let aborted_at_s = wire.vehicle.time_s();
+        let sent = wire.run_asked(3.0, |frame| {
             let mut asked = flood(frame);
             if frame.is_multiple_of(3) {
                 asked.push(from(255, 185, 1.0, 0.0));
@@ -168,10 +168,10 @@ fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
 
 #[test]
 fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
-    let sent = bench.run_asked(14.0, |_| Vec::new());
+    let mut wire = Wire::new();
+    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+    let sent = wire.run_asked(14.0, |_| Vec::new());
     assert_ne!(
         count(
             &sent.0.iter().map(|(_, frame)| frame.clone()).collect::<Vec<_>>(),
@@ -185,14 +185,14 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
 
 #[test]
 fn every_heartbeat_and_flight_status_says_from_the_boot_on_that_it_is_simulated_and_which_boot_it_is() {
-    let mut bench = Bench { endpoint: VehicleEndpoint::new().booted(0xB007_0001), ..Bench::new() };
-    let first = bench.run(0.001);
+    let mut wire = Wire { endpoint: VehicleEndpoint::new().booted(0xB007_0001), ..Wire::new() };
+    let first = wire.run(0.001);
     assert!(
         count(&first, HEARTBEAT_DATA::ID) == 1 && count(&first, TD_FLIGHT_STATUS_DATA::ID) == 1,
         "at once"
     );
-    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-    let sent = first.into_iter().chain(bench.run(5.0));
+    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    let sent = first.into_iter().chain(wire.run(5.0));
     let (mut beats, mut statuses) = (0, 0);
     for frame in sent {
         match frame.decode() {

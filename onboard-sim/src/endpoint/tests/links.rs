@@ -1,22 +1,20 @@
-//! Several links: what is asked over one of them is for that one.
+//! Tests several links: a request over one link applies to that link.
 
 use super::*;
 
 /// A slow link, number 0, and a fast one, number 1.
-fn two_links() -> Bench {
-    Bench { endpoint: VehicleEndpoint::new().over_links(&[2_000, 20_000]), ..Bench::new() }
+fn two_links() -> Wire {
+    Wire { endpoint: VehicleEndpoint::new().over_links(&[2_000, 20_000]), ..Wire::new() }
 }
 
-impl Bench {
+impl Wire {
     /// What each of two links carried.
     fn run_links(&mut self, duration_s: f64) -> [Vec<Frame>; 2] {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = [Vec::new(), Vec::new()];
         while self.vehicle.time_s() < end_s {
-            for event in self.vehicle.advance_frame(&mut || Duration::ZERO) {
-                self.endpoint.on_event(&event);
-            }
-            for Outgoing { frame, links } in self.endpoint.poll(&self.vehicle) {
+            let (_, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
+            for Outgoing { frame, links } in leaving {
                 for link in links {
                     sent[link].push(frame.clone());
                 }
@@ -33,7 +31,7 @@ impl Bench {
             params: [message_id as f32, interval_us, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(link, &request, &mut self.vehicle);
+        self.endpoint.on_command(link, &request, &self.vehicle);
         self.run_links(0.1)[link].iter().find_map(CommandAnswer::from_frame).unwrap().result
     }
 }
@@ -44,37 +42,37 @@ fn numbers_are_whole(frames: &[Frame]) -> bool {
 
 #[test]
 fn all_links_carry_copies_until_one_is_asked_for_something_else() {
-    let mut bench = two_links();
-    let [slow, fast] = bench.run_links(3.0);
+    let mut wire = two_links();
+    let [slow, fast] = wire.run_links(3.0);
     assert_eq!(slow, fast);
-    // What changes nothing parts nobody.
-    assert_eq!(bench.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 0.0), 0);
-    let [slow, fast] = bench.run_links(1.0);
+    // A request that changes nothing does not split the lane.
+    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 0.0), 0);
+    let [slow, fast] = wire.run_links(1.0);
     assert_eq!(slow, fast);
 }
 
 #[test]
 fn an_interval_is_for_the_link_that_asked_and_a_fast_link_carries_more() {
-    let mut bench = two_links();
-    bench.run_links(1.0);
-    assert_eq!(bench.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), MavResult::MAV_RESULT_DENIED as u8);
-    assert_eq!(bench.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
-    let [slow, fast] = bench.run_links(5.0);
+    let mut wire = two_links();
+    wire.run_links(1.0);
+    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
+    let [slow, fast] = wire.run_links(5.0);
     assert!(numbers_are_whole(&slow) && numbers_are_whole(&fast), "a gap would be counted as loss");
     let of = |frames: &[Frame]| count(frames, ATTITUDE_QUATERNION_DATA::ID);
     assert!((49..=51).contains(&of(&slow)), "{} in 5 s at 10 Hz", of(&slow));
     assert!((245..=251).contains(&of(&fast)), "{} in 5 s at 50 Hz", of(&fast));
     // The slow one switches its own off.
-    assert_eq!(bench.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, -1.0), 0);
-    let [slow, fast] = bench.run_links(1.0);
+    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, -1.0), 0);
+    let [slow, fast] = wire.run_links(1.0);
     assert_eq!((of(&slow), of(&fast) >= 49), (0, true));
 }
 
 #[test]
-fn what_the_vehicle_says_goes_over_every_link() {
-    let mut bench = two_links();
-    assert_eq!(bench.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
-    bench.endpoint.on_event(&VehicleEvent::Text { severity: Severity::Notice, text: "a word".to_owned() });
-    let sent = bench.run_links(0.1);
+fn texts_of_the_vehicle_go_over_every_link() {
+    let mut wire = two_links();
+    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
+    wire.endpoint.on_event(&VehicleEvent::Text { severity: Severity::Notice, text: "a word".to_owned() });
+    let sent = wire.run_links(0.1);
     assert!(sent.iter().all(|frames| texts(frames) == ["a word"]));
 }

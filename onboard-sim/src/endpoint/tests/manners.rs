@@ -1,4 +1,4 @@
-//! What other people's ground stations ask of every vehicle.
+//! Tests the questions that other ground stations ask every vehicle.
 
 use protocol::dialect::{
     ATTITUDE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HOME_POSITION_DATA, LOG_ENTRY_DATA,
@@ -7,11 +7,11 @@ use protocol::dialect::{
 
 use super::*;
 
-impl Bench {
-    /// What comes back to a question of these bytes.
+impl Wire {
+    /// The answer to a question with these bytes.
     fn question(&mut self, message_id: u32, payload: &[u8]) -> Vec<Frame> {
         let frame = self.ground.encode_payload(message_id, payload).unwrap();
-        self.endpoint.on_frame(0, &frame, &mut self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle);
         self.run(0.3)
     }
 }
@@ -21,10 +21,10 @@ fn find<T>(frames: &[Frame], of: impl Fn(MavMessage) -> Option<T>) -> Option<T> 
 }
 
 #[test]
-fn mission_fence_and_rally_lists_are_empty_and_what_is_none_of_them_is_unsupported() {
-    let mut bench = Bench::new();
+fn mission_fence_and_rally_lists_are_empty_and_other_types_are_unsupported() {
+    let mut wire = Wire::new();
     for mission_type in 0..3u8 {
-        let sent = bench.question(43, &[1, 1, mission_type]);
+        let sent = wire.question(43, &[1, 1, mission_type]);
         let list = find(&sent, |message| match message {
             MavMessage::MISSION_COUNT(list) => Some(list),
             _ => None,
@@ -33,10 +33,10 @@ fn mission_fence_and_rally_lists_are_empty_and_what_is_none_of_them_is_unsupport
         assert_eq!((list.count, list.mission_type as u8), (0, mission_type));
         assert_eq!((list.target_system, list.target_component), (255, 190));
     }
-    let sent = bench.question(43, &[1, 1, 77]);
+    let sent = wire.question(43, &[1, 1, 77]);
     assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 1));
     // For somebody else.
-    let sent = bench.question(43, &[2, 1, 0]);
+    let sent = wire.question(43, &[2, 1, 0]);
     assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 0));
 }
 
@@ -48,7 +48,7 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
         bytes[37] = mission_type;
         bytes.to_vec()
     };
-    let mut bench = Bench::new();
+    let mut wire = Wire::new();
     for (message_id, payload, result, mission_type) in [
         (44, vec![3, 0, 1, 1, 1], MavMissionResult::MAV_MISSION_UNSUPPORTED, 1),
         (44, vec![0, 0, 1, 1, 2], MavMissionResult::MAV_MISSION_ACCEPTED, 2),
@@ -59,7 +59,7 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
         (39, item(0), MavMissionResult::MAV_MISSION_UNSUPPORTED, 0),
         (73, item(2), MavMissionResult::MAV_MISSION_UNSUPPORTED, 2),
     ] {
-        let sent = bench.question(message_id, &payload);
+        let sent = wire.question(message_id, &payload);
         let answer = find(&sent, |message| match message {
             MavMessage::MISSION_ACK(answer) => Some(answer),
             _ => None,
@@ -76,14 +76,14 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
 
 #[test]
 fn the_list_of_logs_on_board_is_empty() {
-    let mut bench = Bench::new();
-    let sent = bench.question(117, &[0, 0, 0xFF, 0xFF, 1, 1]);
+    let mut wire = Wire::new();
+    let sent = wire.question(117, &[0, 0, 0xFF, 0xFF, 1, 1]);
     let entry = find(&sent, |message| match message {
         MavMessage::LOG_ENTRY(entry) => Some(entry),
         _ => None,
     });
     assert_eq!(entry, Some(LOG_ENTRY_DATA::default()));
-    let sent = bench.question(119, &[7, 0, 0, 0, 90, 0, 0, 0, 3, 0, 1, 1]);
+    let sent = wire.question(119, &[7, 0, 0, 0, 90, 0, 0, 0, 3, 0, 1, 1]);
     let data = find(&sent, |message| match message {
         MavMessage::LOG_DATA(data) => Some((data.ofs, data.id, data.count)),
         _ => None,
@@ -92,7 +92,7 @@ fn the_list_of_logs_on_board_is_empty() {
 }
 
 #[test]
-fn what_maps_and_instruments_show_is_sent_on_request_and_as_a_stream() {
+fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
     for message_id in [
         ATTITUDE_DATA::ID,
         GLOBAL_POSITION_INT_DATA::ID,
@@ -100,8 +100,8 @@ fn what_maps_and_instruments_show_is_sent_on_request_and_as_a_stream() {
         GPS_RAW_INT_DATA::ID,
         SYSTEM_TIME_DATA::ID,
     ] {
-        let mut bench = Bench::new();
-        assert_eq!(count(&bench.run(2.0), message_id), 0, "message {message_id} is off until asked for");
+        let mut wire = Wire::new();
+        assert_eq!(count(&wire.run(2.0), message_id), 0, "message {message_id} is off until asked for");
         let request = CommandRequest {
             source: GROUND,
             target: VEHICLE,
@@ -109,25 +109,25 @@ fn what_maps_and_instruments_show_is_sent_on_request_and_as_a_stream() {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        bench.endpoint.on_command(0, &request, &mut bench.vehicle);
-        assert_eq!(count(&bench.run(0.5), message_id), 1, "message {message_id}");
-        assert_eq!(bench.ask(511, message_id as f32, 1e6).0, 0);
-        assert!((4..=6).contains(&count(&bench.run(5.0), message_id)), "message {message_id} at 1 Hz");
+        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        assert_eq!(count(&wire.run(0.5), message_id), 1, "message {message_id}");
+        assert_eq!(wire.ask(511, message_id as f32, 1e6).0, 0);
+        assert!((4..=6).contains(&count(&wire.run(5.0), message_id)), "message {message_id} at 1 Hz");
     }
 }
 
 #[test]
 fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
-    let mut bench = Bench::new();
+    let mut wire = Wire::new();
     let request =
         CommandRequest { source: GROUND, target: VEHICLE, command: 410, params: [0.0; 7], confirmation: 0 };
-    bench.endpoint.on_command(0, &request, &mut bench.vehicle);
-    let sent = bench.run(1.5);
+    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    let sent = wire.run(1.5);
     let home = find(&sent, |message| match message {
         MavMessage::HOME_POSITION(home) => Some((home.latitude, home.longitude, home.altitude)),
         _ => None,
     });
-    let site = bench.vehicle.snapshot().site;
+    let site = wire.vehicle.snapshot().site;
     assert_eq!(home, Some(((1e7 * site.latitude_deg) as i32, (1e7 * site.longitude_deg).round() as i32, 0)));
     // Released in the plane north of the pad, nose up: heading north.
     let heading = find(&sent, |message| match message {
@@ -135,7 +135,7 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
         _ => None,
     });
     assert_eq!(heading, Some(0));
-    let mut snapshot = bench.vehicle.snapshot();
+    let mut snapshot = wire.vehicle.snapshot();
     let half_rad = 0.5 * 120f64.to_radians();
     snapshot.motion.ned_from_body = [libm::cos(half_rad), 0.0, 0.0, libm::sin(half_rad)];
     let turned = telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
@@ -145,27 +145,27 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
 #[test]
 fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight() {
     for code in [21196.0, 2989.0] {
-        let mut bench = Bench::new();
-        assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-        assert_eq!(bench.ask(400, 0.0, code).0, 0);
-        assert!(!bench.vehicle.mode().interlocks.armed && !bench.vehicle.aborted(), "on the pad");
-        assert_eq!(bench.ask(400, 1.0, 0.0).0, 0, "nothing is latched");
-        assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
-        bench.run(1.0);
-        assert_eq!(bench.ask(400, 0.0, code).0, 0);
-        let mode = bench.vehicle.mode();
-        assert!(!mode.interlocks.armed && mode.countdown_end_s.is_none() && !bench.vehicle.aborted());
-        assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-        assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
-        bench.run(6.0);
-        assert!(!bench.vehicle.phase().on_pad());
+        let mut wire = Wire::new();
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert!(!wire.vehicle.mode().interlocks.armed && !wire.vehicle.aborted(), "on the pad");
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0, "nothing is latched");
+        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        wire.run(1.0);
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        let mode = wire.vehicle.mode();
+        assert!(!mode.interlocks.armed && mode.countdown_end_s.is_none() && !wire.vehicle.aborted());
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        wire.run(6.0);
+        assert!(!wire.vehicle.phase().on_pad());
         assert_eq!(
-            bench.ask(400, 0.0, 0.0).0,
+            wire.ask(400, 0.0, 0.0).0,
             MavResult::MAV_RESULT_DENIED as u8,
             "unforced it stays refused"
         );
-        assert!(!bench.vehicle.aborted());
-        assert_eq!(bench.ask(400, 0.0, code).0, 0);
-        assert!(bench.vehicle.aborted(), "in flight it is an abort");
+        assert!(!wire.vehicle.aborted());
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert!(wire.vehicle.aborted(), "in flight it is an abort");
     }
 }

@@ -1,4 +1,4 @@
-//! Parameters, files and versions, asked as other people's clients ask.
+//! Tests questions about parameters, files and versions, as other clients ask them.
 
 use mavlink::types::CharArray;
 use protocol::dialect::{
@@ -23,10 +23,10 @@ fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
     frames.iter().filter_map(value).collect()
 }
 
-impl Bench {
+impl Wire {
     fn tell(&mut self, message: &MavMessage) {
         let frame = self.ground.encode(message);
-        self.endpoint.on_frame(0, &frame, &mut self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle);
     }
 
     fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
@@ -50,12 +50,12 @@ impl Bench {
 
 #[test]
 fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
-    let mut bench = Bench::new();
-    bench.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    let mut wire = Wire::new();
+    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 1,
         target_component: 0,
     }));
-    let sent = bench.run(10.0);
+    let sent = wire.run(10.0);
     let places: Vec<u16> = values(&sent).iter().map(|value| value.param_index).collect();
     let parameters = parameters::count(&Streams::of(&STANDARD));
     assert_eq!(places, (0..parameters).collect::<Vec<_>>());
@@ -65,8 +65,8 @@ fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
 }
 
 #[test]
-fn one_is_read_by_name_or_place_and_what_is_not_there_is_said() {
-    let mut bench = Bench::new();
+fn a_parameter_is_read_by_name_or_index_and_a_missing_one_is_reported() {
+    let mut wire = Wire::new();
     let read = |param_id, param_index| {
         MavMessage::PARAM_REQUEST_READ(PARAM_REQUEST_READ_DATA {
             param_index,
@@ -75,13 +75,13 @@ fn one_is_read_by_name_or_place_and_what_is_not_there_is_said() {
             param_id,
         })
     };
-    bench.tell(&read(name("NMPC_W_THETA"), -1));
-    bench.tell(&read(name("ignored"), 0));
-    let found: Vec<f32> = values(&bench.run(0.5)).iter().map(|value| value.param_value).collect();
+    wire.tell(&read(name("NMPC_W_THETA"), -1));
+    wire.tell(&read(name("ignored"), 0));
+    let found: Vec<f32> = values(&wire.run(0.5)).iter().map(|value| value.param_value).collect();
     assert_eq!(found, [150.0, 1.0]);
-    bench.tell(&read(name("NO_SUCH"), -1));
-    bench.tell(&read(name(""), 999));
-    let errors = bench.run(0.5).into_iter().filter(|frame| {
+    wire.tell(&read(name("NO_SUCH"), -1));
+    wire.tell(&read(name(""), 999));
+    let errors = wire.run(0.5).into_iter().filter(|frame| {
         matches!(frame.decode(), Ok(MavMessage::PARAM_ERROR(error))
             if error.error == MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST)
     });
@@ -90,36 +90,36 @@ fn one_is_read_by_name_or_place_and_what_is_not_there_is_said() {
 
 #[test]
 fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.set_real("RATE_FINS", 4.0), (4.0, String::new()));
-    let found = count(&bench.run(3.0), TD_FINS_DATA::ID);
+    let mut wire = Wire::new();
+    assert_eq!(wire.set_real("RATE_FINS", 4.0), (4.0, String::new()));
+    let found = count(&wire.run(3.0), TD_FINS_DATA::ID);
     assert!((11..=13).contains(&found), "{found} in 3 s at 4 Hz");
     for (id, asked, holds, why) in [
         ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
         ("RATE_FINS", -3.0, 4.0, "must be"),
         ("RATE_GIMBAL", f32::NAN, 5.0, "must be"),
         ("RATE_POSITION", f32::INFINITY, 10.0, "must be"),
-        ("RATE_HEARTBEAT", 0.0, 1.0, "the crew lives by it"),
+        ("RATE_HEARTBEAT", 0.0, 1.0, "vital messages"),
         ("NMPC_W_U", 51.0, 50.0, "from the profile"),
     ] {
         // Texts have a share of each second.
-        bench.run(1.0);
-        let (found, words) = bench.set_real(id, asked);
+        wire.run(1.0);
+        let (found, words) = wire.set_real(id, asked);
         assert_eq!(found.to_bits(), f32::to_bits(holds), "{id} = {asked}");
         assert!(words.contains(why), "{id} = {asked}: {words}");
     }
-    let (values, words) = bench.set("RATE_FINS", 2.0, MavParamType::MAV_PARAM_TYPE_INT32);
+    let (values, words) = wire.set("RATE_FINS", 2.0, MavParamType::MAV_PARAM_TYPE_INT32);
     assert_eq!(values[0].param_value.to_bits(), 4.0f32.to_bits());
     assert!(words.contains("REAL32"), "{words}");
-    let (values, words) = bench.set("TOUCHDOWN_U", 9.0, MavParamType::MAV_PARAM_TYPE_REAL32);
-    assert!(values.is_empty() && words.contains("none of this name"), "{words}");
-    assert_eq!(bench.set_real("RATE_FINS", 0.0).0.to_bits(), 0.0f32.to_bits());
-    assert_eq!(count(&bench.run(2.0), TD_FINS_DATA::ID), 0, "switched off");
+    let (values, words) = wire.set("TOUCHDOWN_U", 9.0, MavParamType::MAV_PARAM_TYPE_REAL32);
+    assert!(values.is_empty() && words.contains("no parameter has this name"), "{words}");
+    assert_eq!(wire.set_real("RATE_FINS", 0.0).0.to_bits(), 0.0f32.to_bits());
+    assert_eq!(count(&wire.run(2.0), TD_FINS_DATA::ID), 0, "switched off");
 }
 
 /// Both ways to set a rate, asked by a station.
-fn set_rates(bench: &mut Bench, station: Address) -> (u8, f32, String) {
-    let ground = std::mem::replace(&mut bench.ground, Encoder::new(station));
+fn set_rates(wire: &mut Wire, station: Address) -> (u8, f32, String) {
+    let ground = std::mem::replace(&mut wire.ground, Encoder::new(station));
     let request = CommandRequest {
         source: station,
         target: VEHICLE,
@@ -127,21 +127,21 @@ fn set_rates(bench: &mut Bench, station: Address) -> (u8, f32, String) {
         params: [TD_FINS_DATA::ID as f32, 500_000.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    bench.endpoint.on_command(0, &request, &mut bench.vehicle);
-    let sent = bench.run(0.2);
+    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    let sent = wire.run(0.2);
     let answer = sent.iter().find_map(CommandAnswer::from_frame).unwrap();
-    let (values, words) = bench.set("RATE_FINS", 1.0, MavParamType::MAV_PARAM_TYPE_REAL32);
-    bench.ground = ground;
+    let (values, words) = wire.set("RATE_FINS", 1.0, MavParamType::MAV_PARAM_TYPE_REAL32);
+    wire.ground = ground;
     (answer.result, values[0].param_value, format!("{} {words}", texts(&sent).join(" ")))
 }
 
 #[test]
 fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
     let other = Address { system_id: 254, component_id: 190 };
-    let mut bench = Bench::new();
-    assert_eq!(set_rates(&mut bench, other).0, 0, "before arming every station may");
-    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-    // A second arm is accepted, for it is armed; that does not hand the rates over.
+    let mut wire = Wire::new();
+    assert_eq!(set_rates(&mut wire, other).0, 0, "before arming every station may");
+    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    // A second arm is accepted, because the vehicle is armed, but it does not transfer the right to set rates.
     let again = CommandRequest {
         source: other,
         target: VEHICLE,
@@ -149,16 +149,16 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
         params: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    bench.endpoint.on_command(0, &again, &mut bench.vehicle);
-    bench.run(0.2);
-    assert_eq!(bench.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
-    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
-    bench.run(7.0);
-    assert!(!bench.vehicle.phase().on_pad(), "{:?}", bench.vehicle.phase());
-    let (result, rate_hz, words) = set_rates(&mut bench, other);
+    wire.endpoint.on_command(0, &again, &wire.vehicle);
+    wire.run(0.2);
+    assert_eq!(wire.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
+    assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+    wire.run(7.0);
+    assert!(!wire.vehicle.phase().on_pad(), "{:?}", wire.vehicle.phase());
+    let (result, rate_hz, words) = set_rates(&mut wire, other);
     assert_eq!((result, rate_hz.to_bits()), (MavResult::MAV_RESULT_DENIED as u8, 4.0f32.to_bits()));
     assert!(words.contains("only 255/190, which armed, sets rates"), "{words}");
-    let (result, rate_hz, _) = set_rates(&mut bench, GROUND);
+    let (result, rate_hz, _) = set_rates(&mut wire, GROUND);
     assert_eq!(
         (result, rate_hz.to_bits()),
         (0, 1.0f32.to_bits()),
@@ -168,44 +168,44 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
 
 #[test]
 fn a_rate_beyond_the_budget_is_refused_in_flight_as_on_the_pad() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.ask(400, 1.0, 0.0).0, 0);
-    assert_eq!(bench.ask(300, 0.0, 0.0).0, 0);
-    bench.run(7.0);
-    let (found, words) = bench.set_real("RATE_FINS", 20.0);
+    let mut wire = Wire::new();
+    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+    wire.run(7.0);
+    let (found, words) = wire.set_real("RATE_FINS", 20.0);
     assert_eq!(found.to_bits(), 2.0f32.to_bits());
     assert!(words.contains("budget is 2000"), "{words}");
-    assert_eq!(bench.ask(511, TD_FINS_DATA::ID as f32, 50_000.0).0, MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(wire.ask(511, TD_FINS_DATA::ID as f32, 50_000.0).0, MavResult::MAV_RESULT_DENIED as u8);
 }
 
 #[test]
 fn questions_for_another_system_are_left_alone() {
-    let mut bench = Bench::new();
-    bench.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    let mut wire = Wire::new();
+    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 2,
         target_component: 1,
     }));
-    bench.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+    wire.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 2,
         target_component: 1,
         ..FILE_TRANSFER_PROTOCOL_DATA::default()
     }));
-    let sent = bench.run(2.0);
+    let sent = wire.run(2.0);
     assert!(values(&sent).is_empty() && count(&sent, FILE_TRANSFER_PROTOCOL_DATA::ID) == 0);
 }
 
 #[test]
 fn a_file_request_is_declined_at_once() {
-    let mut bench = Bench::new();
+    let mut wire = Wire::new();
     let mut payload = [0; 251];
     payload[3] = 4;
-    bench.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+    wire.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 1,
         target_component: 1,
         payload,
         ..FILE_TRANSFER_PROTOCOL_DATA::default()
     }));
-    let declined = bench.run(0.3).iter().any(|frame| {
+    let declined = wire.run(0.3).iter().any(|frame| {
         matches!(frame.decode(), Ok(MavMessage::FILE_TRANSFER_PROTOCOL(answer)) if answer.payload[3] == 129)
     });
     assert!(declined);
@@ -213,7 +213,7 @@ fn a_file_request_is_declined_at_once() {
 
 #[test]
 fn versions_capabilities_and_the_mode_are_told_to_those_who_ask() {
-    let mut bench = Bench::new();
+    let mut wire = Wire::new();
     for (command, param1, message_id) in [
         (512, 300.0, 300),
         (519, 1.0, 300),
@@ -227,10 +227,10 @@ fn versions_capabilities_and_the_mode_are_told_to_those_who_ask() {
             payload[..4].copy_from_slice(&f32::to_le_bytes(param1));
             payload[28..30].copy_from_slice(&u16::to_le_bytes(command));
             payload[30..32].copy_from_slice(&[1, 1]);
-            bench.ground.encode_payload(COMMAND_LONG_DATA::ID, &payload).unwrap()
+            wire.ground.encode_payload(COMMAND_LONG_DATA::ID, &payload).unwrap()
         };
-        bench.endpoint.on_frame(0, &frame, &mut bench.vehicle);
-        let sent = bench.run(0.5);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        let sent = wire.run(0.5);
         assert_eq!(count(&sent, message_id), 1, "command {command} with {param1}");
         let results: Vec<u8> = sent.iter().filter_map(CommandAnswer::from_frame).map(|a| a.result).collect();
         assert_eq!(results, [0]);

@@ -1,19 +1,19 @@
-//! A rocket from apogee on the wire: what it sends in which phase, and within which budget.
+//! Tests a rocket from apogee on the wire: its messages in each phase, and its budget.
 
-use campaign::dispersion::Dispersion;
+use flight::rules::arming::{Check, UPLINK_CHECK};
 use protocol::dialect::{
     BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA,
     GPS_RAW_INT_DATA, GpsFixType, HIGHRES_IMU_DATA, LOCAL_POSITION_NED_DATA, MavSysStatusSensor,
     SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_PREDICTED_PATH_DATA, TdChute,
 };
+use sim::dispersion::Dispersion;
 
 use super::*;
-use crate::fly::{Delayed, LoadedFlight, load_profile};
-use crate::rocket::Rocket;
+use crate::fly::{Delayed, LoadedFlight, load_flight};
 use crate::streams::FROM_APOGEE;
 
 struct Airborne {
-    rocket: Rocket,
+    rocket: Vehicle,
     endpoint: VehicleEndpoint,
     /// What the ground sends now.
     uplink: Vec<Frame>,
@@ -27,14 +27,12 @@ impl Airborne {
     }
 
     fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
-        let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").unwrap() else {
-            panic!("from apogee")
-        };
-        flight.order.dispersion = Dispersion::builtin(dispersion).unwrap();
-        flight.order.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-        let mut rocket = Rocket::new(&flight).unwrap();
+        let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+        flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
+        flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+        let mut rocket = Vehicle::in_space(&flight).unwrap();
         rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-        rocket.pull_pin();
+        rocket.set_pin_out(true);
         let mut airborne = Self {
             rocket,
             endpoint: VehicleEndpoint::sending(&FROM_APOGEE),
@@ -42,7 +40,9 @@ impl Airborne {
             heard: Delayed::default(),
             sent: Delayed::default(),
         };
-        airborne.run_while(|rocket| rocket.snapshot().checks_failed != 0);
+        // Nobody is heard, and its own programme needs nobody.
+        let waits = |check: &Check| !check.passed && check.name != UPLINK_CHECK;
+        airborne.run_while(|rocket| rocket.arming_checks().iter().any(waits));
         airborne
     }
 
@@ -52,25 +52,21 @@ impl Airborne {
 
     fn let_go_with_faults(dispersion: &str, faults: &[&str]) -> Self {
         let mut airborne = Self::with_faults(dispersion, faults);
-        airborne.rocket.request(crate::craft::Request::Arm);
-        airborne.rocket.request(crate::craft::Request::Start);
+        frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Arm, Asked::Start]);
         airborne.run_while(|rocket| rocket.phase().on_pad());
         airborne
     }
 
-    fn run_while(&mut self, mut holds: impl FnMut(&Rocket) -> bool) -> Vec<Frame> {
+    fn run_while(&mut self, mut holds: impl FnMut(&Vehicle) -> bool) -> Vec<Frame> {
         let mut sent = Vec::new();
         while holds(&self.rocket) {
             let time_s = self.rocket.time_s();
             let uplink = std::mem::take(&mut self.uplink);
             for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
-                self.endpoint.on_frame(0, &frame, &mut self.rocket);
+                self.endpoint.on_frame(0, &frame, &self.rocket);
             }
-            for event in self.rocket.advance_frame(&mut || Duration::ZERO) {
-                self.endpoint.on_event(&event);
-            }
-            let leaving =
-                self.endpoint.poll(&self.rocket).into_iter().map(|outgoing| outgoing.frame).collect();
+            let (_, leaving) = frame(&mut self.rocket, &mut self.endpoint, &[]);
+            let leaving = leaving.into_iter().map(|outgoing| outgoing.frame).collect();
             sent.extend(self.sent.pass(leaving, self.rocket.time_s(), self.rocket.radio()));
         }
         sent
@@ -81,7 +77,7 @@ impl Airborne {
         self.run_while(|rocket| rocket.time_s() < end_s)
     }
 
-    /// The message, asked for once.
+    /// The message, requested once.
     fn request(&mut self, message_id: u32) -> MavMessage {
         let request = CommandRequest {
             source: GROUND,
@@ -90,7 +86,7 @@ impl Airborne {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(0, &request, &mut self.rocket);
+        self.endpoint.on_command(0, &request, &self.rocket);
         let sent = self.run(0.3);
         let found = sent
             .iter()
@@ -108,7 +104,7 @@ fn its_standard_rates_fit_the_radio_signed_or_not() {
     }
 }
 
-/// Twenty commands a second that are refused with words, all the way from apogee to the ground.
+/// Twenty commands a second that are refused with a text, all the way from apogee to the ground.
 #[test]
 fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals_cost_no_position() {
     let mut airborne = Airborne::let_go("field");
@@ -133,8 +129,8 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
     let sizes: Vec<_> = sent.iter().map(|(time_s, frame)| (*time_s, frame.as_bytes().len())).collect();
     let worst = super::budget::worst_second(&sizes);
     assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
-    assert!(worst > 1_200, "it had much to say: {worst} B");
-    // From the first to the last: what lies before and behind them is no interval.
+    assert!(worst > 1_200, "the link was busy: {worst} B");
+    // From the first to the last: the time before and after them is not an interval.
     let at_s: Vec<f64> = sent
         .iter()
         .filter(|(_, frame)| frame.message_id() == LOCAL_POSITION_NED_DATA::ID)
@@ -186,7 +182,7 @@ fn the_landing_burn_tells_its_plan() {
     airborne.run(0.5);
     let sent = airborne.run(2.0);
     assert!(count(&sent, TD_CONTROLLER_DATA::ID) >= 5 && count(&sent, TD_PREDICTED_PATH_DATA::ID) >= 1);
-    // The truth is the estimate here: there is no estimator to speak of, and no sensor.
+    // Here the estimate is the truth: there is no estimator and no sensor.
     assert_eq!(count(&sent, ESTIMATOR_STATUS_DATA::ID), 0);
     let absent = sent.iter().any(|frame| {
         matches!(frame.decode(), Ok(MavMessage::SYS_STATUS(status))
@@ -196,7 +192,7 @@ fn the_landing_burn_tells_its_plan() {
 }
 
 #[test]
-fn what_is_off_can_be_asked_for_and_what_is_not_modelled_is_unknown() {
+fn messages_that_are_off_can_be_requested_and_unmodelled_values_are_unknown() {
     let mut airborne = Airborne::on_the_pad("field");
     let MavMessage::HIGHRES_IMU(imu) = airborne.request(HIGHRES_IMU_DATA::ID) else { panic!("not the IMU") };
     assert!((imu.xacc - 9.81).abs() < 0.3 && imu.ygyro.abs() < 0.1, "{imu:?}");
@@ -217,7 +213,7 @@ fn abort() -> Frame {
     }))
 }
 
-/// Outcome: it lands as if nothing had happened; aborts that are not heard change nothing.
+/// Outcome: it lands as if nothing had happened; aborts that are not received change nothing.
 #[test]
 fn a_link_that_is_lost_changes_nothing_about_the_flight() {
     let mut lost = Airborne::let_go_with_faults("field", &["link-loss@descent"]);
@@ -236,9 +232,9 @@ fn a_link_that_is_lost_changes_nothing_about_the_flight() {
     assert!(lost.rocket.judged().unwrap().landed);
 }
 
-/// Outcome: what is asked for happens, later by as much; its answer comes later by twice that.
+/// Outcome: the request is carried out later by the delay; its answer comes later by twice the delay.
 #[test]
-fn over_a_late_link_an_abort_comes_late_and_is_still_an_abort() {
+fn over_a_slow_link_an_abort_is_late_but_still_works() {
     let mut late = Airborne::let_go_with_faults("field", &["link-delay:1.5@descent"]);
     late.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
     late.run(0.5);
@@ -256,7 +252,7 @@ fn over_a_late_link_an_abort_comes_late_and_is_still_an_abort() {
 }
 
 #[test]
-fn it_is_on_the_map_where_its_mission_has_its_pad() {
+fn its_map_position_is_at_the_pad_of_its_mission() {
     let mut airborne = Airborne::let_go("field");
     airborne.run_while(|rocket| rocket.phase() != Phase::LandArmed);
     let MavMessage::GLOBAL_POSITION_INT(place) = airborne.request(GLOBAL_POSITION_INT_DATA::ID) else {
@@ -272,7 +268,7 @@ fn it_is_on_the_map_where_its_mission_has_its_pad() {
     assert_eq!((fix.fix_type, fix.satellites_visible), (GpsFixType::GPS_FIX_TYPE_3D_FIX, u8::MAX));
 }
 
-/// Outcome: what other ground stations call an emergency stop opens the parachute.
+/// Outcome: a forced disarm (the emergency stop of other ground stations) opens the parachute.
 #[test]
 fn a_forced_disarm_in_the_air_is_an_abort_and_is_answered_as_one() {
     for (code, aborted) in [(21196.0, true), (2989.0, true), (0.0, false)] {

@@ -1,13 +1,12 @@
-//! The uplink as a fact of its own: arming waits for it, a countdown is held without it, and every station is told of it.
+//! Tests the uplink: arming waits for it, a countdown is held without it, and every station gets a report on it.
 
-use campaign::dispersion::Dispersion;
-use flight::arming::{UPLINK_CHECK, all_passed};
-use flight::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
+use flight::rules::arming::{UPLINK_CHECK, all_passed};
+use flight::rules::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
 use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdMotor};
+use sim::dispersion::Dispersion;
 
 use super::*;
-use crate::fly::{LoadedFlight, load_profile};
-use crate::rocket::Rocket;
+use crate::fly::{LoadedFlight, load_flight};
 use crate::streams::FROM_APOGEE;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -17,9 +16,9 @@ const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
 
 const SPARE: Address = Address { system_id: 254, component_id: 190 };
 
-/// Any craft on its pad, and stations that speak to it.
+/// Any vehicle on its pad, and stations that speak to it.
 struct Pad {
-    craft: Box<dyn Craft>,
+    vehicle: Vehicle,
     endpoint: VehicleEndpoint,
     stations: [Encoder; 2],
     /// The stations that send heartbeats, ten a second.
@@ -35,12 +34,12 @@ const CREW: usize = 0;
 const OTHER: usize = 1;
 
 impl Pad {
-    fn of(mut craft: Box<dyn Craft>, endpoint: VehicleEndpoint) -> Self {
-        craft.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-        craft.pull_pin();
+    fn of(mut vehicle: Vehicle, endpoint: VehicleEndpoint) -> Self {
+        vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+        vehicle.set_pin_out(true);
         let stations = [Encoder::new(GROUND), Encoder::new(SPARE)];
         let mut pad = Self {
-            craft,
+            vehicle,
             endpoint,
             stations,
             speaking: vec![CREW],
@@ -48,48 +47,41 @@ impl Pad {
             events: Vec::new(),
             beat_in: 0,
         };
-        while !all_passed(&pad.craft.arming_checks()) {
-            assert!(pad.craft.time_s() < 20.0, "{:?}", pad.craft.arming_checks());
+        while !all_passed(&pad.vehicle.arming_checks()) {
+            assert!(pad.vehicle.time_s() < 20.0, "{:?}", pad.vehicle.arming_checks());
             pad.run(0.1);
         }
         pad
     }
 
     fn planar() -> Self {
-        let profile = Profile::builtin("paper-calibrated").unwrap();
-        let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
-        Self::of(Box::new(vehicle), VehicleEndpoint::new())
+        Self::of(planar(), VehicleEndpoint::new())
     }
 
     fn in_space() -> Self {
-        let LoadedFlight::FromApogee(mut flight) = load_profile("mk2").unwrap() else {
-            panic!("from apogee")
-        };
-        flight.order.dispersion = Dispersion::builtin("none").unwrap();
-        Self::of(Box::new(Rocket::new(&flight).unwrap()), VehicleEndpoint::sending(&FROM_APOGEE))
+        let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+        flight.recipe.dispersion = Dispersion::builtin("none").unwrap();
+        Self::of(Vehicle::in_space(&flight).unwrap(), VehicleEndpoint::sending(&FROM_APOGEE))
     }
 
-    /// As the run loop does it.
+    /// One frame as in the run loop.
     fn frame(&mut self) {
         if self.beat_in == 0 {
             for station in self.speaking.clone() {
                 let beat = self.stations[station].encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-                self.endpoint.on_frame(0, &beat, self.craft.as_mut());
+                self.endpoint.on_frame(0, &beat, &self.vehicle);
             }
-            self.beat_in = (0.1 / self.craft.frame_s()).round() as u32;
+            self.beat_in = (0.1 / self.vehicle.frame_s()).round() as u32;
         }
         self.beat_in -= 1;
-        self.endpoint.watch_the_uplink(self.craft.as_mut());
-        for event in self.craft.advance_frame(&mut || Duration::ZERO) {
-            self.endpoint.on_event(&event);
-            self.events.push(event);
-        }
-        self.sent.extend(frames(self.endpoint.poll(self.craft.as_ref())));
+        let (events, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
+        self.events.extend(events);
+        self.sent.extend(frames(leaving));
     }
 
     fn run(&mut self, duration_s: f64) {
-        let end_s = self.craft.time_s() + duration_s - 1e-9;
-        while self.craft.time_s() < end_s {
+        let end_s = self.vehicle.time_s() + duration_s - 1e-9;
+        while self.vehicle.time_s() < end_s {
             self.frame();
         }
     }
@@ -104,7 +96,7 @@ impl Pad {
         });
         let frame = self.stations[station].encode(&message);
         self.sent.clear();
-        self.endpoint.on_frame(0, &frame, self.craft.as_mut());
+        self.endpoint.on_frame(0, &frame, &self.vehicle);
     }
 
     fn answers(&self) -> Vec<u8> {
@@ -114,9 +106,9 @@ impl Pad {
     /// Sends a command, and returns its result.
     fn ask(&mut self, station: usize, command: MavCmd, param1: f32) -> u8 {
         self.tell(station, command, param1);
-        // Some way behind the answer before it.
-        let end_s = self.craft.time_s() + 0.3;
-        while self.answers().is_empty() && self.craft.time_s() < end_s {
+        // Some time after the previous answer.
+        let end_s = self.vehicle.time_s() + 0.3;
+        while self.answers().is_empty() && self.vehicle.time_s() < end_s {
             self.frame();
         }
         let answers = self.answers();
@@ -130,7 +122,7 @@ impl Pad {
     }
 
     fn counting(&self) -> bool {
-        self.craft.mode().countdown_end_s.is_some()
+        self.vehicle.mode().countdown_end_s.is_some()
     }
 
     fn status(&mut self) -> TD_FLIGHT_STATUS_DATA {
@@ -169,7 +161,7 @@ fn frames(leaving: Vec<Outgoing>) -> Vec<Frame> {
 #[test]
 fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
     for mut pad in [Pad::planar(), Pad::in_space()] {
-        // Somebody is heard, but not who asks.
+        // Another station is heard, but not the one that asks.
         assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
         assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
         pad.speaking = vec![OTHER];
@@ -194,32 +186,32 @@ fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not
 #[test]
 fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
     for mut pad in [Pad::planar(), Pad::in_space()] {
-        let countdown_s = pad.craft.countdown_s();
+        let countdown_s = pad.vehicle.computer().countdown_s();
         pad.count_down();
         pad.run(1.0);
-        // Another station that goes on speaking does not stand in for it.
+        // Heartbeats of another station do not replace it.
         pad.speaking = vec![OTHER];
         pad.run(UPLINK_SILENT_S - 0.2);
         assert!(pad.counting(), "a gap shorter than the limit holds nothing");
         pad.run(0.4);
         assert!(!pad.counting());
-        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
         assert_eq!((pad.said("nothing heard of 255/190 for 2 s"), pad.said("HOLD: no countdown")), (1, 1));
         let status = pad.status();
         assert_eq!((status.hold, status.countdown_ms), (TdHold::TD_HOLD_UPLINK_SILENT, i32::MAX));
         assert!((58..=60).contains(&status.hold_left_s), "{}", status.hold_left_s);
-        // It speaks again: that starts nothing.
+        // Its heartbeats return, but that starts nothing.
         pad.speaking = vec![CREW];
         pad.run(2.0 * countdown_s);
-        assert_eq!((pad.craft.phase(), pad.counting()), (Phase::PadArmed, false));
-        assert_eq!(pad.ask(CREW, HOLD, 1.0), DENIED, "nor does a command to continue");
-        // A new start counts down whole, and is flown.
+        assert_eq!((pad.vehicle.phase(), pad.counting()), (Phase::PadArmed, false));
+        assert_eq!(pad.ask(CREW, HOLD, 1.0), DENIED, "a command to continue is denied");
+        // A new start runs the full countdown, and the flight follows.
         assert_eq!(pad.ask(CREW, START, 0.0), ACCEPTED);
-        let left_s = pad.craft.mode().countdown_remaining_s(pad.craft.time_s()).unwrap();
+        let left_s = pad.vehicle.mode().countdown_remaining_s(pad.vehicle.time_s()).unwrap();
         assert!(left_s > countdown_s - 0.1, "{left_s}");
         assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
         pad.run(countdown_s);
-        assert!(!pad.craft.phase().on_pad(), "{:?}", pad.craft.phase());
+        assert!(!pad.vehicle.phase().on_pad(), "{:?}", pad.vehicle.phase());
     }
 }
 
@@ -227,10 +219,10 @@ fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
 fn after_the_release_silence_holds_nothing() {
     let mut pad = Pad::in_space();
     pad.count_down();
-    pad.run(pad.craft.countdown_s() - 0.5);
+    pad.run(pad.vehicle.computer().countdown_s() - 0.5);
     pad.speaking.clear();
     pad.run(5.0);
-    assert!(!pad.craft.phase().on_pad() && pad.said("HOLD") == 0);
+    assert!(!pad.vehicle.phase().on_pad() && pad.said("HOLD") == 0);
 }
 
 #[test]
@@ -239,12 +231,12 @@ fn a_held_vehicle_disarms_after_a_minute() {
         pad.count_down();
         pad.speaking.clear();
         pad.run(UPLINK_SILENT_S + 0.2);
-        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
         pad.run(HOLD_LIMIT_S - 1.0);
-        assert_eq!(pad.craft.phase(), Phase::PadArmed);
+        assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
         pad.run(1.1);
-        assert_eq!(pad.craft.phase(), Phase::PadIdle);
-        assert!(!pad.craft.aborted() && pad.said("held for 60 s without a new start") == 1);
+        assert_eq!(pad.vehicle.phase(), Phase::PadIdle);
+        assert!(!pad.vehicle.aborted() && pad.said("held for 60 s without a new start") == 1);
         assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
     }
 }
@@ -262,7 +254,7 @@ fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
             assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
         }
         assert_eq!((pad.said("refused"), pad.said("HOLD: no countdown")), (complaints, 1));
-        assert!(pad.craft.mode().interlocks.armed);
+        assert!(pad.vehicle.mode().interlocks.armed);
     }
 }
 
@@ -271,16 +263,14 @@ fn a_vehicle_that_starts_by_itself_needs_no_station() {
     let mut pad = Pad::planar();
     pad.endpoint = VehicleEndpoint::new().starting_by_itself();
     pad.speaking.clear();
-    pad.craft.request(crate::craft::Request::Arm);
-    pad.craft.request(crate::craft::Request::Start);
-    pad.run(pad.craft.countdown_s() + 0.5);
-    assert!(!pad.craft.phase().on_pad(), "{:?}", pad.craft.phase());
+    frame(&mut pad.vehicle, &mut pad.endpoint, &[Asked::Arm, Asked::Start]);
+    pad.run(pad.vehicle.computer().countdown_s() + 0.5);
+    assert!(!pad.vehicle.phase().on_pad(), "{:?}", pad.vehicle.phase());
 }
 
 #[test]
 fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
-    let profile = Profile::builtin("paper-calibrated").unwrap();
-    let vehicle = Vehicle::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+    let vehicle = planar();
     let mut endpoint = VehicleEndpoint::new();
     let mut stranger = Encoder::new(SPARE);
     let beat = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
@@ -289,7 +279,7 @@ fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
     assert_eq!((told.target_system, told.target_component, told.accepted_age_ms), (0, 0, u16::MAX));
     endpoint.on_rejected(&beat, Rejection::Unsigned);
 
-    let mut pad = Pad::of(Box::new(vehicle), endpoint);
+    let mut pad = Pad::of(vehicle, endpoint);
     pad.sent.clear();
     pad.speaking = vec![CREW, OTHER];
     pad.run(5.0);
@@ -313,18 +303,18 @@ fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
 fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
     let mut pad = Pad::in_space();
     pad.count_down();
-    pad.run(pad.craft.countdown_s() + 1.0);
-    assert!(pad.craft.phase().in_descent());
+    pad.run(pad.vehicle.computer().countdown_s() + 1.0);
+    assert!(pad.vehicle.phase().in_descent());
     pad.tell(CREW, ABORT, 1.0);
     // The flight computer takes it at its next frame: until then nothing is latched and nothing acknowledged.
-    let before = frames(pad.endpoint.poll(pad.craft.as_ref()));
-    assert!(!pad.craft.aborted());
+    let before = frames(pad.endpoint.poll(&pad.vehicle));
+    assert!(!pad.vehicle.aborted());
     assert!(before.iter().all(|frame| CommandAnswer::from_frame(frame).is_none()));
     pad.tell(CREW, ABORT, 1.0);
     pad.frame();
-    assert!(pad.craft.aborted());
-    assert_eq!(pad.answers(), [ACCEPTED], "once, though it was repeated");
-    assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED, "and at once ever after");
+    assert!(pad.vehicle.aborted());
+    assert_eq!(pad.answers(), [ACCEPTED], "answered once, although it was repeated");
+    assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED, "later aborts are acknowledged at once");
 }
 
 #[test]
@@ -334,12 +324,12 @@ fn the_motor_and_its_wait_are_on_the_wire_until_it_is_safe() {
     assert_eq!((status.motor, status.approach_wait_s), (TdMotor::TD_MOTOR_LIVE, 0));
     pad.count_down();
     assert_eq!(pad.status().approach_wait_s, u16::MAX, "armed");
-    while pad.craft.phase() != Phase::Powered {
+    while pad.vehicle.phase() != Phase::Powered {
         pad.frame();
     }
     let status = pad.status();
     assert_eq!((status.motor, status.approach_wait_s), (TdMotor::TD_MOTOR_BURNING, u16::MAX));
-    while !pad.craft.is_over() {
+    while !pad.vehicle.is_over() {
         pad.frame();
     }
     let status = pad.status();

@@ -1,8 +1,8 @@
-//! What the flight computer is given of the truth: an inertial unit, a barometer, a late satellite fix and a lidar.
+//! The flight computer's sensors: an inertial unit, a barometer, a satellite receiver with late fixes, and a lidar.
 //!
-//! [`Sensors::observe`] is called after every millisecond of truth, and returns what one frame of the flight computer
-//! sees after every fifth. Each sensor has its own stream of the seed, and draws whether it is out or not: a fault in
-//! one moves no other's noise.
+//! [`Sensors::observe`] is called after every millisecond of truth. After every fifth it returns the measurements of
+//! one frame of the flight computer. Each sensor has its own stream of random numbers and keeps drawing while it is
+//! out, so a fault in one sensor does not change the noise of another.
 
 mod noise;
 mod params;
@@ -10,8 +10,9 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-use flight::estimator::{GRAVITY_M_S2, GnssFix, ImuSample, Measurements};
-use flight::rigid::RigidState;
+use flight::computer::{FRAME_MS, FRAME_S};
+use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, ImuSample, Measurements};
+use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
 use self::noise::{Normal, Wander};
@@ -19,13 +20,9 @@ pub use self::params::{BarometerParams, GnssParams, ImuParams, LidarParams, Sens
 pub use self::start::believed_start;
 use crate::world::World;
 
-/// Milliseconds of truth in one frame of the flight computer.
-pub const FRAME_MS: u32 = 5;
 const MS_S: f64 = 1e-3;
-/// The same, s.
-pub const FRAME_S: f64 = FRAME_MS as f64 * MS_S;
 
-/// The truth that the sensors look at, after a millisecond.
+/// The truth that the sensors measure, after a millisecond.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorTruth {
     /// Position, velocity, attitude and rotation; the position is the centre of gravity's.
@@ -50,7 +47,7 @@ impl SensorTruth {
     }
 }
 
-/// What is broken at this moment.
+/// The faults of the sensors at this moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorFaults {
     /// No satellite fixes.
@@ -65,14 +62,13 @@ pub struct SensorFaults {
     pub accelerometer_bias_step_m_s2: Vector3<f64>,
 }
 
-/// The true errors that a filter tries to find, for comparing.
+/// The true sensor errors that a filter estimates, for comparison.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorErrors {
     /// Gyro bias, body, rad/s.
     pub gyro_bias_rad_s: Vector3<f64>,
     /// Accelerometer bias, body, m/s^2.
     pub accelerometer_bias_m_s2: Vector3<f64>,
-    /// Barometer offset, m.
     pub barometer_offset_m: f64,
     /// Ram coefficient.
     pub barometer_ram: f64,
@@ -91,9 +87,9 @@ pub struct Sensors {
     errors: SensorErrors,
     accelerometer_scale: Vector3<f64>,
     wander: [Wander; 3],
-    /// The wandering error when the position was zeroed on the pad, m.
+    /// The wandering error at the time when the position was zeroed on the pad, m.
     zero_m: Vector3<f64>,
-    /// Of the first fix after the start, ms: receivers keep their own time.
+    /// Time of the first fix after the start, ms: receivers keep their own time.
     gnss_phase_ms: u32,
     on_its_way: Option<(u32, GnssFix)>,
     rate_sum_rad_s: Vector3<f64>,
@@ -104,7 +100,7 @@ impl Sensors {
     /// Draws one flight's sensors; `start_s` is the flight computer's time at the start of the simulation.
     ///
     /// # Errors
-    /// A figure that no sensor can have.
+    /// A parameter is out of range.
     pub fn new(params: &SensorParams, seed: u64, start_s: f64) -> Result<Self, SensorParamError> {
         params.validate()?;
         let (imu, gnss) = (&params.imu, &params.gnss);
@@ -144,12 +140,12 @@ impl Sensors {
         })
     }
 
-    /// The true errors of this flight's sensors at this moment, faults apart.
+    /// The true errors of this flight's sensors at this moment, without faults.
     pub fn errors(&self) -> &SensorErrors {
         &self.errors
     }
 
-    /// Looks at the truth after one more millisecond. A frame's measurements after every fifth.
+    /// Measures the truth after one more millisecond; returns a frame's measurements after every fifth.
     pub fn observe(&mut self, truth: &SensorTruth, faults: &SensorFaults) -> Option<Measurements> {
         self.elapsed_ms += 1;
         self.rate_sum_rad_s += truth.state.rate_rad_s;
@@ -169,7 +165,7 @@ impl Sensors {
     fn imu(&mut self, faults: &SensorFaults) -> ImuSample {
         let imu = &self.params.imu;
         let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
-        // White noise of a density, averaged over a frame.
+        // White noise of this density, averaged over a frame.
         let spread = 1.0 / libm::sqrt(FRAME_S);
         let milli_g = 1e-3 * GRAVITY_M_S2;
 
@@ -201,7 +197,7 @@ impl Sensors {
         }
         let walk = barometer.offset_walk_m_sqrt_s * libm::sqrt(f64::from(barometer.period_ms) * MS_S);
         self.errors.barometer_offset_m += walk * self.barometer_noise.next();
-        // Pressure too high by k rho V^2 / 2 reads as a height too low by k V^2 / 2 g.
+        // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
         let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
         Some(
             truth.state.position_m.z + self.errors.barometer_offset_m
@@ -246,11 +242,12 @@ impl Sensors {
         if tilt_rad > lidar.tilt_max_deg.to_radians() {
             return None;
         }
-        // From the lidar along the axis to the ground: the slant from the centre of gravity, less the lidar's place.
+        // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
+        // distance from it.
         let slant_m = truth.state.position_m.z / libm::cos(tilt_rad);
         let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
-        // Rough ground sends back what falls on it in all directions, and less falls on it aslant (Lambert's cosine
-        // law); the echo weakens with the square of the range.
+        // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
+        // with the square of the range.
         let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
         (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m)
     }

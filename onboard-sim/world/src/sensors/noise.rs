@@ -1,4 +1,4 @@
-//! Seeded noise: white, and slowly wandering.
+//! Noise from a seed: white noise and slow wander.
 
 use nalgebra::Vector3;
 use rand::{Rng as _, SeedableRng as _};
@@ -8,12 +8,12 @@ use rand_chacha::ChaCha12Rng;
 #[derive(Debug, Clone)]
 pub(super) struct Normal {
     random: ChaCha12Rng,
-    /// The pair's other half.
+    /// The second number of the pair.
     spare: Option<f64>,
 }
 
 impl Normal {
-    /// Each stream of a seed is independent of the others: a fault in one sensor moves no other sensor's noise.
+    /// The streams of a seed are independent, so a fault in one sensor does not change the noise of another.
     pub(super) fn new(seed: u64, stream: u64) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         random.set_stream(stream);
@@ -40,7 +40,7 @@ impl Normal {
     }
 }
 
-/// A first-order Gauss-Markov process: stationary, with a correlation that dies down exponentially.
+/// A stationary first-order Gauss-Markov process: its correlation decays exponentially.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wander {
     pub(super) value: f64,
@@ -54,7 +54,7 @@ impl Wander {
         Self { value: sigma * normal.next(), sigma, correlation_s }
     }
 
-    /// Over an interval of any length, exactly.
+    /// Advances over an interval of any length, exactly.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
         let kept = libm::exp(-interval_s / self.correlation_s);
         self.value = self.value * kept + self.sigma * libm::sqrt(1.0 - kept * kept) * normal.next();
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn normal_numbers_have_mean_nought_and_variance_one() {
+    fn normal_numbers_have_mean_zero_and_variance_one() {
         let mut normal = Normal::new(3, 0);
         let n = 40_000;
         let draws: Vec<f64> = (0..n).map(|_| normal.next()).collect();
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wander_stays_stationary_and_forgets_at_its_rate() {
+    fn the_wander_is_stationary_and_its_correlation_decays_at_the_stated_rate() {
         let mut normal = Normal::new(5, 1);
         let (mut squares, mut products) = (0.0, 0.0);
         let n = 20_000;

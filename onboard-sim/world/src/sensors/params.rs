@@ -1,18 +1,16 @@
-//! How good and how bad the sensors are, as data. The defaults are what a student club can buy.
+//! The errors of the sensors, as data. The defaults are those of sensors that a student club can buy.
 
 use serde::Deserialize;
 
-/// Every sensor's figures. Standard deviations, unless the name says otherwise.
+/// The parameters of every sensor. Each value is a standard deviation unless its name says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorParams {
     /// Inertial measurement unit.
     pub imu: ImuParams,
-    /// Barometer.
     pub barometer: BarometerParams,
     /// Satellite receiver.
     pub gnss: GnssParams,
-    /// Lidar.
     pub lidar: LidarParams,
 }
 
@@ -22,7 +20,7 @@ pub struct SensorParams {
 pub struct ImuParams {
     /// Gyro noise density, deg/s/sqrt(Hz).
     pub gyro_noise_deg_s_sqrt_hz: f64,
-    /// Gyro bias left after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times that.)
+    /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times larger.)
     pub gyro_bias_deg_s: f64,
     /// Wander of the gyro bias, deg/s in one second.
     pub gyro_bias_walk_deg_s_sqrt_s: f64,
@@ -32,7 +30,7 @@ pub struct ImuParams {
     pub accelerometer_noise_mg_sqrt_hz: f64,
     /// Accelerometer bias, each axis, mg.
     pub accelerometer_bias_mg: f64,
-    /// Scale error of each accelerometer axis, as a share.
+    /// Scale error of each accelerometer axis, as a fraction.
     pub accelerometer_scale_share: f64,
     /// Largest specific force measured, g.
     pub accelerometer_range_g: f64,
@@ -46,15 +44,15 @@ pub struct BarometerParams {
     pub period_ms: u32,
     /// Noise of one sample, m.
     pub noise_m: f64,
-    /// Offset at the start, m: what weather and warming left since the pad.
+    /// Offset at the start, m, from weather and warming since the pad.
     pub offset_m: f64,
     /// Wander of the offset, m in one second.
     pub offset_walk_m_sqrt_s: f64,
-    /// Ram coefficient: the pressure error over the dynamic pressure.
+    /// Ram coefficient: the pressure error divided by the dynamic pressure.
     pub ram_coefficient: f64,
 }
 
-/// Satellite receiver. Its position is zeroed on the pad before the flight, and has wandered since.
+/// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GnssParams {
@@ -92,12 +90,12 @@ pub struct LidarParams {
     pub range_max_m: f64,
     /// Beyond this tilt the ground gives no echo, degrees.
     pub tilt_max_deg: f64,
-    /// Its place along the axis, ahead of the feet, m.
+    /// Its position along the axis, ahead of the feet, m.
     pub ahead_of_feet_m: f64,
 }
 
 impl LidarParams {
-    /// Its distance behind the centre of gravity, m, for the centre's height over the feet, m.
+    /// Its distance behind the centre of gravity, m, from that centre's height above the feet, m.
     pub fn behind_cg_m(&self, cg_over_feet_m: f64) -> f64 {
         cg_over_feet_m - self.ahead_of_feet_m
     }
@@ -159,7 +157,7 @@ impl Default for LidarParams {
     }
 }
 
-/// A figure that no sensor can have.
+/// Why a sensor parameter is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("sensors: {field} is {found}, accepted is {accepted}")]
 pub struct SensorParamError {
@@ -172,10 +170,10 @@ pub struct SensorParamError {
 }
 
 impl SensorParams {
-    /// Checks every figure.
+    /// Checks every parameter.
     ///
     /// # Errors
-    /// The first figure that no sensor can have.
+    /// The first parameter that is out of range.
     pub fn validate(&self) -> Result<(), SensorParamError> {
         let (imu, baro, gnss, lidar) = (&self.imu, &self.barometer, &self.gnss, &self.lidar);
         let sigmas = [
@@ -218,7 +216,7 @@ impl SensorParams {
         for (field, period_ms) in
             [("barometer.period_ms", baro.period_ms), ("lidar.period_ms", lidar.period_ms)]
         {
-            if period_ms == 0 || !period_ms.is_multiple_of(super::FRAME_MS) {
+            if period_ms == 0 || !period_ms.is_multiple_of(flight::computer::FRAME_MS) {
                 let found = f64::from(period_ms);
                 return Err(SensorParamError { field, found, accepted: "a multiple of 5 above 0" });
             }
@@ -246,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_sensor_can_have_is_refused_by_name() {
+    fn a_parameter_out_of_range_is_named_in_the_error() {
         let good = SensorParams::default();
         assert_eq!(good.validate(), Ok(()));
         let of = |params: SensorParams| params.validate().unwrap_err().to_string();

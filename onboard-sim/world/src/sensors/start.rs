@@ -1,16 +1,16 @@
-//! What the estimator believes at the start of a flight that does not begin on the pad.
+//! The estimator's initial state for a flight that does not begin on the pad.
 
-use flight::estimator::StartUncertainty;
-use flight::rigid::RigidState;
+use flight::estimation::estimator::StartUncertainty;
+use flight::vehicle::rigid::RigidState;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::noise::Normal;
 
-/// The stream of the seed after those of the sensors.
+/// The random stream after those of the sensors.
 const STREAM: u64 = 4;
 
-/// The true state with errors drawn from the stated uncertainty. The rate is the truth's: the gyro corrects it in the
-/// first frame.
+/// The true state with errors drawn from the stated uncertainty. The rotation rate has no error, because the gyro
+/// replaces it in the first frame.
 pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: u64) -> RigidState {
     let mut normal = Normal::new(seed, STREAM);
     let position_m = Vector3::new(uncertainty.horizontal_m, uncertainty.horizontal_m, uncertainty.height_m);

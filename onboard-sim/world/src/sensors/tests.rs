@@ -1,4 +1,4 @@
-//! The sensors against their own figures.
+//! The sensors against their own parameters.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn frames(seed: u64, truth: &SensorTruth, faults: &SensorFaults, frames: usize) 
 }
 
 #[test]
-fn rates_are_the_sensors_own() {
+fn each_sensor_reports_at_its_own_rate() {
     let seen = frames(1, &falling(10.0, 5.0), &SensorFaults::default(), 400);
     assert_eq!(seen.len(), 400);
     assert_eq!(seen.iter().filter(|m| m.pressure_altitude_m.is_some()).count(), 100);
@@ -50,14 +50,15 @@ fn the_lidar_is_silent_high_up_and_on_its_side() {
     assert!(lidar_of(&falling(5.0, 13.0)).is_empty());
     let mut leaning = falling(5.0, 5.0);
     let lean = |deg: f64| nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), deg.to_radians());
-    leaning.state.world_from_body = lean(46.0) * flight::rigid::upright();
+    leaning.state.world_from_body = lean(46.0) * flight::vehicle::rigid::upright();
     assert!(lidar_of(&leaning).is_empty());
-    // 11 m straight down are seen; the 10.7 m aslant from 8 m are beyond 12 m times the root of the cosine of 44 deg.
+    // 11 m straight down are in range. The slant range of 10.7 m from 8 m is beyond 12 m times the root of the cosine
+    // of 44 deg.
     assert!(!lidar_of(&falling(5.0, 11.0)).is_empty());
     let mut far = falling(5.0, 8.0);
-    far.state.world_from_body = lean(44.0) * flight::rigid::upright();
+    far.state.world_from_body = lean(44.0) * flight::vehicle::rigid::upright();
     assert!(lidar_of(&far).is_empty());
-    leaning.state.world_from_body = lean(20.0) * flight::rigid::upright();
+    leaning.state.world_from_body = lean(20.0) * flight::vehicle::rigid::upright();
     let ranges = lidar_of(&leaning);
     // 5 m / cos 20 deg - (0.6 - 0.15) m.
     let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
@@ -65,7 +66,7 @@ fn the_lidar_is_silent_high_up_and_on_its_side() {
 }
 
 #[test]
-fn a_fault_silences_its_sensor_and_moves_no_other_noise() {
+fn a_fault_silences_its_sensor_and_does_not_change_the_noise_of_others() {
     let truth = falling(10.0, 5.0);
     let healthy = frames(4, &truth, &SensorFaults::default(), 400);
     let step = Vector3::new(0.1, 0.0, -0.2);
@@ -106,7 +107,7 @@ fn noise_has_the_stated_size_and_a_seed_repeats_it() {
 
 #[test]
 fn over_many_flights_the_ram_error_has_its_size() {
-    // 30 m/s is 45.89 m of speed height: 2.29 m of sigma, and 0.3 m of offset.
+    // 30 m/s has a speed height of 45.89 m: a sigma of 2.29 m, and 0.3 m of offset.
     let n = 300;
     let squares: f64 = (0..n)
         .map(|seed| {

@@ -1,4 +1,4 @@
-//! The wind: a mean that grows with height, and gusts in it.
+//! The wind: a mean that grows with height, and gusts.
 //!
 //! The mean follows the power law over flat open country with the exponent 1/7, from its value 10 m above the
 //! ground. Gusts are those of [`gusts`].
@@ -9,13 +9,13 @@ use nalgebra::Vector3;
 
 use gusts::Gusts;
 
-/// Height the mean wind is stated at, m.
+/// Reference height of the mean wind, m.
 pub const REFERENCE_HEIGHT_M: f64 = 10.0;
 /// Exponent of the power law.
 const EXPONENT: f64 = 1.0 / 7.0;
-/// Below this the mean wind stays what it is here, m: within the grass the law says nothing.
+/// Below this height the mean wind is constant, m: the power law does not hold so close to the ground.
 const LOWEST_M: f64 = 0.5;
-/// Height the gusts' standard states the wind at: 20 ft, m.
+/// Reference height of the wind in the gust standard: 20 ft, m.
 const GUST_REFERENCE_HEIGHT_M: f64 = 6.096;
 
 /// The wind of one flight.
@@ -29,8 +29,8 @@ pub struct Wind {
 }
 
 impl Wind {
-    /// A wind by its mean at the reference height, m/s, where it blows to (from world x towards world y, rad), gust
-    /// intensity over the standard's, and the gusts' seed.
+    /// A wind from its mean at the reference height, m/s, the direction it blows to (from world x towards world y,
+    /// rad), the gust intensity as a multiple of the standard's, and the seed of the gusts.
     pub fn new(reference_m_s: f64, towards_rad: f64, gust_scale: f64, seed: u64) -> Self {
         let (sin, cos) = libm::sincos(towards_rad);
         let gust_wind_m_s = mean_m_s(reference_m_s, GUST_REFERENCE_HEIGHT_M);
@@ -43,7 +43,7 @@ impl Wind {
         }
     }
 
-    /// This wind with the mean and the gust intensity of another; the gusts themselves go on.
+    /// This wind with the mean and the gust intensity of another wind; the gusts themselves continue.
     pub(crate) fn changed(&self, other: &Self) -> Self {
         Self { gusts: self.gusts.as_strong_as(&other.gusts), now_m_s: self.now_m_s, ..other.clone() }
     }
@@ -53,7 +53,7 @@ impl Wind {
         self.along * mean_m_s(self.reference_m_s, height_m)
     }
 
-    /// Moves on by a length of air, m, at a height above ground, m.
+    /// Advances by a length of air, m, at a height above ground, m.
     pub(crate) fn step(&mut self, height_m: f64, path_m: f64) {
         self.now_m_s = self.mean_m_s(height_m);
         if self.gusts.blow() {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn no_wind_is_none() {
+    fn still_air_has_no_mean_and_no_gusts() {
         let mut wind = Wind::new(0.0, 1.0, 1.0, 1);
         wind.step(100.0, 0.04);
         assert!(wind.now_m_s().norm() < 1e-300);

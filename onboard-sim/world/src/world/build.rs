@@ -1,8 +1,9 @@
-//! A world from data, and the data it does not take.
+//! Builds a world from data, and refuses data that make no sense.
 
-use flight::airframe::{Airframe, AirframeError, MassModel};
-use flight::rigid::RigidState;
-use flight::thrust_curve::ThrustCurve;
+use flight::vehicle::airframe::BadValue;
+use flight::vehicle::airframe::{Airframe, MassModel};
+use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 
 use super::World;
@@ -14,12 +15,12 @@ use crate::servo::Servo;
 use crate::truth::Truth;
 use crate::wind::Wind;
 
-/// Data that make no world.
+/// Why no world can be built from the data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WorldError {
     /// The airframe is not sound.
     #[error("airframe")]
-    Airframe(#[from] AirframeError),
+    Airframe(#[from] BadValue),
     /// The motor does not fit the airframe.
     #[error(
         "motor {motor} has {propellant_kg} kg of propellant; with it the airframe's mass of {loaded_kg} kg and its inertia \
@@ -28,7 +29,6 @@ pub enum WorldError {
     Motor {
         /// The motor's name.
         motor: String,
-        /// Its propellant, kg.
         propellant_kg: f64,
         /// The airframe's loaded mass, kg.
         loaded_kg: f64,
@@ -43,13 +43,13 @@ pub enum WorldError {
         /// What would be accepted.
         required: &'static str,
     },
-    /// The initial state is not finite, or its attitude not a rotation.
+    /// The initial state is not finite, or its attitude is not a rotation.
     #[error("the initial state is {0}; finite numbers and a unit attitude are accepted")]
     State(String),
 }
 
 impl World {
-    /// A world at the start of a flight: fins closed and gimbal centred, motor full, parachute stowed, gusts by seed.
+    /// A world at the start of a flight: fins closed, gimbal centred, motor full, parachute stowed, gusts from a seed.
     ///
     /// # Errors
     ///
@@ -98,7 +98,7 @@ impl World {
         Ok(world)
     }
 
-    /// The same world with the fins at an opening angle already, rad, held between their stops.
+    /// The same world with the fins already at an opening angle, rad, held between their stops.
     #[must_use]
     pub fn with_fins_at(mut self, opening_rad: f64) -> Self {
         self.fins = fins_at(&self.airframe, opening_rad);
@@ -111,7 +111,7 @@ fn fins_at(airframe: &Airframe, opening_rad: f64) -> [Servo; 4] {
     core::array::from_fn(|_| Servo::new(&airframe.fins.servo, stops_rad, opening_rad))
 }
 
-/// Whether a vehicle can be in a state.
+/// Checks that a state is finite and its attitude a rotation.
 pub(super) fn check_state(state: &RigidState) -> Result<(), WorldError> {
     if !state.is_finite() || (state.world_from_body.coords.norm_squared() - 1.0).abs() > 1e-6 {
         return Err(WorldError::State(format!("{state:?}")));

@@ -1,8 +1,8 @@
-//! Another vehicle or another day from one moment on, in the middle of a flight.
+//! Changes the vehicle or the weather in the middle of a flight.
 
-use flight::airframe::{Airframe, Servo as ServoData};
-use flight::rigid::RigidState;
-use flight::thrust_curve::ThrustCurve;
+use flight::vehicle::airframe::{Airframe, Servo as ServoData};
+use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
 
 use super::build::check_state;
 use super::{World, WorldError};
@@ -12,9 +12,9 @@ use crate::truth::Truth;
 impl World {
     /// The same moment of the same flight, with another airframe, motor or truth from now on.
     ///
-    /// State, time, angles of the servos, what has been commanded and what has broken stay; gusts go on with another
-    /// strength; a motor that burns goes on along the other curve at its time. With nothing changed it flies on as this
-    /// one does, bit for bit.
+    /// State, time, servo angles, past commands and faults stay. The gusts continue with the new strength, and a
+    /// burning motor continues on the new curve at the same time. If nothing changes, the flight continues with the
+    /// same bits.
     ///
     /// # Errors
     /// As [`World::new`].
@@ -44,10 +44,10 @@ impl World {
         })
     }
 
-    /// The same moment of the same flight with the vehicle in another place, attitude or motion; everything else goes on.
+    /// The same moment of the same flight with the vehicle at another position, attitude or motion; all else continues.
     ///
     /// # Errors
-    /// The state is not finite, or its attitude no rotation.
+    /// The state is not finite, or its attitude is not a rotation.
     pub fn placed(&self, state: &RigidState) -> Result<Self, WorldError> {
         check_state(state)?;
         Ok(Self { state: *state, ..self.clone() })
@@ -56,7 +56,7 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use flight::motors;
+    use vehicles::motors;
 
     use super::*;
     use crate::{Actuators, Fault};
@@ -65,7 +65,7 @@ mod tests {
         Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, parachute: false };
 
     fn airframe() -> Airframe {
-        Airframe::builtin("mk2").unwrap()
+        vehicles::airframe::builtin("mk2").unwrap()
     }
 
     /// Half a second into its burn, with a weakened motor and a slow gimbal, in wind.
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn with_nothing_changed_it_flies_on_bit_for_bit() {
+    fn without_a_change_the_flight_continues_bit_for_bit() {
         let mut world = burning();
         let motor = motors::builtin(&world.airframe().motor).unwrap();
         let mut same = world.changed(world.airframe(), &motor, world.truth()).unwrap();
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn in_another_place_it_flies_on_as_it_was() {
+    fn a_moved_vehicle_keeps_everything_but_its_state() {
         let mut world = burning();
         let mut same = world.placed(world.state()).unwrap();
         let mut there = *world.state();
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn another_motor_and_another_wind_act_from_the_moment_on() {
+    fn another_motor_and_another_wind_act_at_once() {
         let world = burning();
         let motor = motors::builtin(&world.airframe().motor).unwrap();
         let weaker = Truth { impulse_scale: 0.5 * world.truth().impulse_scale, ..*world.truth() };

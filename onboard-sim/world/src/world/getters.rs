@@ -1,8 +1,8 @@
-//! What can be asked of the world.
+//! Read access to the world.
 
-use flight::airframe::{Airframe, MassProperties};
-use flight::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
-use flight::rigid::RigidState;
+use flight::vehicle::airframe::{Airframe, MassProperties};
+use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
 use super::World;
@@ -26,18 +26,18 @@ impl World {
         &self.state
     }
 
-    /// Height of the feet above the ground as if the vehicle were upright, m: nil at touchdown.
+    /// Height of the feet above the ground as if the vehicle were upright, m; zero at touchdown.
     pub fn height_m(&self) -> f64 {
         self.state.position_m.z - self.cg_above_feet_m()
     }
 
-    /// From the feet up to the centre of gravity, along the axis, m.
+    /// Distance from the feet up to the centre of gravity, along the axis, m.
     pub fn cg_above_feet_m(&self) -> f64 {
         self.airframe.above_feet_m(self.cg_m().x)
     }
 
-    /// Mean specific force over the last step in body axes, m/s^2: what an ideal accelerometer at the centre of gravity
-    /// gathers.
+    /// Mean specific force over the last step in body axes, m/s^2, which is what an ideal accelerometer at the centre
+    /// of gravity measures.
     pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
         &self.specific_force_m_s2
     }
@@ -92,22 +92,22 @@ impl World {
         Air::at_height_m(self.state.position_m.z)
     }
 
-    /// Whether the parachute was thrown out.
+    /// Whether the parachute was ejected.
     pub fn parachute_ejected(&self) -> bool {
         self.parachute.ejected()
     }
 
-    /// Share of the parachute that is open, 0 to 1.
+    /// Fraction of the parachute that is open, 0 to 1.
     pub fn parachute_open_share(&self) -> f64 {
         self.parachute.open_share()
     }
 
-    /// The first contact with the ground, once it was.
+    /// The first contact with the ground, if there was one.
     pub fn touchdown(&self) -> Option<&Touchdown> {
         self.touchdown.as_ref()
     }
 
-    /// How the vehicle ended, once it has; from then on only time moves.
+    /// How the vehicle came to rest, if it has. From then on only time changes.
     pub fn rest(&self) -> Option<&Rest> {
         self.rest.as_ref()
     }
@@ -117,7 +117,7 @@ impl World {
         &self.airframe
     }
 
-    /// How the true vehicle and its day differ from the data.
+    /// How the true vehicle and the weather differ from the nominal data.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }

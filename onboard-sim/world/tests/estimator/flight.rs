@@ -1,13 +1,12 @@
-//! A flight that is only integrated, not flown: from apogee down in wind, lit in time, through an S-turn to the ground.
-//! Its attitude is a function of time and its thrust one of height and speed, so that it needs no controller and no
-//! estimator.
+//! A prescribed flight: from apogee down in wind, with ignition in time, through an S-turn to the ground. Its attitude
+//! is a function of time and its thrust a function of height and speed, so it needs no controller and no estimator.
 
 use core::f64::consts::TAU;
 
-use flight::estimator::{
+use flight::estimation::estimator::{
     Estimate, Estimator, EstimatorConfig, GRAVITY_M_S2, Measurements, StartUncertainty, VehicleNow,
 };
-use flight::rigid::{RigidState, upright};
+use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use world::sensors::{SensorFaults, SensorParams, SensorTruth, Sensors, believed_start};
 
@@ -17,18 +16,18 @@ const DENSITY_KG_M3: f64 = 1.2;
 const MASS_KG: f64 = 3.1;
 const FIN_DRAG_AREA_M2: f64 = 0.031;
 const CROSSFLOW_AREA_M2: f64 = 0.09;
-/// Lit when stopping above the ground asks for this, m/s^2.
+/// The motor is lit when a stop above the ground needs this deceleration, m/s^2.
 const STOPPING_M_S2: f64 = 7.0;
 
 /// What differs between flights.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scene {
     pub(crate) seed: u64,
-    /// At the start height; it dies down with the 1/7 power of height.
+    /// Wind at the start height; it decreases with the 1/7 power of height.
     pub(crate) wind_m_s: Vector2<f64>,
     pub(crate) faults: fn(f64) -> SensorFaults,
     pub(crate) sensors: SensorParams,
-    /// The true force of the air over the one the estimator reckons with.
+    /// The true force of the air divided by the one in the estimator's model.
     pub(crate) air_scale: f64,
 }
 
@@ -57,7 +56,7 @@ impl Frame {
 }
 
 impl Scene {
-    /// Wind of some 3 m/s from a direction of the seed's own.
+    /// Wind of about 3 m/s from a direction that depends on the seed.
     pub(crate) fn of(seed: u64) -> Self {
         let (sin, cos) = libm::sincos(seed as f64);
         let wind_m_s = Vector2::new(cos, sin) * (2.0 + (seed % 4) as f64);
@@ -83,7 +82,7 @@ impl Scene {
         Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed)
     }
 
-    /// Flies it, to a centre of gravity 0.1 m above its height at rest.
+    /// Runs the flight until the centre of gravity is 0.1 m above its height at rest.
     pub(crate) fn fly(&self) -> Vec<Frame> {
         let mut estimator = self.estimator();
         let mut sensors = Sensors::new(&self.sensors, self.seed, 0.0).expect("good figures");

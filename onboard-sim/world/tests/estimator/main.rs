@@ -1,4 +1,5 @@
-//! The estimator on the modelled sensors: consistent, good enough to land by, and steady when sensors fail.
+//! The estimator with the modelled sensors: it is consistent, accurate enough for landing, and steady when sensors
+//! fail.
 #![expect(clippy::expect_used, reason = "a test says what it expected")]
 
 mod flight;
@@ -6,7 +7,7 @@ mod plant;
 
 use std::sync::LazyLock;
 
-use ::flight::estimator::{Doubt, Health};
+use ::flight::estimation::estimator::{Doubt, Health};
 use nalgebra::Vector3;
 use world::sensors::SensorFaults;
 
@@ -19,7 +20,7 @@ fn fly(flights: u64, faults: fn(f64) -> SensorFaults) -> Vec<Vec<Frame>> {
     (0..flights).map(|seed| Scene { faults, ..Scene::of(seed) }.fly()).collect()
 }
 
-/// Flights with nothing broken; several tests look at them.
+/// Flights without faults, shared by several tests.
 static HEALTHY: LazyLock<Vec<Vec<Frame>>> = LazyLock::new(|| fly(FLIGHTS, |_| SensorFaults::default()));
 
 fn rms(frames: &[&Frame], error: impl Fn(&Frame) -> f64) -> f64 {
@@ -30,7 +31,7 @@ fn last(flights: &[Vec<Frame>]) -> Vec<&Frame> {
     flights.iter().map(|frames| frames.last().expect("a flight has frames")).collect()
 }
 
-/// The frames of all flights that show what is asked for.
+/// The frames of all flights that meet a condition.
 fn frames(flights: &[Vec<Frame>], of: impl Fn(&Frame) -> bool) -> Vec<&Frame> {
     flights.iter().flatten().filter(|frame| of(frame)).collect()
 }
@@ -50,7 +51,7 @@ fn height_rms_m(at: &[&Frame]) -> f64 {
 }
 
 #[test]
-fn val_chi_square_the_error_is_as_large_as_the_filter_says() {
+fn val_chi_square_the_error_matches_the_filters_covariance() {
     let flights = &*HEALTHY;
     let shortest = flights.iter().map(Vec::len).min().expect("flights");
     // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard deviation of 60, and
@@ -66,7 +67,7 @@ fn val_chi_square_the_error_is_as_large_as_the_filter_says() {
 }
 
 #[test]
-fn it_is_good_enough_to_land_by() {
+fn the_estimate_is_accurate_enough_for_landing() {
     let flights = &*HEALTHY;
     let low = frames(flights, |frame| frame.truth.position_m.z < 8.0);
     let down = last(flights);
@@ -88,7 +89,7 @@ fn it_is_good_enough_to_land_by() {
 }
 
 #[test]
-fn the_wind_is_known_when_the_motor_is_lit_though_the_drag_is_not() {
+fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
     let lit: Vec<&Frame> =
         flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("lit")).collect();
@@ -100,7 +101,7 @@ fn the_wind_is_known_when_the_motor_is_lit_though_the_drag_is_not() {
 }
 
 #[test]
-fn the_two_heights_agree_at_ignition_and_a_jump_of_one_shows() {
+fn the_two_heights_agree_at_ignition_and_show_a_jump_of_one() {
     let flights = &*HEALTHY;
     for frame in frames(flights, |frame| frame.time_s > 1.0) {
         let apart_m = frame.estimate.heights.disagreement_m().expect("two heights");
@@ -121,7 +122,7 @@ fn the_two_heights_agree_at_ignition_and_a_jump_of_one_shows() {
 }
 
 #[test]
-fn without_satellites_in_the_last_five_seconds_it_drifts_no_further_than_it_says() {
+fn without_satellites_in_the_last_five_seconds_the_error_stays_within_the_stated_deviation() {
     let flights = &fly(FLIGHTS, |time_s| SensorFaults { gnss_out: time_s > 6.9, ..SensorFaults::default() });
     let down = last(flights);
     let silent_s = down.iter().map(|frame| frame.time_s - 6.9).fold(f64::INFINITY, f64::min);
@@ -140,7 +141,7 @@ fn without_satellites_in_the_last_five_seconds_it_drifts_no_further_than_it_says
 }
 
 #[test]
-fn one_height_sensor_is_enough_to_come_down() {
+fn one_height_sensor_is_enough_for_the_descent() {
     let no_barometer =
         fly(50, |time_s| SensorFaults { barometer_out: time_s > 3.0, ..SensorFaults::default() });
     let down = last(&no_barometer);
@@ -153,7 +154,7 @@ fn one_height_sensor_is_enough_to_come_down() {
 }
 
 #[test]
-fn an_inertial_unit_that_jumps_is_doubted_and_learnt_again() {
+fn after_a_jump_of_the_inertial_unit_the_estimate_is_unhealthy_and_then_recovers() {
     let jumps: [fn(f64) -> SensorFaults; 3] = [
         |time_s| gyro_jump(time_s, 1.0),
         |time_s| gyro_jump(time_s, 5.0),
@@ -184,11 +185,11 @@ fn gyro_jump(time_s: f64, deg_s: f64) -> SensorFaults {
 }
 
 #[test]
-fn a_log_of_measurements_flies_it_again_bit_for_bit() {
+fn a_log_of_measurements_reproduces_the_estimate_bit_for_bit() {
     let scene = Scene::of(11);
     let flown = scene.fly();
     let mut estimator = scene.estimator();
-    // Frozen halfway, too: a clone goes on as the first would have.
+    // Also from halfway: a clone continues exactly like the original.
     let mut frozen = None;
     for (index, frame) in flown.iter().enumerate() {
         let again = estimator.step(&frame.measurements, &frame.vehicle);

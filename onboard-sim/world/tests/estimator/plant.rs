@@ -1,17 +1,18 @@
-//! The estimators on the simulated truth: a vehicle that falls in wind and gusts under moving fins, and is lit and held
-//! upright by a hand-made law that knows the truth.
+//! The estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that knows
+//! the truth lights the motor and holds the vehicle upright.
 
 use std::sync::LazyLock;
 
-use flight::airframe::{Airframe, MassModel, MassProperties};
-use flight::atmosphere::Air;
-use flight::estimator::{Estimate, Estimator, EstimatorConfig, StartUncertainty, VehicleNow};
-use flight::fins::{Allocation, FinCommand, Moments, OpeningRange};
-use flight::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
-use flight::motors;
-use flight::rigid::RigidState;
-use flight::thrust_curve::ThrustCurve;
+use flight::control::fins::{Allocation, FinCommand, OpeningRange};
+use flight::estimation::estimator::{Estimate, Estimator, EstimatorConfig, StartUncertainty, VehicleNow};
+use flight::estimation::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
+use flight::vehicle::airframe::{MassModel, MassProperties};
+use flight::vehicle::atmosphere::Air;
+use flight::vehicle::fins::Moments;
+use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{Vector2, Vector3};
+use vehicles::motors;
 use world::sensors::{SensorFaults, SensorParams, SensorTruth, Sensors, believed_start};
 use world::wind::Wind;
 use world::{Actuators, Truth, World};
@@ -20,7 +21,7 @@ const FLIGHTS: u64 = 100;
 /// The igniter is fired below this height, m.
 const IGNITE_M: f64 = 66.0;
 
-/// What one frame came to.
+/// The result of one frame.
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     time_s: f64,
@@ -30,11 +31,11 @@ struct Frame {
     estimate: Estimate,
     nees: f64,
     motor: MotorEstimate,
-    /// Thrust a second ahead: predicted and, by the drawn motor, true, N.
+    /// Thrust one second ahead, N: as predicted, and the true thrust of the drawn motor.
     ahead_n: (f64, f64),
 }
 
-/// A vehicle and a day, spread by the seed in a fixed pattern over their ranges.
+/// A vehicle and its weather, spread over their ranges by the seed in a fixed pattern.
 fn truth_of(seed: u64) -> Truth {
     let spread = |step: f64| libm::sin(1.0 + step * seed as f64) * core::f64::consts::SQRT_2;
     Truth {
@@ -50,7 +51,7 @@ fn truth_of(seed: u64) -> Truth {
     }
 }
 
-/// Falling with the wind, upright: how it gets there is not the estimator's affair.
+/// Falling upright with the wind.
 fn start(truth: &Truth) -> RigidState {
     let mut state = RigidState::upright(280.0);
     let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).mean_m_s(280.0);
@@ -58,13 +59,13 @@ fn start(truth: &Truth) -> RigidState {
     state
 }
 
-/// Upright by the truth: an angle and its rate against each axis.
+/// Holds the true attitude upright by the gimbal, from an angle and its rate on each axis.
 fn upright_gimbal_rad(state: &RigidState) -> [f64; 2] {
     let up = state.world_from_body.inverse() * Vector3::z();
     [0.15 * up.z + 0.04 * state.rate_rad_s.y, -0.15 * up.y + 0.04 * state.rate_rad_s.z]
 }
 
-/// The same with the fins, three quarters open in the mean.
+/// Holds it upright by the fins, which are three quarters open on average.
 fn upright_fins(state: &RigidState, mass: &MassProperties) -> FinCommand {
     let up = state.world_from_body.inverse() * Vector3::z();
     let (rate, inertia) = (&state.rate_rad_s, mass.pitch_inertia_kg_m2);
@@ -79,7 +80,7 @@ fn upright_fins(state: &RigidState, mass: &MassProperties) -> FinCommand {
 }
 
 fn fly(seed: u64) -> Vec<Frame> {
-    let airframe = Airframe::builtin("mk2").expect("a built-in airframe");
+    let airframe = vehicles::airframe::builtin("mk2").expect("a built-in airframe");
     let curve: ThrustCurve = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = truth_of(seed);
     let mut world =
@@ -160,7 +161,7 @@ fn fly(seed: u64) -> Vec<Frame> {
 static FLOWN: LazyLock<Vec<(Truth, Vec<Frame>)>> =
     LazyLock::new(|| (0..FLIGHTS).map(|seed| (truth_of(seed), fly(seed))).collect());
 
-/// Every flight's truth and its first frame so long after the thrust began.
+/// Every flight's truth, with its first frame at this time after the thrust began.
 fn burning_for(since_s: f64) -> Vec<(&'static Truth, &'static Frame)> {
     let at = |frame: &&Frame| frame.since_thrust_s.is_some_and(|found_s| found_s >= since_s);
     FLOWN.iter().map(|(truth, frames)| (truth, frames.iter().find(at).expect("burning"))).collect()
@@ -174,7 +175,7 @@ fn rms(
 }
 
 #[test]
-fn val_chi_square_in_the_simulated_truth_too() {
+fn val_chi_square_of_the_error_in_the_simulated_truth() {
     // 99.9 % of chi-square with 900 degrees of freedom, over the flights, as for the flights of `main`.
     let half_width = 3.29 * (18.0 / FLIGHTS as f64).sqrt();
     let of_fall = |frame: usize| FLOWN.iter().map(|(_, frames)| frames[frame].nees).sum::<f64>();
@@ -209,7 +210,7 @@ fn wind_and_air_are_known_at_ignition() {
 fn the_motor_is_known_half_a_second_into_its_burn() {
     for (since_s, thrust_n) in [(0.5, 1.0), (1.0, 1.0), (1.5, 1.0)] {
         let burning = burning_for(since_s);
-        // The accelerometer sees thrust over mass, and a mass that is off is in the estimated thrust.
+        // The accelerometer measures thrust over mass, so an error of the mass goes into the estimated thrust.
         let ahead_n = rms(&burning, |truth, frame| frame.ahead_n.0 - frame.ahead_n.1 / truth.mass_scale);
         println!("after {since_s} s: thrust a second ahead {ahead_n:.2} N");
         assert!(ahead_n < thrust_n, "{ahead_n}");
@@ -224,7 +225,7 @@ fn the_motor_is_known_half_a_second_into_its_burn() {
 }
 
 #[test]
-fn near_the_ground_it_is_good_enough_to_land_by() {
+fn near_the_ground_the_estimate_is_accurate_enough_for_landing() {
     let low: Vec<(&Truth, &Frame)> = FLOWN
         .iter()
         .flat_map(|(truth, frames)| frames.iter().map(move |frame| (truth, frame)))

@@ -1,7 +1,7 @@
-//! The telemetry log that other ground stations write and read: `.tlog`.
+//! Writes and reads `.tlog` files, the telemetry logs of other ground stations.
 //!
-//! Microseconds since the Unix epoch (eight bytes, big-endian), then the raw frame; again and again. MAVProxy's
-//! `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's `mavlogfile` read it.
+//! Each entry is the time in microseconds since the Unix epoch (eight bytes, big-endian), followed by the raw frame.
+//! MAVProxy's `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's `mavlogfile` read it.
 
 mod reader;
 mod writer;

@@ -1,27 +1,27 @@
-//! Frames out of a `.tlog`, also of a damaged one.
+//! Reads frames from a `.tlog` file, also from a damaged one.
 
 use std::io::{BufReader, Read};
 
 const TIME_BYTES: usize = 8;
-/// Start markers of MAVLink 2 and of its predecessor.
+/// The start markers of MAVLink 2 and MAVLink 1.
 const MAGIC_2: u8 = 0xfd;
 const MAGIC_1: u8 = 0xfe;
 const SIGNED: u8 = 0x01;
-/// Longest frame there is: 10 + 255 + 2 + 13.
+/// Length of the longest frame: 10 + 255 + 2 + 13.
 const FRAME_MAX_BYTES: usize = 280;
-/// Times outside the years 2000 to 2100 are no times.
+/// Times outside the years 2000 to 2100 are treated as garbage.
 const PLAUSIBLE_US: std::ops::Range<u64> = 946_684_800_000_000..4_102_444_800_000_000;
 
-/// A frame and when it was written down.
+/// A frame and the time at which it was logged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TlogFrame {
     /// Microseconds since the Unix epoch.
     pub time_us: u64,
-    /// One whole MAVLink 2 frame, as long as its head says; its checksum has not been looked at.
+    /// One whole MAVLink 2 frame, as long as its header says; its checksum has not been checked.
     pub bytes: Vec<u8>,
 }
 
-/// Frames and their times, with what lies between them counted; holds one frame at a time.
+/// Reads frames and their times, and counts the bytes between them. It keeps one frame in memory at a time.
 pub struct TlogReader<R> {
     input: BufReader<R>,
     buffer: Vec<u8>,
@@ -31,7 +31,7 @@ pub struct TlogReader<R> {
 }
 
 impl<R: Read> TlogReader<R> {
-    /// Reads from the beginning.
+    /// Starts reading at the beginning of `input`.
     pub fn new(input: R) -> Self {
         Self {
             input: BufReader::new(input),
@@ -42,22 +42,22 @@ impl<R: Read> TlogReader<R> {
         }
     }
 
-    /// Frames of MAVLink 1 so far; they are left out.
+    /// Returns how many MAVLink 1 frames were skipped so far.
     pub fn mavlink1(&self) -> u64 {
         self.mavlink1
     }
 
-    /// Bytes so far that belong to no frame.
+    /// Returns how many bytes so far belong to no frame.
     pub fn garbage_bytes(&self) -> u64 {
         self.garbage_bytes
     }
 
-    /// Bytes read from the input so far: how far the reading is.
+    /// Returns how many bytes have been read so far.
     pub fn bytes_read(&self) -> u64 {
         self.bytes_read
     }
 
-    /// The next frame of MAVLink 2.
+    /// Returns the next MAVLink 2 frame.
     ///
     /// # Errors
     /// The input cannot be read.
@@ -90,7 +90,7 @@ impl<R: Read> TlogReader<R> {
         }
     }
 
-    /// Reads until the buffer has room for the longest frame, or to the end.
+    /// Fills the buffer up to the length of the longest entry, or to the end of the input.
     fn fill(&mut self) -> std::io::Result<()> {
         let missing = (TIME_BYTES + FRAME_MAX_BYTES).saturating_sub(self.buffer.len());
         let read = self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)?;
@@ -99,7 +99,7 @@ impl<R: Read> TlogReader<R> {
     }
 }
 
-/// The length of the frame that bytes begin with, of MAVLink 1 or 2, as its own head says.
+/// Returns the length of the MAVLink 1 or 2 frame that these bytes begin with, as its header says.
 pub fn frame_length(frame: &[u8]) -> Option<usize> {
     let payload = usize::from(*frame.get(1)?);
     match *frame.first()? {

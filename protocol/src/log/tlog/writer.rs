@@ -1,22 +1,21 @@
-//! Frames into a `.tlog`.
+//! Writes frames into a `.tlog` file.
 
 use std::io::{self, Write};
 
 use crate::log::record::Record;
 
-/// Writes the frames that a ground station received and sent.
 pub struct TlogWriter<W: Write> {
     out: W,
     start_unix_ns: u64,
 }
 
 impl<W: Write> TlogWriter<W> {
-    /// An empty log; times of records count from the start.
+    /// Starts an empty log; the times of records count from `start_unix_ns`.
     pub fn new(out: W, start_unix_ns: u64) -> Self {
         Self { out, start_unix_ns }
     }
 
-    /// Writes the ground's own raw frames, both ways; every other record is not for this log.
+    /// Writes a raw frame that the ground received or sent; skips every other record.
     ///
     /// # Errors
     /// The underlying writer failed.
@@ -30,7 +29,7 @@ impl<W: Write> TlogWriter<W> {
         self.out.write_all(&frame.bytes)
     }
 
-    /// Hands everything to the system.
+    /// Writes everything to the operating system.
     ///
     /// # Errors
     /// The underlying writer failed.
@@ -44,7 +43,7 @@ mod tests {
     use super::*;
     use crate::log::record::{Direction, RawFrame};
 
-    /// The layout by hand: 1.000 002 s is 1,000,002 us, 0x0F4242.
+    /// The expected bytes are written by hand: 1.000 002 s is 1,000,002 us, 0x0F4242.
     #[test]
     fn val_tlog_is_a_big_endian_time_and_the_frame() -> io::Result<()> {
         let mut bytes = Vec::new();

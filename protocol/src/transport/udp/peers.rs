@@ -1,41 +1,41 @@
-//! Whom a UDP link answers, and what it says about everybody else.
+//! Decides which senders a UDP link answers, and reports all others.
 //!
-//! A datagram proves nothing: its sender is answered once a frame of it was believed. Time is an argument, counted from
-//! when the link was opened.
+//! A datagram proves nothing about its sender. A sender is answered once a frame of it was accepted. Time is an
+//! argument, counted from the opening of the link.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use super::waiting::Standing;
+use super::queue::Standing;
 
-/// Proven senders that are answered at the same time; each costs what the vehicle sends, 2,000 bytes a second. Without
-/// a key anybody's frame is valid, and a crowd of strangers must leave places for the true ground.
+/// This many proven senders are answered at the same time; each one costs the vehicle's whole telemetry, 2,000 bytes
+/// a second. Without a key anybody's frame is valid, so there must be more places than strangers usually take.
 const MAX_PROVEN: usize = 64;
-/// Where no place is left, a proven sender that has been silent for this long gives its own to a newcomer. One that
-/// speaks never does.
+/// When all places are taken, a newcomer displaces a proven sender that has been silent for this long. A sender that
+/// still sends is never displaced.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
-/// While nobody is proven one stranger is answered, so that a ground with the wrong key can see why it is refused. It
-/// keeps that place until it has been silent for this long.
+/// While no sender is proven, one stranger (the guest) is answered, so that a ground with the wrong key can see why
+/// it is refused. It keeps that place until it has been silent for this long.
 const GUEST_SILENT_AFTER: Duration = Duration::from_secs(5);
 
-/// Strangers are spoken of this often at most.
-const SAID_EVERY: Duration = Duration::from_secs(10);
-/// The first of them after this long, so that a newcomer whose first frame is still being judged is none.
-const FIRST_SAID_AFTER: Duration = Duration::from_secs(1);
-/// Peers that are named in [`SAID_EVERY`]; of more only the number is said.
+/// Strangers are reported at most this often.
+const REPORT_INTERVAL: Duration = Duration::from_secs(10);
+/// The first report waits this long, so that a newcomer whose first frame is still being checked is not reported.
+const FIRST_REPORT_DELAY: Duration = Duration::from_secs(1);
+/// This many new peers are named in [`REPORT_INTERVAL`]; of further ones only the number is reported.
 const MAX_NAMED: usize = 4;
-/// Strangers that are told apart; of more only the datagrams are counted.
-const MAX_COUNTED: usize = 1024;
+/// This many strangers are counted by sender; of further ones only the datagrams are counted.
+const MAX_COUNTED_SENDERS: usize = 1024;
 
 #[derive(Debug)]
 struct Proven {
     address: SocketAddr,
-    /// When a frame of it was last believed.
+    /// When a frame of this sender was last accepted.
     believed_at: Duration,
 }
 
-/// Senders that were not believed since they were last spoken of.
+/// Senders that were not accepted since the last report.
 #[derive(Debug, Default)]
 struct Strangers {
     datagrams: BTreeMap<SocketAddr, u64>,
@@ -43,24 +43,23 @@ struct Strangers {
     last: Option<SocketAddr>,
 }
 
-/// The senders that a link knows.
 #[derive(Debug)]
 pub(super) struct Peers {
-    /// The one that the link was opened to; there are no others then.
+    /// The only peer of a `udpout` link.
     fixed: Option<SocketAddr>,
     proven: Vec<Proven>,
     guest: Option<(SocketAddr, Duration)>,
     strangers: Strangers,
-    /// When the latest peers were named.
+    /// When the most recent peers were named.
     named_at: VecDeque<Duration>,
     unnamed: u64,
-    said_at: Option<Duration>,
-    say_at: Option<Duration>,
+    reported_at: Option<Duration>,
+    report_due_at: Option<Duration>,
 }
 
 impl Peers {
-    /// Whoever proves itself.
-    pub(super) fn anybody() -> Self {
+    /// A link that answers every proven sender.
+    pub(super) fn any() -> Self {
         Self {
             fixed: None,
             proven: Vec::new(),
@@ -68,29 +67,29 @@ impl Peers {
             strangers: Strangers::default(),
             named_at: VecDeque::new(),
             unnamed: 0,
-            said_at: None,
-            say_at: None,
+            reported_at: None,
+            report_due_at: None,
         }
     }
 
-    /// This one and nobody else.
+    /// A link that knows only this peer.
     pub(super) fn only(peer: SocketAddr) -> Self {
-        Self { fixed: Some(peer), ..Self::anybody() }
+        Self { fixed: Some(peer), ..Self::any() }
     }
 
-    /// Takes note of a datagram's sender; `None` if it is nobody to listen to.
+    /// Notes the sender of a datagram; returns `None` if its datagrams are to be dropped.
     pub(super) fn on_datagram(&mut self, from: SocketAddr, now: Duration) -> Option<Standing> {
         if self.fixed == Some(from) || self.proven.iter().any(|peer| peer.address == from) {
             return Some(Standing::Proven);
         }
         let strangers = &mut self.strangers;
-        if strangers.datagrams.len() < MAX_COUNTED || strangers.datagrams.contains_key(&from) {
+        if strangers.datagrams.len() < MAX_COUNTED_SENDERS || strangers.datagrams.contains_key(&from) {
             *strangers.datagrams.entry(from).or_default() += 1;
         } else {
             strangers.uncounted += 1;
         }
         strangers.last = Some(from);
-        self.will_say(now);
+        self.schedule_report(now);
         if self.fixed.is_some() {
             return None;
         }
@@ -104,8 +103,8 @@ impl Peers {
         Some(Standing::Unproven)
     }
 
-    /// Takes note that a frame of this sender was believed. Says whether it is answered from now on and was not before,
-    /// and if so, whether it is to be named.
+    /// Notes that a frame of this sender was accepted. Returns a value if the sender is answered from now on and was
+    /// not before; the value says whether it is to be named.
     pub(super) fn on_believed(&mut self, from: SocketAddr, now: Duration) -> Option<Newcomer> {
         if self.fixed.is_some() {
             return None;
@@ -123,35 +122,35 @@ impl Peers {
         self.proven.push(Proven { address: from, believed_at: now });
         self.guest = None;
         self.strangers.datagrams.remove(&from);
-        self.named_at.retain(|at| now.saturating_sub(*at) < SAID_EVERY);
+        self.named_at.retain(|at| now.saturating_sub(*at) < REPORT_INTERVAL);
         if self.named_at.len() < MAX_NAMED {
             self.named_at.push_back(now);
             return Some(Newcomer::Named);
         }
         self.unnamed += 1;
-        self.will_say(now);
+        self.schedule_report(now);
         Some(Newcomer::Unnamed)
     }
 
-    /// Whom to send to.
+    /// The addresses to send to.
     pub(super) fn answered(&self) -> impl Iterator<Item = SocketAddr> {
         let guest = self.guest.map(|(address, _)| address);
         self.fixed.into_iter().chain(self.proven.iter().map(|peer| peer.address)).chain(guest)
     }
 
-    fn will_say(&mut self, now: Duration) {
-        let soonest = self.said_at.map_or(Duration::ZERO, |at| at + SAID_EVERY);
-        self.say_at.get_or_insert((now + FIRST_SAID_AFTER).max(soonest));
+    fn schedule_report(&mut self, now: Duration) {
+        let soonest = self.reported_at.map_or(Duration::ZERO, |at| at + REPORT_INTERVAL);
+        self.report_due_at.get_or_insert((now + FIRST_REPORT_DELAY).max(soonest));
     }
 
-    /// When [`Peers::say`] has something to say, if ever.
-    pub(super) fn say_at(&self) -> Option<Duration> {
-        self.say_at
+    /// When [`Peers::report`] is due, if there is something to report.
+    pub(super) fn report_due_at(&self) -> Option<Duration> {
+        self.report_due_at
     }
 
-    /// One line about all those that are not answered, and about peers that were not named.
-    pub(super) fn say(&mut self, now: Duration) -> Option<String> {
-        self.say_at = None;
+    /// Returns one line about the senders that are not answered and the peers that were not named.
+    pub(super) fn report(&mut self, now: Duration) -> Option<String> {
+        self.report_due_at = None;
         let Strangers { datagrams, uncounted, last } = std::mem::take(&mut self.strangers);
         let further = std::mem::take(&mut self.unnamed);
         let count: u64 = datagrams.values().sum::<u64>() + uncounted;
@@ -168,17 +167,16 @@ impl Peers {
         if words.is_empty() {
             return None;
         }
-        self.said_at = Some(now);
+        self.reported_at = Some(now);
         Some(words.join("; "))
     }
 }
 
-/// A sender that was not answered before.
+/// A sender that is answered from now on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Newcomer {
-    /// To be named.
     Named,
-    /// One of too many to be named.
+    /// There were too many newcomers to name this one.
     Unnamed,
 }
 
@@ -199,26 +197,26 @@ mod tests {
     }
 
     #[test]
-    fn strangers_never_take_the_place_of_whom_is_believed() {
-        let mut peers = Peers::anybody();
+    fn strangers_never_displace_an_accepted_sender() {
+        let mut peers = Peers::any();
         assert_eq!(peers.on_datagram(at(1), s(0)), Some(Standing::Unproven));
         assert_eq!(peers.on_believed(at(1), s(0)), Some(Newcomer::Named));
         for second in 1..1_000 {
             for port in 100..140 {
                 assert_eq!(peers.on_datagram(at(port), s(second)), Some(Standing::Unproven));
             }
-            assert_eq!(answered(&peers), [at(1)], "also when it has been silent for long");
+            assert_eq!(answered(&peers), [at(1)], "it keeps its place although it is silent");
         }
     }
 
     #[test]
-    fn while_nobody_is_believed_one_stranger_is_answered() {
-        let mut peers = Peers::anybody();
+    fn while_no_sender_is_accepted_one_stranger_is_answered() {
+        let mut peers = Peers::any();
         for second in 0..20 {
             for port in 100..140 {
                 peers.on_datagram(at(port), s(second));
             }
-            assert_eq!(answered(&peers), [at(100)], "one that speaks keeps the place");
+            assert_eq!(answered(&peers), [at(100)], "a stranger that still sends keeps the place");
         }
         for second in 20..30 {
             peers.on_datagram(at(101), s(second));
@@ -230,18 +228,18 @@ mod tests {
 
     #[test]
     fn another_port_and_a_second_station_are_answered_beside_the_first() {
-        let mut peers = Peers::anybody();
+        let mut peers = Peers::any();
         for port in 1..=3 {
             assert!(peers.on_believed(at(port), s(0)).is_some());
-            assert!(peers.on_believed(at(port), s(1)).is_none(), "said once");
+            assert!(peers.on_believed(at(port), s(1)).is_none(), "it is named only once");
         }
         assert_eq!(answered(&peers), [at(1), at(2), at(3)]);
     }
 
-    /// Without a key every stranger's frame is valid.
+    /// Without a key every stranger's frame is accepted.
     #[test]
-    fn a_crowd_that_is_believed_takes_no_place_of_one_that_speaks() {
-        let mut peers = Peers::anybody();
+    fn many_accepted_senders_do_not_displace_one_that_still_sends() {
+        let mut peers = Peers::any();
         peers.on_believed(at(1), s(0));
         for second in 0..100 {
             for port in 1_000..2_000 {
@@ -251,27 +249,27 @@ mod tests {
             assert!(answered(&peers).contains(&at(1)));
             assert!(peers.proven.len() <= MAX_PROVEN);
         }
-        // Silent ones make room.
+        // Silent senders make room.
         assert_eq!(peers.on_believed(at(2), s(108)), None);
         assert!(peers.on_believed(at(2), s(109)).is_some());
     }
 
     #[test]
-    fn a_fixed_peer_is_the_only_one() {
+    fn a_fixed_peer_is_the_only_one_answered() {
         let mut peers = Peers::only(at(1));
         assert_eq!(peers.on_datagram(at(1), s(0)), Some(Standing::Proven));
         assert_eq!(peers.on_datagram(at(2), s(0)), None);
         assert_eq!(peers.on_believed(at(2), s(0)), None);
         assert_eq!(answered(&peers), [at(1)]);
         assert!(
-            peers.say(s(1)).unwrap().contains("1 unknown senders: 1 datagrams"),
-            "but others are counted"
+            peers.report(s(1)).unwrap().contains("1 unknown senders: 1 datagrams"),
+            "datagrams of others are counted"
         );
     }
 
     #[test]
-    fn many_strangers_are_one_line_in_ten_seconds() {
-        let mut peers = Peers::anybody();
+    fn many_strangers_are_reported_in_one_line_every_ten_seconds() {
+        let mut peers = Peers::any();
         let mut lines = Vec::new();
         let (mut named, mut believed) = (0, 0);
         for tenth in 0..600 {
@@ -279,11 +277,11 @@ mod tests {
             for port in 0..3_000 {
                 peers.on_datagram(at(1_000 + port), now);
             }
-            // And a believed sender on another port each time.
+            // In addition an accepted sender appears on a new port each time.
             believed += 1;
             named += u32::from(peers.on_believed(at(10_000 + tenth as u16), now) == Some(Newcomer::Named));
-            if peers.say_at().is_some_and(|due| now >= due) {
-                lines.extend(peers.say(now));
+            if peers.report_due_at().is_some_and(|due| now >= due) {
+                lines.extend(peers.report(now));
             }
         }
         assert!((5..=7).contains(&lines.len()), "{lines:?}");
@@ -295,11 +293,11 @@ mod tests {
     }
 
     #[test]
-    fn a_newcomer_that_is_believed_at_once_is_no_stranger() {
-        let mut peers = Peers::anybody();
+    fn a_newcomer_accepted_at_once_is_not_reported_as_a_stranger() {
+        let mut peers = Peers::any();
         peers.on_datagram(at(1), s(0));
         peers.on_believed(at(1), Duration::from_millis(20));
-        assert_eq!(peers.say_at(), Some(s(1)));
-        assert_eq!(peers.say(s(1)), None);
+        assert_eq!(peers.report_due_at(), Some(s(1)));
+        assert_eq!(peers.report(s(1)), None);
     }
 }

@@ -1,11 +1,11 @@
-//! The program: where it writes, what it says, how it exits.
+//! Tests the program: its output file, messages and exit codes.
 
 use std::path::Path;
 use std::process::Command;
 
 use crate::logs::{folder, write_log};
 
-/// Exit code and what was said.
+/// Exit code and output.
 fn run(arguments: &[&Path]) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_replay-rerun")).args(arguments).output().unwrap();
     assert!(output.stdout.is_empty());
@@ -23,7 +23,7 @@ fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
     std::fs::write(&rrd, "precious").unwrap();
     let (code, said) = run(&[&log]);
     assert_eq!(code, Some(2));
-    assert!(said.contains("flight.rrd: is there already; --force overwrites it"), "{said}");
+    assert!(said.contains("flight.rrd: already exists; --force overwrites it"), "{said}");
     assert_eq!(std::fs::read(&rrd).unwrap(), b"precious");
     assert_eq!(run(&[&log, Path::new("--force")]).0, Some(0));
     assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));

@@ -1,4 +1,4 @@
-//! What is in a recording.
+//! Tests the content of a recording.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! Files: damaged, foreign, missing, in the way, and full disks.
+//! Tests with files that are damaged, foreign, missing or already there, and with full disks.
 
 use replay::log::FlightLog;
 use replay_rerun::survey::Survey;
@@ -24,13 +24,13 @@ fn the_readable_part_of_a_cut_log_is_exported() {
 }
 
 #[test]
-fn nothing_is_overwritten_unasked() {
+fn nothing_is_overwritten_without_force() {
     let (_folder, log, rrd) = folder();
     write_log(&log, true);
     std::fs::write(&rrd, "precious").unwrap();
     let refused = export_file(&log, &rrd, Overwrite::Never).unwrap_err();
     assert!(matches!(refused, ExportError::Exists { .. }));
-    assert!(refused.to_string().contains("flight.rrd: is there already"), "{refused}");
+    assert!(refused.to_string().contains("flight.rrd: already exists"), "{refused}");
     assert_eq!(std::fs::read(&rrd).unwrap(), b"precious");
     let refused = export_file(&log, &log, Overwrite::Always).unwrap_err();
     assert!(matches!(refused, ExportError::IsTheLog { .. }));
@@ -39,7 +39,7 @@ fn nothing_is_overwritten_unasked() {
 }
 
 #[test]
-fn what_is_no_log_is_named_and_leaves_nothing_behind() {
+fn a_file_that_is_not_a_log_is_named_and_leaves_nothing_behind() {
     let (folder, log, rrd) = folder();
     std::fs::write(&log, "time,altitude\n0,15\n").unwrap();
     let error = export_file(&log, &rrd, Overwrite::Never).unwrap_err();
@@ -59,7 +59,7 @@ fn a_failing_output_is_an_error() {
     struct Full;
     impl std::io::Write for Full {
         fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            // Room for the stream's header only.
+            // There is room for the stream's header only.
             if bytes.len() <= 16 { Ok(bytes.len()) } else { Err(std::io::Error::other("no room")) }
         }
         fn flush(&mut self) -> std::io::Result<()> {

@@ -1,13 +1,11 @@
-//! Logs to export.
+//! Makes logs to export.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flight::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
-use flight::dynamics::PlanarModel;
-use flight::phase::Phase;
-use flight::profile::Profile;
-use flight::verdict::{LandingVerdict, TouchdownLimits};
+use flight::guidance::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
@@ -18,18 +16,18 @@ const PROFILE: &str = "paper-calibrated";
 pub(crate) const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
 pub(crate) const TICKS: u64 = 4;
 
-/// A log of the first ticks of a landing; the plant is the controller's own model, recorded at every 10 ms.
+/// A log of the first ticks of a landing; the plant is the controller's own model, recorded every 10 ms.
 pub(crate) fn write_log(path: &Path, with_truth: bool) {
-    let profile = Profile::builtin(PROFILE).unwrap();
+    let profile = vehicles::profile::builtin(PROFILE).unwrap();
     let config = ControllerConfig::from_profile(&profile);
-    let model = PlanarModel::from_profile(&profile);
+    let model = profile.planar_model();
     let mut controller = ControllerState::new(&config);
     let mut plant = profile.start.planar_state();
     let header = LogHeader {
         writer: "test".to_owned(),
         start_unix_ns: START_UNIX_NS,
         run: BTreeMap::from([("start_unix_ns".to_owned(), START_UNIX_NS.to_string())]),
-        profile_toml: Profile::builtin_toml(PROFILE).map(str::to_owned),
+        profile_toml: vehicles::profile::builtin_toml(PROFILE).map(str::to_owned),
         ..LogHeader::default()
     };
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
@@ -88,7 +86,7 @@ fn nanoseconds(time_s: f64) -> u64 {
     (time_s * 1e9).round() as u64
 }
 
-/// A folder of its own, a log in it and the recording of that.
+/// A new directory with a log and its recording.
 pub(crate) fn folder() -> (tempfile::TempDir, PathBuf, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let (log, rrd) = (folder.path().join("flight.mcap"), folder.path().join("flight.rrd"));
@@ -97,7 +95,7 @@ pub(crate) fn folder() -> (tempfile::TempDir, PathBuf, PathBuf) {
 
 /// A log of a flight from apogee: 2 s of an upright fall, a frame every 0.5 s.
 pub(crate) fn write_apogee_log(path: &Path) {
-    let (_, mission_toml) = flight::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
+    let (_, mission_toml) = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
     let header = LogHeader {
         writer: "test".to_owned(),
         start_unix_ns: START_UNIX_NS,
@@ -134,7 +132,7 @@ pub(crate) fn write_apogee_log(path: &Path) {
     log.finish().unwrap();
 }
 
-/// A log as a ground station writes it: what it knew, and when.
+/// A log as a ground station writes it.
 pub(crate) fn write_telemetry_log(path: &Path) {
     let header =
         LogHeader { writer: "test".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
@@ -143,7 +141,7 @@ pub(crate) fn write_telemetry_log(path: &Path) {
         let telemetry = v1::Telemetry {
             time_s: f64::from(second),
             phase: Some(u32::from(Phase::Powered.index())),
-            // The first second, nothing has been heard of the pose.
+            // No pose has been received in the first second.
             altitude_m: (second > 0).then_some(15.0),
             pitch_rad: Some(std::f64::consts::FRAC_PI_2),
             control_level: Some(u32::from(ControlLevel::Converged.index())),

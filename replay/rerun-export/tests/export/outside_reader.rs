@@ -1,4 +1,4 @@
-//! The recordings that the program writes, read by Rerun's own command.
+//! Tests that Rerun's own command accepts the recordings.
 
 use std::process::Command;
 

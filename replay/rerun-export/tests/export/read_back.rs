@@ -1,4 +1,4 @@
-//! Recordings, read back.
+//! Reads recordings back.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use re_sdk::external::re_log_encoding::Decoder;
 use re_sdk::log::{Chunk, LogMsg};
 
-/// A recording, read back.
+/// A recording that was read back.
 pub(crate) struct Recording {
     pub(crate) application: String,
     pub(crate) ids: BTreeSet<String>,

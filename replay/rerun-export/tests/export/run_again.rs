@@ -1,8 +1,9 @@
-//! What running the controller again adds: paths that are not in the log, and what is decided beside what was.
+//! Tests what running the controller again adds: paths that are not in the log, and decisions next to the recorded
+//! ones.
 
 use std::path::Path;
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use re_sdk::log::Chunk;
@@ -27,14 +28,14 @@ fn a_flight_from_apogee_has_its_planned_paths() {
     assert!(20 < paths && paths <= most + 2, "{paths} of {most}");
     assert_eq!(recording.rows(entity::PREDICTED_TOUCHDOWN), paths);
     assert!(recording.is_static(entity::FIRST_PLAN));
-    // All but the one that clears the last when the plan is flown out.
+    // All but the one that clears the last path when the plan is finished.
     let ticks = recording.times(entity::PREDICTED, entity::TIMELINE_TICK);
     assert!(ticks.iter().rev().skip(1).all(|tick| tick % 10 == 0), "{ticks:?}");
     assert!(recording.rows("plots/solve_time_ms/controller") == log.timings.len());
 }
 
 #[test]
-fn what_is_decided_again_stands_beside_what_was_recorded() {
+fn repeated_decisions_are_plotted_with_the_recorded_ones() {
     let recording = exported(&MK2.log, &MK2.beside("again.rrd"));
     let frames = MK2.recording().frames.len();
     for path in
@@ -54,9 +55,9 @@ fn what_is_decided_again_stands_beside_what_was_recorded() {
     assert_eq!(recording.of(entity::REPLAY).map(Chunk::num_rows).sum::<usize>(), 0);
 }
 
-/// A record that was not what the controller decided, and behind it frames that are lost.
+/// A record that differs from the controller's decision, followed by lost frames.
 #[test]
-fn where_it_differs_and_where_it_ends_is_in_the_text() {
+fn the_text_says_where_the_rerun_differs_and_ends() {
     let log = Log::open(&MK2.log).unwrap();
     let path = MK2.beside("forged.mcap");
     let header = LogHeader {
@@ -72,7 +73,7 @@ fn where_it_differs_and_where_it_ends_is_in_the_text() {
             tick.output.fins_rad[0] += 0.1;
         }
         if tick.input.frame == 30 {
-            // There already.
+            // The file already exists.
             tick.input.frame = 29;
         }
         let time_ns = (tick.input.time_s * 1e9).round() as u64;

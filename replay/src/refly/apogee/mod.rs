@@ -1,24 +1,24 @@
-//! A flight from apogee, flown again up to a moment with the recorded draw, and from there on with what is other.
+//! Flies a flight from apogee again: with the recorded draw up to the start, then with the changed settings.
 
 mod place;
 mod rerun;
 
 use std::collections::BTreeMap;
 
-use campaign::baseline::{Baseline, Controller};
-use campaign::dispersion::Dispersion;
-use campaign::draw::draw;
-use flight::phase::Phase;
-use onboard_sim::from_apogee;
+use flight::computer::FRAME_S;
+use flight::guidance::baseline::{Controller, Law as BurnLaw};
+use flight::rules::phase::Phase;
 use prost::Message as _;
 use protocol::log::flight_v1;
 use protocol::log::record::Record;
+use sim::dispersion::Dispersion;
+use sim::draw::draw;
 use tick_log::pilot::{state_to_log, tick_to_log};
+use tick_log::sortie;
 use world::Truth;
-use world::sensors::FRAME_S;
 
 use self::place::{find, phase_of, put_where_it_believes, recorded_frame};
-use self::rerun::{Recipe, Rerun};
+use self::rerun::{Recorded, Rerun};
 use super::start::{From, StartState};
 use super::{Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, refuse_timed, report};
 use crate::controller::{LoggedPilot, SETTINGS_IN_FLIGHT};
@@ -26,7 +26,7 @@ use crate::info::VerdictFacts;
 use crate::log::Recording;
 use crate::settings::{Setting, mission_with, truth_with};
 
-/// Number and time of what is kept of a flight.
+/// Number and time of a record that is kept.
 type Kept = Vec<(f64, Record)>;
 
 /// A recorded flight, flown again up to the moment of the start.
@@ -49,17 +49,17 @@ impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.recorded_frames()?;
-        let Recipe { dispersion, number, mut rerun } = Recipe::of(recording)?;
+        let Recorded { dispersion, number, mut rerun } = Recorded::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
-        while rerun.flight.frame() + 1 < first_frame && rerun.step()? {
+        while rerun.flight.frame() + 1 < first_frame && rerun.step() {
             let flight = &rerun.flight;
-            if let (Some(input), Some(piloted)) = (flight.input(), flight.piloted())
+            if let Some((input, piloted)) = rerun.piloted()
                 && let Some(then) = recorded_frame(&frames[..place], flight.frame())
             {
                 reached.frames += 1;
-                let now = tick_to_log(input, piloted, flight.pilot().digest());
+                let now = tick_to_log(input, piloted, flight.computer().flight_digest());
                 if now.encode_to_vec() == then.encode_to_vec() {
                     reached.identical += 1;
                 } else {
@@ -69,11 +69,12 @@ impl<'a> AtStart<'a> {
         }
         let recorded = match &recording.verdict {
             Some(verdict) => Some(VerdictFacts::of(verdict)),
-            // An older log of a whole flight: what it comes to as it was, if it is still the same flight.
+            // For an older log of a whole flight: its outcome without changes, if this build still flies the same
+            // flight.
             None if reached.first_different.is_none() && frames.last().is_some_and(is_down) => {
                 let mut as_it_was = rerun.clone();
-                while as_it_was.step()? {}
-                from_apogee::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+                while as_it_was.step() {}
+                sortie::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
             }
             None => None,
         };
@@ -108,17 +109,17 @@ impl<'a> AtStart<'a> {
         })
     }
 
-    /// What chance decided about the recorded flight.
+    /// The random draw of the recorded flight.
     pub(super) fn truth(&self) -> &Truth {
         &self.truth
     }
 
-    /// How far the recorded frames before the start were the same.
+    /// How many recorded frames before the start were reproduced.
     pub(super) fn reached(&self) -> Reached {
         self.reached
     }
 
-    /// Flies on; what happens is kept if there is a place for it.
+    /// Continues the flight to its end; keeps the frames if a place for them is given.
     pub(super) fn fly(
         &self,
         options: &ReflyOptions,
@@ -127,11 +128,11 @@ impl<'a> AtStart<'a> {
         let mut rerun = self.changed(options)?;
         let (mut ticks, mut commands_recorded, mut commands_identical) = (0, 0, 0);
         let mut gimbal_difference_max_rad = 0.0_f64;
-        let mut phase = rerun.flight.pilot().mode().phase;
+        let mut phase = rerun.flight.computer().mode().phase;
         loop {
-            let goes_on = rerun.step()?;
+            let goes_on = rerun.step();
             let flight = &rerun.flight;
-            if let (Some(_), Some(piloted)) = (flight.input(), flight.piloted()) {
+            if let Some((_, piloted)) = rerun.piloted() {
                 ticks += 1;
                 if let Some(then) = recorded_frame(self.frames, flight.frame()) {
                     let then = &then.output.gimbal_rad;
@@ -145,12 +146,12 @@ impl<'a> AtStart<'a> {
             if let Some(kept) = &mut kept {
                 keep(kept, &rerun, phase);
             }
-            phase = rerun.flight.pilot().mode().phase;
+            phase = rerun.flight.computer().mode().phase;
             if !goes_on {
                 break;
             }
         }
-        let verdict = from_apogee::verdict(&rerun.flight);
+        let verdict = sortie::verdict(&rerun.flight);
         let reflown = verdict.as_ref().map(VerdictFacts::of);
         let report = ReflyReport {
             reached: Some(self.reached),
@@ -164,39 +165,40 @@ impl<'a> AtStart<'a> {
         Ok((report, verdict))
     }
 
-    /// Flies on and keeps everything, from apogee on. What comes before the start is kept as it was flown again too: its
-    /// recorded frames may be of another build, or lost in part, and would not run on into these.
+    /// Continues the flight to its end and keeps everything from apogee on. The frames before the start are the
+    /// re-flown ones, too: recorded frames may come from another build or be partly lost, and the flight after the
+    /// start would not continue them.
     pub(super) fn fly_kept(
         &self,
         options: &ReflyOptions,
     ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-        let Recipe { mut rerun, .. } = Recipe::of(self.recording)?;
+        let Recorded { mut rerun, .. } = Recorded::of(self.recording)?;
         let believed = state_to_log(rerun.flight.believed_at_apogee());
         let start = flight_v1::PilotStart { believed, ..*self.pilot_start };
         let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
-        let mut phase = rerun.flight.pilot().mode().phase;
-        while rerun.flight.frame() + 1 < self.first_frame && rerun.step()? {
+        let mut phase = rerun.flight.computer().mode().phase;
+        while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {
             keep(&mut records, &rerun, phase);
-            phase = rerun.flight.pilot().mode().phase;
+            phase = rerun.flight.computer().mode().phase;
         }
         let (report, verdict) = self.fly(options, Some(&mut records))?;
         let run = self.run_facts(options)?;
         Ok((report, ReflownFlight { records, run, verdict, ..ReflownFlight::default() }))
     }
 
-    /// What a log of this flight says beside what the recorded one says.
+    /// Facts that the log of this flight has in addition to those of the recorded one.
     fn run_facts(&self, options: &ReflyOptions) -> Result<BTreeMap<String, String>, ReflyError> {
         let lines: Vec<String> = self.in_flight(options)?.iter().map(ToString::to_string).collect();
         Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
     }
 
-    /// The settings as timed ones: none holds before the start, half a frame before its first frame's end, since until
-    /// then the flight is the recorded one. With the height that another controller of the landing burn lights at, if one
-    /// is asked for.
+    /// The settings as timed ones. None applies before the start (half a frame before the end of its first frame),
+    /// because until then the flight is the recorded one. If another controller of the landing burn is requested, its
+    /// ignition height is included.
     fn in_flight(&self, options: &ReflyOptions) -> Result<Vec<Setting>, ReflyError> {
         let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
         let mut in_flight = options.settings.clone();
-        // Of two that begin to hold at the start the later one wins, as it would have on its way there.
+        // Of two settings that take effect at the start, the later one wins, as it would have in flight.
         in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
         for setting in &mut in_flight {
             setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
@@ -204,10 +206,11 @@ impl<'a> AtStart<'a> {
         if let Some(controller) = self.other_controller(options)? {
             let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
             let fixed_m = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
-            if let (Some(baseline), None) = (Baseline::new(controller, &mission)?, fixed_m) {
+            let height_m = BurnLaw::of(controller, &mission).ignition_height_m();
+            if let (Some(height_m), None) = (height_m, fixed_m) {
                 in_flight.push(Setting {
                     path: "ignition.fixed_height_m".to_owned(),
-                    value: toml::Value::Float(baseline.ignition_height_m()),
+                    value: toml::Value::Float(height_m),
                     at_s: Some(start_s),
                 });
             }
@@ -215,7 +218,7 @@ impl<'a> AtStart<'a> {
         Ok(in_flight)
     }
 
-    /// Who is to fly the landing burn instead of who did.
+    /// The requested controller of the landing burn, if it differs from the recorded one.
     fn other_controller(&self, options: &ReflyOptions) -> Result<Option<Controller>, ReflyError> {
         match options.law {
             Law::AsRecorded => Ok(None),
@@ -231,7 +234,7 @@ impl<'a> AtStart<'a> {
         }
     }
 
-    /// The flight at the start, with what is other from there on.
+    /// The flight at the start, with the changes that apply from there.
     fn changed(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
         refuse_timed(&options.plant_settings)?;
         let toml = self.recording.profile_toml()?;
@@ -245,7 +248,7 @@ impl<'a> AtStart<'a> {
         let in_flight = self.in_flight(options)?;
         rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
 
-        // Of the world: the airframe by every lasting setting, chance by its own.
+        // The world gets its airframe from all settings without a time, and its draw from the settings of the draw.
         let lasting = lasting(options);
         let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
             options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
@@ -253,26 +256,26 @@ impl<'a> AtStart<'a> {
         let true_mission = mission_with(toml, &all)?;
         if let Some(controller) = self.other_controller(options)? {
             let believed = mission_with(toml, &lasting)?;
-            rerun.flight = rerun.flight.with_baseline(Baseline::new(controller, &believed)?);
+            rerun.flight.set_law(BurnLaw::of(controller, &believed));
         }
         let other_draw =
             options.seed.map(|seed| draw(&true_mission, &self.dispersion, seed, self.number).truth);
         let truth = truth_with(&other_draw.unwrap_or(self.truth), &of_truth)?;
         let world = rerun.flight.world();
         if truth != *world.truth() || true_mission.airframe != *world.airframe() {
-            let changed = world.changed(&true_mission.airframe, &true_mission.motor()?, &truth)?;
+            let changed = world.changed(&true_mission.airframe, &true_mission.motor_curve, &truth)?;
             *rerun.flight.world_mut() = changed;
         }
         Ok(rerun)
     }
 }
 
-/// The plant has an airframe and what chance decided, the controller everything but the latter.
+/// The plant takes settings of the airframe and of the draw; the controller takes all but those of the draw.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
     let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
     if let Some(setting) = options.settings.iter().find(of_truth) {
-        let belongs = "what chance decided is the plant's alone (--plant, --vary-plant, --of-plant)";
+        let belongs = "the random draw belongs to the plant alone (--plant, --vary-plant, --of-plant)";
         return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
     }
     if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {
@@ -283,10 +286,10 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     Ok(())
 }
 
-/// Keeps the frame just flown; `phase` is that before it.
+/// Keeps the frame just flown; `phase` is the phase before it.
 fn keep(kept: &mut Kept, rerun: &Rerun, phase: Phase) {
     let time_s = rerun.flight.frame() as f64 * FRAME_S;
-    kept.extend(from_apogee::frame(&rerun.flight, phase).into_iter().map(|record| (time_s, record)));
+    kept.extend(sortie::frame_and_phase(&rerun.flight, phase).into_iter().map(|record| (time_s, record)));
 }
 
 /// The settings without a time.

@@ -1,6 +1,6 @@
-//! The frame to start with.
+//! Finds the frame to start with.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 use protocol::log::flight_v1;
 
 use super::rerun::Rerun;
@@ -12,8 +12,8 @@ pub(super) fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
     u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
 }
 
-/// The place of the frame to start with. Of a phase it is the frame behind the one that entered it: what is other can
-/// change nothing before.
+/// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
+/// cannot act earlier.
 pub(super) fn find(
     recording: &Recording,
     frames: &[flight_v1::PilotTick],
@@ -53,7 +53,7 @@ pub(super) fn find(
     })
 }
 
-/// Puts the vehicle where its flight computer believed to be when the frame before the start was over.
+/// Puts the vehicle where its flight computer believed it was at the end of the frame before the start.
 pub(super) fn put_where_it_believes(
     recording: &Recording,
     rerun: &mut Rerun,
@@ -66,7 +66,9 @@ pub(super) fn put_where_it_believes(
     };
     let world = rerun.flight.world();
     if world.touchdown().is_some() {
-        return Err(refused("it is on the ground already; --from estimate puts what flies elsewhere"));
+        return Err(refused(
+            "it is already on the ground; --from estimate can place only a vehicle in flight",
+        ));
     }
     let placed = world.placed(&estimate.state)?;
     *rerun.flight.world_mut() = placed;

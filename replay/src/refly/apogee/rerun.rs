@@ -1,41 +1,40 @@
-//! A recorded flight about to be flown again, by what its log says of how it was flown.
+//! Sets up a recorded flight to be flown again, from the facts in its log.
 
-use campaign::baseline::Baseline;
-use campaign::dispersion::Dispersion;
-use campaign::draw::draw;
-use campaign::fault::{Breakage, FaultError, Injector, TimedFault};
-use campaign::fly::Flight;
-use flight::mission::Mission;
-use onboard_sim::from_apogee;
-use world::sensors::FRAME_S;
+use flight::computer::FRAME_S;
+use flight::computer::pilot::{PilotInput, PilotOutput};
+use flight::vehicle::mission::Mission;
+use sim::dispersion::Dispersion;
+use sim::fault::{Breakage, FaultError, TimedFault};
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use tick_log::sortie as sortie_log;
 
 use crate::controller::LoggedPilot;
 use crate::log::Recording;
 use crate::refly::ReflyError;
 use crate::settings::Schedule;
 
-/// A flight on its way, with what still breaks and changes in it.
+/// A flight in progress, with its faults and timed changes still to come.
 #[derive(Debug, Clone)]
 pub(super) struct Rerun {
-    pub(super) flight: Flight,
-    injector: Injector,
+    pub(super) flight: Sortie,
     pub(super) schedule: Option<Schedule<Mission>>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
 }
 
-/// What a flight was drawn from, and the flight at apogee.
-pub(super) struct Recipe {
+/// The recipe of a flight, and the flight at apogee.
+pub(super) struct Recorded {
     pub(super) dispersion: Dispersion,
     pub(super) number: u64,
     pub(super) rerun: Rerun,
 }
 
-impl Recipe {
+impl Recorded {
     /// The recipe of a recorded flight.
     ///
     /// # Errors
-    /// The log does not say all of it, or this build does not know it.
+    /// The log lacks a part of it, or this build does not know it.
     pub(super) fn of(recording: &Recording) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
@@ -48,40 +47,53 @@ impl Recipe {
             number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
         };
         let (seed, number) = (number_of("seed")?, number_of("flight")?);
-        let dispersion = from_apogee::dispersion_of(run, recording.head.scenario_toml.as_deref())
+        let dispersion = sortie_log::dispersion_of(run, recording.head.scenario_toml.as_deref())
             .map_err(|error| lacking(error.to_string()))?;
         let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
-        let controller = from_apogee::controller_of(run).ok_or_else(unknown)?;
+        let controller = sortie_log::controller_of(run).ok_or_else(unknown)?;
         let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
         let faults: Vec<TimedFault> = faults
             .map(str::parse)
             .collect::<Result<_, _>>()
             .map_err(|error: FaultError| lacking(error.to_string()))?;
         let mission = LoggedPilot::schedule(recording.profile_toml()?, pilot_start, &[])?.base().clone();
-        let drawn = draw(&mission, &dispersion, seed, number);
-        let flight =
-            Flight::new(&mission, &dispersion, &drawn)?.with_baseline(Baseline::new(controller, &mission)?);
-        // An abort that no fault asked for was the crew's.
-        let by_fault = faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
+        let recipe = Recipe {
+            mission,
+            mission_toml: recording.profile_toml()?.to_owned(),
+            dispersion,
+            dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),
+            dispersion_toml: recording.head.scenario_toml.clone().unwrap_or_default(),
+            seed,
+            controller,
+            faults,
+        };
+        let flight = Sortie::new(&recipe, number)?;
+        // An abort that no fault caused came from the crew.
+        let by_fault = recipe.faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);
         let aborts = crews.map(|tick| tick.input.frame).collect();
-        let rerun = Rerun { flight, injector: Injector::new(&faults, seed, number), schedule: None, aborts };
+        let rerun = Rerun { flight, schedule: None, aborts };
         Ok(Self { dispersion, number, rerun })
     }
 }
 
 impl Rerun {
-    /// `false` when there is no more to fly.
-    pub(super) fn step(&mut self) -> Result<bool, ReflyError> {
+    /// Flies one frame; `false` when the flight is over.
+    pub(super) fn step(&mut self) -> bool {
         let time_s = (self.flight.frame() + 1) as f64 * FRAME_S;
-        // As the flight computer of a log is changed: before the frame in whose time the change falls.
+        // The change is made before the frame in whose time it falls, as in a recorded flight.
         if let Some(mission) = self.schedule.as_mut().and_then(|schedule| schedule.due(time_s)) {
-            self.flight.reconfigure(mission)?;
+            self.flight.reconfigure(mission);
         }
-        self.injector.step(&mut self.flight);
         if self.aborts.binary_search(&(self.flight.frame() + 1)).is_ok() {
             self.flight.abort();
         }
-        Ok(self.flight.step())
+        self.flight.step();
+        self.flight.goes_on()
+    }
+
+    /// Input and output of the last frame; `None` while the computer is dead.
+    pub(super) fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
+        self.flight.computer().piloted().filter(|_| !self.flight.computer_is_dead())
     }
 }

@@ -1,12 +1,12 @@
 //! What the controller believed, against the simulated plant.
 
 use super::{COMPONENTS, rms_and_max};
-use crate::report::page::{paragraph, table};
+use crate::report::html::{paragraph, table};
 use crate::report::track::{Flight, Teller, phase_of, state_of};
 
 pub(super) fn html(flight: &Flight) -> String {
     if flight.teller != Teller::Plant || flight.recording.ticks.is_empty() {
-        return paragraph("The log has no truth to hold the estimate against.");
+        return paragraph("The log has no truth to compare the estimate with.");
     }
     let errors: Vec<[f64; 6]> = flight
         .recording
@@ -38,11 +38,11 @@ pub(super) fn html(flight: &Flight) -> String {
     html + &paragraph(&format!("At {} {ticks}.", errors.len()))
 }
 
-/// The plant at the very time of a tick; in between nothing is made up.
+/// The plant at the exact time of a tick; nothing is interpolated.
 fn nearby(flight: &Flight, time_s: f64) -> Option<[f64; 6]> {
     const SAME_S: f64 = 1e-4;
     let found = flight.recording.truth.iter().find(|truth| (truth.time_s - time_s).abs() < SAME_S)?;
-    // The rig's record at the instant of the release is of the moment before it.
+    // The rig's record at the instant of the release shows the moment before it.
     phase_of(found.phase).filter(|phase| !phase.on_pad())?;
     Some(state_of(&found.state))
 }

@@ -1,9 +1,9 @@
-//! How the radio fared.
+//! How well the radio worked.
 
 use super::rms_and_max;
 use crate::info::Info;
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, escaped, paragraph, table};
+use crate::report::html::{charts, escaped, paragraph, table};
 use crate::report::track::Flight;
 
 pub(super) fn html(flight: &Flight, info: &Info) -> String {
@@ -28,10 +28,7 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
     }
     let mut html = String::new();
     if !frames.is_empty() {
-        html.push_str(&table(
-            &["frames", "written down by", "link", "#count", "#missing in the log"],
-            &frames,
-        ));
+        html.push_str(&table(&["frames", "recorded by", "link", "#count", "#missing in the log"], &frames));
     }
     if heard.is_empty() {
         return html

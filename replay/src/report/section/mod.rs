@@ -50,7 +50,7 @@ fn rms_and_max(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     (count > 0).then(|| (libm::sqrt(squares / f64::from(count)), largest))
 }
 
-/// A column of the six state components: name, unit, and what their numbers are multiplied with to be in it.
+/// A column of the six state components: name, unit, and the factor to that unit.
 const COMPONENTS: [(&str, &str, f64); 6] = [
     ("x", "m", 1.0),
     ("altitude", "m", 1.0),

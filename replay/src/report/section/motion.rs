@@ -1,16 +1,16 @@
-//! The landing as the paper draws it (its Figs. 6 to 9): path in the pitch plane, states, input.
+//! The landing, drawn as in the paper (Figs. 6 to 9): path in the pitch plane, states, input.
 
 use super::{COMPONENTS, DEGREES};
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, paragraph};
+use crate::report::html::{charts, paragraph};
 use crate::report::track::{Flight, GimbalAxis, Teller};
 
 pub(super) fn html(flight: &Flight) -> String {
     let who = match flight.teller {
         Teller::Plant => "From the simulated plant.",
         Teller::Estimate => "From the controller's state estimate; the log has no plant.",
-        Teller::Telemetry => "From what a ground station heard; the log has neither plant nor ticks.",
-        Teller::Nobody => return paragraph("The log does not tell where the vehicle was."),
+        Teller::Telemetry => "From the telemetry of a ground station; the log has neither plant nor ticks.",
+        Teller::Nobody => return paragraph("The log has no positions of the vehicle."),
     };
     let mut pictures = vec![path(flight)];
     pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));

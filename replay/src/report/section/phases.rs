@@ -1,14 +1,14 @@
-//! When the vehicle was in which phase, and the moments that count.
+//! The phases and the important moments of the flight.
 
-use flight::phase::Phase;
+use flight::rules::phase::Phase;
 
 use crate::info::{Info, PhaseSpan};
-use crate::report::page::{escaped, paragraph, put, table};
+use crate::report::html::{escaped, paragraph, put, table};
 use crate::report::track::{Flight, phase_of};
 
 pub(super) fn html(flight: &Flight, info: &Info) -> String {
     let Some(timeline) = info.phases.first() else {
-        return paragraph("The log tells no phase.");
+        return paragraph("The log has no phases.");
     };
     let mut html = strip(flight, &timeline.spans);
     html.push_str(&times(flight, &timeline.spans));
@@ -51,7 +51,7 @@ fn strip(flight: &Flight, spans: &[PhaseSpan]) -> String {
                 (right - left).max(1.5)
             ),
         );
-        // Words of neighbours that are too short for them stand on other lines.
+        // Labels of short neighbouring phases are put on different lines.
         let y = [14.0, 54.0, 70.0][place % 3];
         let anchor = if left > 0.85 * WIDTH { "end" } else { "start" };
         put(
@@ -67,7 +67,7 @@ fn strip(flight: &Flight, spans: &[PhaseSpan]) -> String {
     svg + &format!("<p class=\"muted\">Times in {}.</p>\n", flight.axis_name())
 }
 
-/// The same in numbers, for narrow screens and for reading aloud.
+/// The same in numbers, for narrow screens and screen readers.
 fn times(flight: &Flight, spans: &[PhaseSpan]) -> String {
     let seconds = |time_s: f64| format!("{:.2} s", rounded(time_s));
     let rows: Vec<Vec<String>> = spans
@@ -81,12 +81,12 @@ fn times(flight: &Flight, spans: &[PhaseSpan]) -> String {
     table(&["phase", "#from", "#for"], &rows)
 }
 
-/// To hundredths, without a negative nought.
+/// To hundredths, without a negative zero.
 fn rounded(time_s: f64) -> f64 {
     (100.0 * time_s).round() / 100.0 + 0.0
 }
 
-/// What is asked first after a flight.
+/// The key figures of the flight.
 fn moments(flight: &Flight) -> Vec<(&'static str, Option<f64>)> {
     let lit_s = thrust_above_half_s(flight);
     let delay_s = lit_s.zip(flight.ignition_s).map(|(lit_s, command_s)| lit_s - command_s);

@@ -1,12 +1,12 @@
-//! Where each tick thought that the vehicle would touch down, against where it did.
+//! The touchdown predicted at each tick, against the actual one.
 
-use flight::controller::ControlLevel;
-use flight::phase::Phase;
+use flight::guidance::controller::ControlLevel;
+use flight::rules::phase::Phase;
 use protocol::log::v1::ControllerTick;
 
 use super::COMPONENTS;
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, paragraph};
+use crate::report::html::{charts, paragraph};
 use crate::report::track::{Flight, phase_of, state_of};
 
 pub(super) fn html(flight: &Flight) -> String {

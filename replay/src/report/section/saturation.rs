@@ -1,11 +1,11 @@
-//! How long gimbal and fins were at their stops, or slewed as fast as they can.
+//! How long gimbal and fins were at their stops or at their maximum slew rate.
 
 use protocol::log::v1::PlantTruth;
 
-use crate::report::page::{paragraph, table};
+use crate::report::html::{paragraph, table};
 use crate::report::track::{Flight, phase_of};
 
-/// Closer to a stop, or to the fastest slew, than this fraction counts as there.
+/// A value within this fraction of a stop or of the maximum slew rate counts as saturated.
 const AT_LIMIT: f64 = 0.995;
 
 pub(super) fn html(flight: &Flight) -> String {
@@ -39,7 +39,7 @@ pub(super) fn html(flight: &Flight) -> String {
             axis.actual.iter().copied().filter(|(time_s, _)| in_air(*time_s)).collect();
         let time = |holds: &dyn Fn(f64, f64, f64) -> bool| -> f64 {
             let pairs = angles.windows(2).map(|pair| (pair[0].1, pair[1].1, pair[1].0 - pair[0].0));
-            // From a positive nought: the sum of nothing is a negative one.
+            // Start from positive zero, because an empty sum is negative zero.
             pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).fold(0.0, |sum, (_, _, dt_s)| sum + dt_s)
         };
         rows.push((

@@ -1,11 +1,11 @@
-//! How long the ticks took and how their solves went.
+//! How long the ticks took, and the results of their solves.
 
-use flight::controller::ControlLevel;
+use flight::guidance::controller::ControlLevel;
 use protocol::log::v1;
 
 use crate::info::{Info, SolveTimes};
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, paragraph, table};
+use crate::report::html::{charts, paragraph, table};
 use crate::report::track::Flight;
 
 pub(super) fn html(flight: &Flight, info: &Info) -> String {
@@ -40,7 +40,7 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
         ])
 }
 
-/// How long it took, as rows of a table; `what` took it.
+/// Durations as rows of a table; `what` names the operation.
 fn time_rows(times: &SolveTimes, what: &str) -> [Vec<String>; 5] {
     let milliseconds = |s: f64| format!("{:.3} ms", 1e3 * s);
     [
@@ -93,6 +93,6 @@ fn plans(flight: &Flight, info: &Info) -> String {
     let timings = flight.recording.timings.iter();
     let points = timings.map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s)).collect();
     pictures
-        .push(chart("Time that each frame with a plan took, ms", points, vec![1e3 * times.deadline_s]).svg());
+        .push(chart("Duration of each frame with a plan, ms", points, vec![1e3 * times.deadline_s]).svg());
     table(&["", "#"], &rows) + &charts(&pictures)
 }

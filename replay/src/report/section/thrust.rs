@@ -1,8 +1,8 @@
-//! The motor as the profile has it, as the controller weighed it, and as it was.
+//! The motor in the profile, as estimated by the controller, and the true one.
 
 use super::rms_and_max;
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, paragraph, table};
+use crate::report::html::{charts, paragraph, table};
 use crate::report::track::{Flight, FromApogee};
 
 pub(super) fn html(flight: &Flight) -> String {
@@ -16,7 +16,7 @@ pub(super) fn html(flight: &Flight) -> String {
         flight.inferred_n.iter().filter(|(time_s, _)| shown(*time_s)).copied().collect();
     let truth: Vec<_> = flight.recording.truth.iter().filter(|truth| flight.is_shown(truth.time_s)).collect();
     let actual: Vec<(f64, f64)> = truth.iter().map(|truth| (axis(truth.time_s), truth.thrust_n)).collect();
-    // Where the flight computer had an opinion, else wherever the truth is known.
+    // The times of the flight computer's estimates, else those of the truth.
     let times: Vec<f64> = if inferred.is_empty() || flight.from_apogee.is_some() {
         truth.iter().map(|truth| truth.time_s).filter(|time_s| shown(*time_s)).collect()
     } else {

@@ -1,21 +1,21 @@
-//! How far the vehicle came from where the plan wanted it.
+//! How far the vehicle was from its planned path.
 
 use std::collections::BTreeMap;
 
 use super::{COMPONENTS, rms_and_max};
 use crate::report::chart::{Chart, Line};
-use crate::report::page::{charts, paragraph, table};
+use crate::report::html::{charts, paragraph, table};
 use crate::report::track::{AHEAD_S, Flight};
 
 pub(super) fn html(flight: &Flight) -> String {
-    // By phase, in the order flown: phase index, then what came less what was planned, for each distance ahead.
+    // By phase, in the order flown: phase index, then actual minus planned state for each prediction time.
     let mut errors: BTreeMap<u8, [Vec<[f64; 6]>; 2]> = BTreeMap::new();
     let mut names = BTreeMap::new();
     let mut distance: [Vec<(f64, f64)>; 2] = Default::default();
     for plan in &flight.plans {
         for (k, (ahead_s, planned)) in AHEAD_S.iter().zip(plan.ahead).enumerate() {
             let then_s = plan.time_s + ahead_s;
-            // Behind the contact the ground decides.
+            // After contact the ground determines the motion.
             let in_air = flight.touchdown_s.is_none_or(|touchdown_s| then_s <= touchdown_s);
             let (Some(planned), Some(came)) = (planned, flight.state_at(then_s).filter(|_| in_air)) else {
                 continue;
@@ -56,7 +56,7 @@ pub(super) fn html(flight: &Flight) -> String {
     all.extend(heads.iter().map(String::as_str));
     let [near, far] = distance;
     let chart = Chart {
-        title: "Distance between where a plan put the vehicle and where it was, m".to_owned(),
+        title: "Distance between the planned and the actual position, m".to_owned(),
         x_label: flight.axis_name(),
         lines: vec![
             Line { name: "0.5 s ahead", class: "b", points: far },
@@ -66,7 +66,7 @@ pub(super) fn html(flight: &Flight) -> String {
         full: true,
         ..Chart::default()
     };
-    paragraph("What came less what each tick's plan had said, root mean square / largest.")
+    paragraph("Actual state minus the state planned at each tick, root mean square / largest.")
         + &table(&all, &rows)
         + &charts(&[chart.svg()])
 }

@@ -1,13 +1,15 @@
 //! The verdict, each value against its limit.
 
 use crate::info::{Info, VerdictLimit};
-use crate::report::page::{escaped, paragraph, table};
+use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
 pub(super) fn html(_: &Flight, info: &Info) -> String {
     let Some(verdict) = &info.verdict else {
         return "<p class=\"verdict\">No verdict in this log</p>\n".to_owned()
-            + &paragraph("The vehicle did not touch down while it was recorded, or nobody judged it.");
+            + &paragraph(
+                "The vehicle did not touch down while it was recorded, or its verdict was not recorded.",
+            );
     };
     let broken: Vec<&str> =
         verdict.limits.iter().filter(|limit| !limit.passed).map(|limit| limit.name.as_str()).collect();
@@ -35,7 +37,7 @@ pub(super) fn html(_: &Flight, info: &Info) -> String {
         + &table(&["touchdown", "#value", "unit", "limit", "", "share of the limit"], &rows)
 }
 
-/// Where the value lies in its range, the range being the grey strip; a value outside stands at its end.
+/// Where the value lies in its range, the grey strip; a value outside is drawn at the end of the strip.
 fn bar(limit: &VerdictLimit) -> String {
     const WIDTH: f64 = 160.0;
     let share = (limit.value - limit.minimum) / (limit.maximum - limit.minimum);

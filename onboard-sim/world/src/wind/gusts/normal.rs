@@ -18,7 +18,7 @@ impl Normals {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
-        // 53 bits each; the first never nil, because of its logarithm.
+        // 53 bits each; the first is never zero, because its logarithm is taken.
         let unit = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;
         let radius = (-2.0 * libm::log(1.0 - unit(self.random.next_u64()))).sqrt();
         let (sin, cos) = libm::sincos(core::f64::consts::TAU * unit(self.random.next_u64()));

@@ -17,8 +17,8 @@ fn val_mil_f_8785c_scales_at_200_ft() {
     assert_eq!(GustScales::at(900.0, 15.0), GustScales::at(304.8, 15.0));
 }
 
-/// Variances, and the correlation a quarter and a whole length apart, over many samples of a step that is long for a
-/// simulation: exact discretisation does not mind.
+/// Variances, and the correlation a quarter and a whole length apart, over many samples. The step is longer than in a
+/// simulation, which exact discretisation allows.
 #[test]
 fn val_mil_f_8785c_variance_and_correlation() {
     let height_m = 60.0;
@@ -48,7 +48,7 @@ fn val_mil_f_8785c_variance_and_correlation() {
     }
 }
 
-/// Many short steps are worth one long one: the same decay, and the same variance at the end.
+/// Many short steps equal one long step: the same decay, and the same variance at the end.
 #[test]
 fn standing_air_keeps_its_gust() {
     let mut gusts = Gusts::new(10.0, 3);
@@ -59,7 +59,7 @@ fn standing_air_keeps_its_gust() {
 }
 
 #[test]
-fn a_seed_says_it_all() {
+fn the_same_seed_gives_the_same_gusts() {
     let flight = |seed| {
         let mut gusts = Gusts::new(8.0, seed);
         (0..1000).map(|_| gusts.step(30.0, 0.04)).collect::<Vec<_>>()

@@ -1,4 +1,4 @@
-//! What holds for every flight: finite numbers, the same bits, mirror symmetry, faults, refusals.
+//! Properties of every flight: finite numbers, the same bits, mirror symmetry, faults, refusals.
 
 use proptest::prelude::*;
 
@@ -29,8 +29,8 @@ fn windy() -> Truth {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// Whatever is commanded, in the air, under thrust, under the parachute or on the ground: finite numbers, a unit
-    /// attitude, actuators between their stops.
+    /// For any commands, in the air, under thrust, under the parachute and on the ground: the numbers are finite, the
+    /// attitude is a unit quaternion, and the actuators are between their stops.
     #[test]
     fn any_commands_give_finite_numbers(
         commands in proptest::collection::vec(actuators(), 1..40),
@@ -54,7 +54,7 @@ proptest! {
         }
     }
 
-    /// A vehicle rolled by half a turn, with the commands that belong to it, flies the same way in the world.
+    /// A vehicle rolled by half a turn, with its commands rolled as well, flies the same path in the world.
     #[test]
     fn half_a_roll_mirrors(
         gimbal_rad in proptest::array::uniform2(-0.1..0.1_f64),
@@ -71,7 +71,7 @@ proptest! {
         rolled.world_from_body *= half_roll;
         rolled.rate_rad_s = half_roll * initial.rate_rad_s;
         let command = Actuators { gimbal_rad, fins_rad, ignite: true, parachute: false };
-        // Half a roll takes fin 1 to the place of fin 3, and turns both gimbal axes round.
+        // Half a roll moves fin 1 to the place of fin 3, and reverses both gimbal axes.
         let [one, two, three, four] = fins_rad;
         let rolled_command = Actuators {
             gimbal_rad: gimbal_rad.map(|angle| -angle),
@@ -90,7 +90,7 @@ proptest! {
 #[test]
 fn the_same_arguments_give_the_same_bits() {
     let fly = |seed: u64| {
-        let airframe = Airframe::builtin("mk2").unwrap();
+        let airframe = vehicles::airframe::builtin("mk2").unwrap();
         let motor = motors::builtin(&airframe.motor).unwrap();
         let mut world = World::new(&airframe, &motor, &windy(), &leaning(150.0, 0.05, 0.02), seed).unwrap();
         world.advance(&OPEN, 2000);
@@ -102,7 +102,7 @@ fn the_same_arguments_give_the_same_bits() {
 }
 
 #[test]
-fn actuators_that_break_stay_or_slow_down() {
+fn faults_make_actuators_stuck_or_slow() {
     let mut world = world("mk2", &Truth::default(), &RigidState::upright(900.0));
     let command = Actuators { gimbal_rad: [0.08, -0.08], ..OPEN };
     world.inject(&Fault::FinStuck { fin: 2 });
@@ -117,7 +117,7 @@ fn actuators_that_break_stay_or_slow_down() {
 }
 
 #[test]
-fn a_slow_gimbal_is_slow() {
+fn a_slow_gimbal_turns_at_its_reduced_rate() {
     let turned_rad = |fault: Option<Fault>| {
         let mut world = world("mk2", &Truth::default(), &RigidState::upright(900.0));
         if let Some(fault) = fault {
@@ -131,8 +131,8 @@ fn a_slow_gimbal_is_slow() {
 }
 
 #[test]
-fn data_that_make_no_world_are_refused() {
-    let airframe = Airframe::builtin("mk2").unwrap();
+fn data_out_of_range_are_refused() {
+    let airframe = vehicles::airframe::builtin("mk2").unwrap();
     let motor = motors::builtin("H45W").unwrap();
     let start = RigidState::upright(100.0);
     let refuse = |truth: &Truth, start: &RigidState| {

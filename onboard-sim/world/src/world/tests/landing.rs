@@ -3,9 +3,9 @@
 use super::*;
 use crate::ground::RestOutcome;
 
-/// Feet at a height, with velocity (x, z), m/s, a lean, rad, and a rate about body y, rad/s.
+/// A world with the feet at a height, m, a velocity (x, z), m/s, a lean, rad, and a rate about body y, rad/s.
 fn approaching(height_m: f64, [x_m_s, z_m_s]: [f64; 2], lean_rad: f64, rate_rad_s: f64) -> World {
-    let airframe = Airframe::builtin("mk2").unwrap();
+    let airframe = vehicles::airframe::builtin("mk2").unwrap();
     let above_feet_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
     let mut state = leaning(height_m + above_feet_m, lean_rad, 0.0);
     state.velocity_m_s = Vector3::new(x_m_s, 0.0, z_m_s);
@@ -24,7 +24,7 @@ fn until_rest(world: &mut World) -> Rest {
 }
 
 #[test]
-fn it_stands_on_its_legs_and_the_accelerometer_feels_gravity() {
+fn a_standing_vehicle_rests_on_its_legs_and_its_accelerometer_measures_gravity() {
     let mut world = approaching(0.02, [0.0, 0.0], 0.0, 0.0);
     let rest = until_rest(&mut world);
     assert_eq!(rest.outcome, RestOutcome::Upright);
@@ -38,9 +38,9 @@ fn it_stands_on_its_legs_and_the_accelerometer_feels_gravity() {
     assert!((touchdown.vertical_m_s + fallen_m_s).abs() < 0.01, "{touchdown:?}");
 }
 
-/// Every corner of the verdict on legs, one limit at a time, and the vertical and lateral limits together.
+/// Landings at each limit of the legs' verdict, one at a time, and at the vertical and lateral limits together.
 #[test]
-fn landings_on_the_verdicts_limits_stay_upright() {
+fn landings_at_the_limits_of_the_verdict_stay_upright() {
     for (velocity_m_s, lean_deg, rate_deg_s) in [
         ([0.0, -1.0], 0.0, 0.0),
         ([0.7, -0.3], 0.0, 0.0),
@@ -66,17 +66,17 @@ fn a_fast_or_leaning_landing_tips_over() {
 }
 
 #[test]
-fn a_fall_from_height_strikes_the_body() {
+fn after_a_fall_from_height_the_body_hits_the_ground() {
     let mut world = approaching(30.0, [0.0, -20.0], 0.0, 0.0);
     assert_eq!(until_rest(&mut world).outcome, RestOutcome::BodyStrike);
     assert!(world.touchdown().unwrap().vertical_m_s < -25.0);
 }
 
-/// Feet without damping give back the energy: the vehicle bounces to the height it fell from, and damping takes it.
+/// Legs without damping return the energy: the vehicle bounces to the height it fell from. Damping takes the energy.
 #[test]
-fn legs_bounce() {
+fn legs_bounce_without_damping() {
     let peak_m = |damping_n_s_m: f64| {
-        let mut airframe = Airframe::builtin("mk2").unwrap();
+        let mut airframe = vehicles::airframe::builtin("mk2").unwrap();
         airframe.legs.damping_n_s_m = damping_n_s_m;
         let motor = motors::builtin(&airframe.motor).unwrap();
         let truth = Truth { drag_scale: 0.0, ..Truth::default() };
@@ -96,9 +96,9 @@ fn legs_bounce() {
     assert!(peak_m(45.0) < 0.015, "{}", peak_m(45.0));
 }
 
-/// Ejected at the full fall, the parachute is open after its delay and distance and brings the vehicle down at 6 m/s.
+/// Ejected at full falling speed, the parachute is open after its delay and distance, and the vehicle sinks at 6 m/s.
 #[test]
-fn the_parachute_recovers() {
+fn the_parachute_brings_the_vehicle_down_slowly() {
     for (name, slowest, fastest) in [("mk2", 5.8, 6.3), ("mk2-h53", 5.8, 6.3), ("mini-f10", 5.8, 6.3)] {
         let mut world = world(name, &Truth::default(), &RigidState::upright(400.0)).with_fins_at(FRAC_PI_2);
         world.advance(&OPEN, 5000);

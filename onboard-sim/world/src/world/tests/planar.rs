@@ -1,19 +1,18 @@
 //! The controller's planar equations are the world's motion in its x-z plane.
 
-use flight::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
-use flight::thrust_curve::ThrustCurve;
+use flight::vehicle::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
 
 use super::*;
 
-/// A motor of constant thrust and hardly any propellant, an ideal gimbal, no crossflow, fins closed, near sea level.
+/// A motor of constant thrust with almost no propellant, an ideal gimbal, no crossflow, fins closed, near sea level.
 #[test]
 fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
-    let mut airframe = Airframe::builtin("mk2").unwrap();
+    let mut airframe = vehicles::airframe::builtin("mk2").unwrap();
     airframe.body.crossflow_drag_coefficient = 0.0;
     airframe.gimbal.servo.rate_deg_s = 1e6;
     airframe.gimbal.servo.delay_s = 0.0;
     airframe.gimbal.servo.slop_deg = 0.0;
-    let motor = ThrustCurve::from_rasp("C 38 194 0 1e-9 0.1 M\n0 33.3\n5 33.3\n").unwrap();
+    let motor = vehicles::thrust_curve::from_rasp("C 38 194 0 1e-9 0.1 M\n0 33.3\n5 33.3\n").unwrap();
     let truth = Truth { ignition_delay_s: 0.0, ..Truth::default() };
     let planar = PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.45, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: -0.2 };
     let mut world = World::new(&airframe, &motor, &truth, &RigidState::from(planar), 1).unwrap();
@@ -37,7 +36,7 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
         expected = model.rk4_step(&expected, gimbal_rad, 33.3, STEP_S);
     }
     let (found, expected) = (world.state(), RigidState::from(expected));
-    // What is left is the density, which is constant in the planar equations.
+    // The remaining difference comes from the density, which is constant in the planar equations.
     assert!((found.position_m - expected.position_m).norm() < 2e-4, "{found:?}\n{expected:?}");
     assert!((found.velocity_m_s - expected.velocity_m_s).norm() < 2e-4, "{found:?}\n{expected:?}");
     assert!((found.rate_rad_s - expected.rate_rad_s).norm() < 1e-6, "{found:?}\n{expected:?}");

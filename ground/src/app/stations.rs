@@ -1,0 +1,242 @@
+//! Finds, lists and stops this user's stations.
+
+use std::fmt::Write as _;
+use std::io::{self, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use protocol::transport::LinkAddress;
+use tokio::io::AsyncWriteExt as _;
+
+use super::server::read_one;
+use crate::attach::codec::{decode_to_screen, encode_to_station};
+use crate::attach::message::{StationStatus, ToScreen, ToStation, VERSION};
+use crate::attach::socket;
+use crate::exit::Exit;
+use crate::model::seat::Seat;
+use crate::model::{Model, words};
+
+/// How long a station may take to answer.
+const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
+/// How long a station may take to end and finish its log.
+const ENDS_WITHIN: Duration = Duration::from_secs(10);
+const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(50);
+
+/// The status of this station.
+pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
+    let settings = &model.settings;
+    let vehicle = &model.vehicle;
+    let boot = vehicle.status.as_ref().map_or(0, |status| status.value.boot_number);
+    let boot = if boot == 0 { String::new() } else { format!(" boot {boot}") };
+    let kind = match settings.demonstration {
+        true => "DEMO",
+        false if vehicle.is_simulated() => "SIM",
+        false => "LIVE",
+    };
+    let heard = vehicle.heartbeat.is_some();
+    let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
+    let armed = vehicle.armed().is_some_and(|armed| armed.value);
+    let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
+    let own = model.crew.seats().iter().find(|seat| **seat == settings.seat).map(Seat::to_string);
+    let attached =
+        screens.iter().map(|(seat, watch)| format!("{seat}{}", if *watch { " (watches)" } else { "" }));
+    StationStatus {
+        pid: std::process::id(),
+        link: settings.link_name.clone(),
+        demonstration: settings.demonstration,
+        vehicle: if heard { named } else { "not heard".to_owned() },
+        phase: format!("{phase} {}", if armed { "ARMED" } else { "disarmed" }),
+        at_risk: model.is_at_risk(),
+        log: settings.log_path.clone().unwrap_or_default(),
+        screens: own.into_iter().chain(attached).collect::<Vec<_>>().join("; "),
+    }
+}
+
+/// Answers a request to stop this station.
+pub(super) fn stopping(model: &Model, force: bool) -> ToScreen {
+    let refused = model.is_at_risk() && !model.settings.demonstration && !force;
+    let log = model.settings.log_path.as_deref().unwrap_or("none");
+    let words = if refused {
+        "the vehicle is armed or in flight; --force ends the station anyway".to_owned()
+    } else {
+        format!("log: {log}")
+    };
+    ToScreen::Stopping { stops: !refused, words }
+}
+
+/// Sends one question to the station on this socket.
+async fn ask(path: &Path, asked: &ToStation) -> io::Result<ToScreen> {
+    let asking = async {
+        let (mut read, mut write) = socket::connect(path).await?.into_split();
+        write.write_all(&encode_to_station(asked)).await?;
+        let bytes = read_one(&mut read).await.ok_or_else(|| io::Error::from(ErrorKind::UnexpectedEof))?;
+        let (told, _) =
+            decode_to_screen(&bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?;
+        Ok(told)
+    };
+    tokio::time::timeout(ANSWERS_WITHIN, asking)
+        .await
+        .unwrap_or_else(|_elapsed| Err(io::Error::from(ErrorKind::TimedOut)))
+}
+
+/// A socket and the status of its station, or why it gives none.
+type Found = (PathBuf, Result<StationStatus, String>);
+
+/// Every station of this user. The sockets of killed stations are removed.
+///
+/// # Errors
+/// The directory belongs to another user or cannot be read.
+pub(super) async fn stations() -> io::Result<Vec<Found>> {
+    let mut found = Vec::new();
+    for path in socket::sockets()? {
+        let status = match ask(&path, &ToStation::Status).await {
+            Ok(ToScreen::Status(status)) => Ok(status),
+            Ok(ToScreen::Hello(hello)) => {
+                Err(format!("it has version {}, this program has {VERSION}", hello.version))
+            }
+            Ok(_) => Err("unexpected answer".to_owned()),
+            Err(error) if matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound) => {
+                // The station is gone. If its socket cannot be removed, it is skipped again next time.
+                let _ = std::fs::remove_file(&path);
+                continue;
+            }
+            Err(error) => Err(error.to_string()),
+        };
+        found.push((path, status));
+    }
+    Ok(found)
+}
+
+/// The named station, or the only one.
+///
+/// # Errors
+/// No station runs, or several do.
+pub(super) async fn the_station(named: Option<&Path>) -> anyhow::Result<PathBuf> {
+    if let Some(path) = named {
+        return Ok(path.to_owned());
+    }
+    let mut found = stations().await.context("looking for ground stations")?;
+    match found.len() {
+        0 => anyhow::bail!("no ground station of yours runs; start one with `ground daemon`"),
+        1 => Ok(found.remove(0).0),
+        _ => {
+            anyhow::bail!("several ground stations of yours run; name one with --socket:\n{}", listed(&found))
+        }
+    }
+}
+
+/// The only station over these links, for a screen that has lost its station.
+pub(super) async fn station_over(links: &str) -> Option<PathBuf> {
+    let found = stations().await.ok()?;
+    let mut same =
+        found.into_iter().filter(|(_, status)| status.as_ref().is_ok_and(|status| status.link == links));
+    same.next().filter(|_| same.next().is_none()).map(|(path, _)| path)
+}
+
+fn listed(found: &[Found]) -> String {
+    let mut text = String::new();
+    for (path, status) in found {
+        // Writing into a String cannot fail.
+        let _ = match status {
+            Ok(status) => {
+                let or = |text: &str, other: &str| {
+                    if text.is_empty() { other.to_owned() } else { text.to_owned() }
+                };
+                let StationStatus { pid, link, vehicle, phase, log, screens, .. } = status;
+                let (log, screens) = (or(log, "none"), or(screens, "none"));
+                writeln!(
+                    text,
+                    "pid {pid}  {link}  vehicle {vehicle}  {phase}\n  socket {}\n  log {log}\n  screens {screens}",
+                    path.display()
+                )
+            }
+            Err(why) => writeln!(text, "socket {}  gives no status: {why}", path.display()),
+        };
+    }
+    text
+}
+
+/// For a demonstration: a line saying that a station runs and how to reach it.
+pub(super) async fn running_beside() -> Option<String> {
+    // An error is ignored, because a demonstration needs no station.
+    let found = stations().await.ok()?;
+    match &found[..] {
+        [] => None,
+        [(_, Ok(StationStatus { pid, link, .. }))] => {
+            Some(format!("a station runs: pid {pid}, {link}; `ground attach` shows it"))
+        }
+        _ => Some(format!(
+            "{} stations run: `ground status` lists them, `ground attach` shows one",
+            found.len()
+        )),
+    }
+}
+
+/// Explains why a link could not be opened; if the address is in use, by which station.
+pub(super) async fn explain(error: anyhow::Error, endpoints: &[LinkAddress]) -> anyhow::Error {
+    let in_use = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::AddrInUse)
+    };
+    if !error.chain().any(in_use) {
+        return error;
+    }
+    let places: Vec<String> = endpoints.iter().map(|endpoint| kind_and_port(&endpoint.to_string())).collect();
+    let found = stations().await.unwrap_or_default();
+    let holder = found.iter().find_map(|(_, status)| {
+        let status = status.as_ref().ok()?;
+        let mut links = status.link.split(" and ");
+        links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
+    });
+    match holder {
+        Some(StationStatus { pid, link, phase, .. }) => error.context(format!(
+            "your ground station pid {pid} ({phase}) uses {link}: `ground attach` shows it, `ground stop` ends it"
+        )),
+        None => error.context("another program uses the address; none of your ground stations does"),
+    }
+}
+
+/// Kind and port of a link: a port can be opened only once, whatever the address.
+fn kind_and_port(link: &str) -> String {
+    let kind = link.split(':').next().unwrap_or_default();
+    let port = link.rsplit(':').next().unwrap_or_default();
+    format!("{kind}:{port}")
+}
+
+/// `ground status`.
+///
+/// # Errors
+/// The stations cannot be looked for.
+pub async fn list() -> anyhow::Result<Exit> {
+    let found = stations().await.context("looking for ground stations")?;
+    let text = if found.is_empty() { "no ground station of yours runs\n".to_owned() } else { listed(&found) };
+    print(&text)?;
+    Ok(Exit::Landed)
+}
+
+/// `ground stop`: asks the station to end and waits until it has.
+///
+/// # Errors
+/// No station runs, several run, or the station refuses.
+pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow::Result<Exit> {
+    let path = the_station(named).await?;
+    let asked = ToStation::Stop { force, operator };
+    let told = ask(&path, &asked).await.with_context(|| format!("asking {} to end", path.display()))?;
+    let ToScreen::Stopping { stops, words } = told else {
+        anyhow::bail!("{} sent an unexpected answer", path.display());
+    };
+    anyhow::ensure!(stops, "refused: {words}");
+    for _ in 0..ENDS_WITHIN.as_millis() / LOOK_AGAIN_AFTER.as_millis() {
+        if socket::connect(&path).await.is_err() {
+            print(&format!("the station has ended; {words}\n"))?;
+            return Ok(Exit::Landed);
+        }
+        tokio::time::sleep(LOOK_AGAIN_AFTER).await;
+    }
+    anyhow::bail!("{} was told to end but has not within {} s", path.display(), ENDS_WITHIN.as_secs())
+}
+
+fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("writing to standard output")
+}

@@ -1,0 +1,301 @@
+//! The command line: every command, flag and help text.
+
+mod values;
+
+use std::path::PathBuf;
+
+use clap::builder::NonEmptyStringValueParser;
+use clap::{Parser, Subcommand};
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::transport::LinkAddress;
+
+use crate::demo::Speed;
+use crate::exit;
+pub use values::{Characters, Colour, LogChoice, ReplayFrom, Seconds};
+
+/// The profile that the demonstration flies by default.
+const DEMO_PROFILE: &str = "mk2";
+const DEMO_SEED: u64 = 1;
+
+/// Terminal ground station for a rocket that lands on its own thrust.
+///
+/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from apogee to touchdown,
+/// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
+/// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended.
+#[derive(Debug, Clone, Parser)]
+#[command(name = "ground", version, after_help = exit::HELP)]
+pub struct Cli {
+    /// What to run instead of a station with its screen.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
+    #[arg(long, value_name = "LINK", global = true)]
+    pub connect: Vec<LinkAddress>,
+
+    /// This station's own MAVLink system id; every station on a link needs a different one. Default: 255.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub sysid: Option<u8>,
+
+    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1; for a replay the
+    /// first vehicle in the log.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub vehicle_sysid: Option<u8>,
+
+    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen` creates a key.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub key: Option<PathBuf>,
+
+    /// Log to write (MCAP), or `none`. An existing file is not overwritten.
+    ///
+    /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub log: Option<LogChoice>,
+
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2; the paper's landing is paper-calibrated.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
+    pub profile: Option<String>,
+
+    /// Demonstration: seed of its dispersions. Default: 1.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", global = true)]
+    pub seed: Option<u64>,
+
+    /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
+    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", global = true)]
+    pub speed: Option<Speed>,
+
+    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
+    ///
+    /// Default: with --connect the name of the log with this extension; the demonstration writes none.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub tlog: Option<LogChoice>,
+
+    /// Settings file (TOML); `ground config example` prints one.
+    ///
+    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub config: Option<PathBuf>,
+
+    /// `ground daemon`: fly the demonstration even if the settings name a link.
+    #[arg(long, conflicts_with = "connect", global = true)]
+    pub demo: bool,
+
+    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "seed", "speed"])]
+    pub replay: Option<PathBuf>,
+
+    /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
+    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
+    pub from: Option<ReplayFrom>,
+
+    /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
+    #[arg(long, value_name = "PATH", global = true)]
+    pub socket: Option<PathBuf>,
+
+    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub operator: Option<String>,
+
+    /// Ring the terminal's bell on an alarm. Default: true.
+    #[arg(long, value_name = "true|false", global = true)]
+    pub bell: Option<bool>,
+
+    /// Command to run with `sh -c` when an alarm is raised, with its text in $TOUCHDOWN_ALARM; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub alarm_command: Option<String>,
+
+    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub characters: Option<Characters>,
+
+    /// Whether to use colours. Default: auto, by NO_COLOR and TERM.
+    #[arg(long, value_name = "WHEN", visible_alias = "color", global = true)]
+    pub colour: Option<Colour>,
+
+    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
+    #[arg(long, global = true)]
+    pub auto: bool,
+
+    /// Print lines instead of the full screen, even on a terminal.
+    #[arg(long)]
+    pub headless: bool,
+
+    /// Without a screen: give up if the flight has not ended after this time.
+    ///
+    /// Default: 120 s if the flight is started automatically, otherwise never.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub timeout_s: Option<Seconds>,
+}
+
+/// The commands of `ground` besides a station with its screen.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Command {
+    /// A station without a screen: holds the link, records, and serves screens until `ground stop` or SIGTERM ends it.
+    ///
+    /// It keeps running when its screens close and when the session that started it ends.
+    Daemon,
+    /// A screen for a station in another process on this machine. Quitting does not affect the station.
+    Attach {
+        /// Show only; command nothing.
+        #[arg(long)]
+        watch: bool,
+    },
+    /// List your stations: socket, process, link, vehicle, phase, log and screens.
+    Status,
+    /// End a station. This is refused while its vehicle is armed or in flight.
+    Stop {
+        /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Check the settings file or print an example.
+    Config {
+        /// Check the file, or print an example.
+        #[command(subcommand)]
+        command: ConfigCommand,
+    },
+    /// Print a shell's completions.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    Man,
+}
+
+/// What can be done with the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+pub enum ConfigCommand {
+    /// Check the settings and print them.
+    Check,
+    /// Print a file with every key, its meaning and its default.
+    Example,
+}
+
+impl Cli {
+    /// Profile, seed and speed of the demonstration.
+    pub fn demonstration(&self) -> (&str, u64, Speed) {
+        let profile = self.profile.as_deref().unwrap_or(DEMO_PROFILE);
+        (profile, self.seed.unwrap_or(DEMO_SEED), self.speed.unwrap_or(Speed::Factor(1.0)))
+    }
+
+    /// Our own MAVLink address.
+    pub fn us(&self) -> Address {
+        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
+    }
+
+    /// The vehicle's MAVLink address.
+    pub fn vehicle(&self) -> Address {
+        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
+    }
+
+    /// Whether the flags describe a demonstration, so that links in the settings do not apply.
+    pub fn describes_demonstration(&self) -> bool {
+        self.demo || self.profile.is_some() || self.seed.is_some() || self.speed.is_some()
+    }
+
+    /// A given flag that the command would ignore.
+    pub fn ignored_flag(&self) -> Option<&'static str> {
+        let ignores =
+            matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        let given = [
+            ("--connect", !self.connect.is_empty()),
+            ("--key", self.key.is_some()),
+            ("--log", self.log.is_some()),
+            ("--tlog", self.tlog.is_some()),
+            ("--profile", self.profile.is_some()),
+            ("--seed", self.seed.is_some()),
+            ("--speed", self.speed.is_some()),
+            ("--demo", self.demo),
+            ("--replay", self.replay.is_some()),
+            ("--auto", self.auto),
+            ("--timeout-s", self.timeout_s.is_some()),
+            ("--alarm-command", self.alarm_command.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| ignores && *given).map(|(flag, _)| flag)
+    }
+
+    /// Whether the automatic mode starts the flight.
+    pub fn starts_by_itself(&self, interactive: bool) -> bool {
+        self.auto || (self.connect.is_empty() && !interactive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_every_option_and_exit_code() {
+        let help = Cli::command().render_long_help().to_string();
+        for word in [
+            "--connect",
+            "--key",
+            "--sysid",
+            "--vehicle-sysid",
+            "--log",
+            "--profile",
+            "--seed",
+            "--speed",
+            "--auto",
+            "--headless",
+            "--timeout-s",
+        ] {
+            assert!(help.contains(word), "{word}");
+        }
+        assert!(help.contains(exit::HELP));
+    }
+
+    #[test]
+    fn wrong_values_are_refused_with_what_would_do() {
+        let refuse = |arguments: &[&str]| {
+            Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().to_string()
+        };
+        assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
+        assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
+        assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
+        assert!(refuse(&["--speed", "0"]).contains("0.01"));
+        assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
+    }
+
+    #[test]
+    fn a_demonstration_without_a_screen_starts_by_itself() {
+        let demo = Cli::try_parse_from(["ground"]).unwrap();
+        assert_eq!(demo.demonstration(), ("mk2", 1, Speed::Factor(1.0)), "the mission itself");
+        assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
+        let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
+        assert!(!live.starts_by_itself(false));
+    }
+
+    #[test]
+    fn flags_that_an_attached_screen_would_ignore_are_found() {
+        let ignored = |line: &str| Cli::try_parse_from(line.split(' ')).unwrap().ignored_flag();
+        for (flag, value) in [
+            ("--connect", " udpin:0.0.0.0:14550"),
+            ("--key", " k"),
+            ("--log", " none"),
+            ("--tlog", " none"),
+            ("--profile", " mk2"),
+            ("--seed", " 1"),
+            ("--speed", " 1"),
+            ("--demo", ""),
+            ("--auto", ""),
+            ("--alarm-command", " true"),
+        ] {
+            for command in ["attach", "status", "stop"] {
+                assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
+            }
+            assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
+        }
+        assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
+        assert_eq!(ignored("ground --replay f.mcap attach"), Some("--replay"));
+        assert_eq!(ignored("ground attach --watch --socket s --operator anna --bell false"), None);
+    }
+}

@@ -1,0 +1,98 @@
+//! The values that flags take, and how their text is parsed.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::ValueEnum;
+use protocol::dialect::TdPhase;
+use serde::Deserialize;
+
+use crate::model::words;
+
+/// Where the log goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LogChoice {
+    /// No log.
+    None,
+    /// This file.
+    File(PathBuf),
+}
+
+impl FromStr for LogChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given {
+            "" => Err("the name of the log is empty; give a file or `none`".to_owned()),
+            "none" => Ok(Self::None),
+            path => Ok(Self::File(PathBuf::from(path))),
+        }
+    }
+}
+
+/// Where a replay begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReplayFrom {
+    /// Time since the first frame.
+    Time(Duration),
+    /// The start of this phase.
+    Phase(TdPhase),
+}
+
+impl FromStr for ReplayFrom {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if let Some(phase) = words::phase_from_name(given) {
+            return Ok(Self::Phase(phase));
+        }
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(Self::Time(Duration::from_secs_f64(seconds))),
+            _ => Err(format!(
+                "`{given}` is neither a number of seconds from 0 to 1000000 nor a phase such as POWERED"
+            )),
+        }
+    }
+}
+
+/// A time limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seconds(pub Duration);
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(Self(Duration::from_secs_f64(seconds))),
+            _ => Err(format!("`{given}` is not a number of seconds from 0.1 to 86400")),
+        }
+    }
+}
+
+/// What the terminal can show.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Characters {
+    /// Decide by the environment
+    #[default]
+    Auto,
+    /// Unicode characters
+    Unicode,
+    /// Only ASCII characters
+    Ascii,
+}
+
+/// Whether colours may be used.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Colour {
+    /// Decide by the environment
+    #[default]
+    Auto,
+    /// Always use colours
+    Always,
+    /// Never use colours
+    Never,
+}

@@ -1,0 +1,177 @@
+//! The settings file (TOML). [`EXAMPLE`] documents every key; the flag of the same name overrides it.
+
+use std::path::{Path, PathBuf};
+
+use protocol::transport::LinkAddress;
+use serde::Deserialize;
+
+use crate::cli::{Characters, Cli, Colour, Command, LogChoice};
+
+/// A file with every key, its meaning and its default; `ground config example` prints it.
+pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
+# Its path is $XDG_CONFIG_HOME/touchdown/ground.toml, or ~/.config/touchdown/ground.toml.
+
+# Links to the vehicle, as for --connect, for `ground daemon`. A bare `ground` flies its demonstration.
+#connect = ["udpin:0.0.0.0:14550"]
+
+# MAVLink system ids of this station and of its vehicle, as for --sysid and --vehicle-sysid.
+#sysid = 255
+#vehicle_sysid = 1
+
+# Signing key, as for --key. Default: nothing is signed.
+#key = "touchdown.key"
+
+# Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
+#log = "flight.mcap"
+
+# Telemetry log (.tlog), or "none". Default with a link: the log's name with this ending.
+#tlog = "flight.tlog"
+
+# Socket between a station and its screens. Default: one socket per station.
+#socket = "/run/user/1000/touchdown/field.sock"
+
+# Ring the terminal's bell on an alarm.
+#bell = true
+
+# Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM; or "none", the default.
+#alarm_command = "notify-send \"$TOUCHDOWN_ALARM\""
+
+# Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
+#characters = "auto"
+
+# Use colours: "always", "never", or "auto": by NO_COLOR and TERM.
+#colour = "auto"
+"#;
+
+/// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
+/// same name.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    #[serde(default)]
+    pub connect: Vec<String>,
+    pub sysid: Option<u8>,
+    pub vehicle_sysid: Option<u8>,
+    pub key: Option<PathBuf>,
+    pub log: Option<String>,
+    pub tlog: Option<String>,
+    pub socket: Option<PathBuf>,
+    pub bell: Option<bool>,
+    pub alarm_command: Option<String>,
+    #[serde(default)]
+    pub characters: Characters,
+    #[serde(default)]
+    pub colour: Colour,
+}
+
+/// Why a settings file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    #[error("cannot read the settings {}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    /// It is not valid; the reason names line and key.
+    #[error("{}: {reason}", path.display())]
+    Wrong {
+        path: PathBuf,
+        /// Where it is wrong, and what would be accepted.
+        reason: String,
+    },
+}
+
+impl Config {
+    /// Loads the named file, otherwise the usual one if it exists.
+    ///
+    /// # Errors
+    /// The file cannot be read or is invalid, or a named file is missing.
+    pub fn load(named: Option<&Path>) -> Result<Self, ConfigError> {
+        let path = match (named, usual_path()) {
+            (Some(path), _) => path.to_owned(),
+            (None, Some(path)) if path.exists() => path,
+            (None, _) => return Ok(Self::default()),
+        };
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+        Self::parse(&text).map_err(|reason| ConfigError::Wrong { path, reason })
+    }
+
+    /// Parses the text of a file and checks every value.
+    ///
+    /// # Errors
+    /// The text is invalid; the error says where.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let config: Self = toml::from_str(text).map_err(|error| error.to_string())?;
+        for link in &config.connect {
+            link.parse::<LinkAddress>().map_err(|error| format!("connect: {error}"))?;
+        }
+        for (key, value) in [("sysid", config.sysid), ("vehicle_sysid", config.vehicle_sysid)] {
+            if value == Some(0) {
+                return Err(format!("{key}: 0 addresses every system; give one from 1 to 255"));
+            }
+        }
+        for (key, value) in [("log", &config.log), ("tlog", &config.tlog)] {
+            if let Some(file) = value {
+                file.parse::<LogChoice>().map_err(|error| format!("{key}: {error}"))?;
+            }
+        }
+        if config.alarm_command.as_ref().is_some_and(|command| command.trim().is_empty()) {
+            return Err("alarm_command is empty; give a command or \"none\"".to_owned());
+        }
+        Ok(config)
+    }
+
+    /// Fills in the flags that the command line does not give.
+    pub fn fill(&self, cli: &mut Cli) {
+        fn parsed<T: std::str::FromStr>(value: Option<&String>) -> Option<T> {
+            value.and_then(|value| value.parse().ok())
+        }
+        // Only a daemon takes links from the settings: a bare `ground` must always be the demonstration.
+        let is_daemon = matches!(cli.command, Some(Command::Daemon));
+        if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
+            cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        }
+        // A replay shows the vehicle in the log, whatever the settings say.
+        if cli.replay.is_none() {
+            cli.sysid = cli.sysid.or(self.sysid);
+            cli.vehicle_sysid = cli.vehicle_sysid.or(self.vehicle_sysid);
+        }
+        if cli.key.is_none() && !cli.connect.is_empty() {
+            cli.key.clone_from(&self.key);
+        }
+        if cli.log.is_none() {
+            cli.log = parsed(self.log.as_ref());
+        }
+        if cli.tlog.is_none() {
+            cli.tlog = parsed(self.tlog.as_ref());
+        }
+        if cli.socket.is_none() {
+            cli.socket.clone_from(&self.socket);
+        }
+    }
+
+    /// The flags about the screen and its alarms override the file.
+    #[must_use]
+    pub fn overridden_by(self, cli: &Cli) -> Self {
+        let alarm_command = cli.alarm_command.clone().or(self.alarm_command);
+        Self {
+            bell: cli.bell.or(self.bell),
+            alarm_command: alarm_command.filter(|command| command != "none"),
+            characters: cli.characters.unwrap_or(self.characters),
+            colour: cli.colour.unwrap_or(self.colour),
+            ..self
+        }
+    }
+}
+
+/// The usual path of the settings file.
+pub fn usual_path() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let directory = match (set("XDG_CONFIG_HOME"), set("HOME")) {
+        (Some(directory), _) => PathBuf::from(directory),
+        (None, Some(home)) => PathBuf::from(home).join(".config"),
+        (None, None) => return None,
+    };
+    Some(directory.join("touchdown").join("ground.toml"))
+}
+
+#[cfg(test)]
+mod tests;

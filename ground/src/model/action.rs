@@ -1,0 +1,53 @@
+//! What the model asks of the run loop: messages to send, records to write, requests to the station.
+
+use protocol::dialect::MavMessage;
+use protocol::log::record::{Event, EventLevel, Record};
+
+use super::alarm::AlarmKind;
+use super::command::CommandKind;
+use super::events::Speaker;
+
+/// What a screen in another process asks its station to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// The crew has completed every step of this command: send it.
+    Command(CommandKind),
+    /// The crew has seen this alarm.
+    Acknowledge(AlarmKind),
+    /// Ask the vehicle for its parameters.
+    Parameters,
+}
+
+/// What `update` wants the run loop to do.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Send a message to the vehicle.
+    Send(Box<MavMessage>),
+    /// Write a record into the log.
+    Record(Record),
+    /// Write the log to disk now.
+    SyncLog,
+    /// Redraw the whole screen.
+    Redraw,
+    /// Ask the station, from a screen in another process.
+    Request(Request),
+    /// Tell the other screens that the crew has asked for this on the station's own screen.
+    Tell(CommandKind),
+    /// Give the terminal back and continue without a screen.
+    LeaveScreen,
+    Bell,
+    /// An alarm was raised: run the alarm command with its text.
+    Alarm(String),
+    Quit,
+}
+
+impl Action {
+    pub(crate) fn send(message: MavMessage) -> Self {
+        Self::Send(Box::new(message))
+    }
+
+    pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
+        let event = Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
+        Self::Record(Record::Event(event))
+    }
+}

@@ -1,0 +1,157 @@
+//! Reports changes of the vehicle's state as events, and updates the outcome of the flight.
+
+use std::time::Duration;
+
+use protocol::dialect::{TdHold, TdMotor, TdPhase};
+use protocol::log::record::EventLevel;
+
+use super::{Action, commands};
+use crate::model::command::is_aborted;
+use crate::model::dialog::Dialog;
+use crate::model::events::Speaker;
+use crate::model::flight_so_far::FlightSoFar;
+use crate::model::flown_path::FlownPath;
+use crate::model::history::{History, Maxima};
+use crate::model::judgement::Standard;
+use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::parameters::Parameters;
+use crate::model::uplink::Uplink;
+use crate::model::vehicle::{Vehicle, Verdict, is_flight};
+use crate::model::{Model, words};
+
+/// The part of the vehicle's state whose changes are reported.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Announced {
+    phase: Option<TdPhase>,
+    armed: Option<bool>,
+    counting: bool,
+    aborted: bool,
+    hold: Option<TdHold>,
+    danger: Option<Danger>,
+    verdict: Option<Verdict>,
+}
+
+impl Announced {
+    pub(super) fn of(vehicle: &Vehicle) -> Self {
+        let on_pad = vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_PAD_ARMED);
+        Self {
+            phase: vehicle.phase().map(|phase| phase.value),
+            armed: vehicle.armed().map(|armed| armed.value),
+            counting: on_pad && vehicle.countdown_s().is_some(),
+            aborted: vehicle.interlocks().is_some_and(is_aborted)
+                || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
+            hold: vehicle.status.as_ref().map(|status| status.value.hold),
+            danger: KeepAway::of(vehicle).map(|away| away.danger),
+            verdict: vehicle.verdict.map(|verdict| verdict.value),
+        }
+    }
+}
+
+pub(super) fn on_reboot(model: &mut Model, now: Duration) {
+    let number = model.vehicle.boot.number();
+    let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
+    let text = format!("the vehicle has rebooted{which}: all earlier values are dropped");
+    model.warn(now, text);
+    model.outcome = FlightSoFar { error: model.outcome.error.take(), ..FlightSoFar::default() };
+    model.history = History::default();
+    model.parameters = Parameters::default();
+    model.link.uplink = Uplink::default();
+    model.link.round_trip = None;
+    model.alarms.vehicle_rebooted(now);
+    model.rebooted_at = Some(now);
+    // An open dialog was opened for the former boot.
+    model.dialog = Dialog::Closed;
+    let void = commands::restart_after_reboot(model, now);
+    if !void.is_empty() {
+        let void = void.join(", ");
+        model.warn(now, format!("void since the reboot: {void}"));
+    }
+}
+
+pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
+    let after = Announced::of(&model.vehicle);
+    if after == before {
+        return;
+    }
+    if after.armed != before.armed
+        && let Some(armed) = after.armed
+    {
+        model.info(now, if armed { "armed (HEARTBEAT)" } else { "disarmed (HEARTBEAT)" });
+    }
+    if let Some(phase) = after.phase
+        && after.phase != before.phase
+    {
+        on_phase(model, before.phase, phase, now);
+    }
+    if after.counting && !before.counting {
+        model.info(now, "countdown runs");
+    }
+    if after.aborted && !before.aborted {
+        model.say(now, Speaker::Ground, EventLevel::Error, "the vehicle has latched an abort");
+        model.outcome.aborted_at = Some(now);
+        model.outbox.push(Action::SyncLog);
+    }
+    if let Some(verdict) = after.verdict
+        && after.verdict != before.verdict
+    {
+        on_verdict(model, &verdict, now);
+    }
+    if after.hold != before.hold
+        && let Some(text) = hold_words(&model.vehicle, model.link.uplink.armed_by_us)
+    {
+        model.say(now, Speaker::Ground, EventLevel::Error, text);
+        model.outbox.push(Action::SyncLog);
+    }
+    if after.danger != before.danger {
+        on_danger(model, now);
+    }
+}
+
+/// Reports whether people may approach, because the log must show when they may not.
+fn on_danger(model: &mut Model, now: Duration) {
+    if let Some(away) = KeepAway::of(&model.vehicle) {
+        let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
+        return model.say(now, Speaker::Ground, level, away.words());
+    }
+    let safe = match model.vehicle.status.as_ref().map(|status| status.value.motor) {
+        Some(TdMotor::TD_MOTOR_PIN_IN) => "the pin is in: the vehicle may be approached",
+        Some(TdMotor::TD_MOTOR_BURNT) => "the motor is burnt out and cool: the vehicle may be approached",
+        _ => "the waiting time is over",
+    };
+    model.info(now, safe);
+}
+
+fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
+    let from = before.map_or_else(String::new, |before| format!("{} -> ", words::phase(before)));
+    if is_flight(phase) && !before.is_some_and(is_flight) && !model.outcome.started {
+        model.history.maxima = Maxima::default();
+    }
+    model.history.note_phase(phase, now);
+    model.info(now, format!("phase {from}{}", words::phase(phase)));
+    model.outbox.push(Action::SyncLog);
+    if is_flight(phase) && !before.is_some_and(is_flight) {
+        if !model.outcome.started {
+            model.vehicle.flown = FlownPath::default();
+            model.vehicle.burn = FlownPath::default();
+        }
+        model.outcome.started = true;
+    }
+    if phase == TdPhase::TD_PHASE_SAFED {
+        model.outcome.safed_at = Some(now);
+    }
+}
+
+fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
+    let (level, text) = match (verdict.landed, verdict.touchdown.violations()) {
+        (true, _) => {
+            let whose = Standard::whose(model.vehicle.limits.as_ref());
+            (EventLevel::Info, format!("LANDED inside every limit of {whose}"))
+        }
+        (false, Some(names)) => (EventLevel::Error, format!("NOT LANDED: outside {names}")),
+        (false, None) => (EventLevel::Error, "NOT LANDED".to_owned()),
+    };
+    model.say(now, Speaker::Ground, level, text);
+    model.outcome.started = true;
+    model.outcome.verdict = Some((verdict.landed, now));
+    model.outbox.push(Action::SyncLog);
+}

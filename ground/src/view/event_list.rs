@@ -1,0 +1,85 @@
+//! The newest events, wrapped to the width of the list.
+
+use protocol::log::record::EventLevel;
+use ratatui::text::{Line, Span};
+
+use super::theme::{TextRole, Theme};
+use crate::model::Model;
+
+/// Columns before the text of an event: time, speaker and mark.
+const BEFORE_TEXT: usize = 18;
+/// Narrower than this, a text is cut rather than wrapped.
+const WRAP_COLUMNS_MIN: usize = 20;
+
+/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
+/// is its reason.
+pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let text_columns = columns.saturating_sub(BEFORE_TEXT);
+    let mut lines: Vec<Line> = model
+        .events
+        .newest(rows)
+        .flat_map(|event| {
+            let role = match event.level {
+                EventLevel::Info => TextRole::Plain,
+                EventLevel::Warning => TextRole::Caution,
+                EventLevel::Error | EventLevel::Fatal => TextRole::Alarm,
+            };
+            let head = format!("{:>7.1} {:<7} ", event.at.as_secs_f64(), event.speaker.name());
+            let mark = event.mark();
+            let mut pieces = wrap(&event.text, text_columns).into_iter();
+            let first = pieces.next().unwrap_or_default();
+            let first = Line::from(vec![
+                Span::styled(head, theme.style(TextRole::Label)),
+                Span::styled(format!("{mark}{first}"), theme.style(role)),
+            ]);
+            let rest = pieces.map(move |piece| {
+                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), Span::styled(piece, theme.style(role))])
+            });
+            std::iter::once(first).chain(rest).collect::<Vec<_>>()
+        })
+        .collect();
+    lines.drain(..lines.len().saturating_sub(rows));
+    lines
+}
+
+/// Breaks a text at spaces; a word longer than a line is broken at the end of the line.
+fn wrap(text: &str, columns: usize) -> Vec<String> {
+    if columns < WRAP_COLUMNS_MIN {
+        return vec![text.to_owned()];
+    }
+    let mut lines = Vec::new();
+    let (mut line, mut used) = (String::new(), 0);
+    for word in text.split(' ') {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > columns {
+            lines.push(std::mem::take(&mut line));
+            used = 0;
+        } else if used > 0 {
+            line.push(' ');
+            used += 1;
+        }
+        for c in word.chars() {
+            if used == columns {
+                lines.push(std::mem::take(&mut line));
+                used = 0;
+            }
+            line.push(c);
+            used += 1;
+        }
+    }
+    lines.push(line);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_wrap_at_spaces_and_keep_every_character() {
+        assert_eq!(wrap("one two", 20), ["one two"]);
+        assert_eq!(wrap("arming refused: pin: found in", 20), ["arming refused: pin:", "found in"]);
+        assert_eq!(wrap(&"x".repeat(45), 20).concat().len(), 45);
+        assert_eq!(wrap("", 20), [""]);
+    }
+}

@@ -1,0 +1,169 @@
+//! The side view: the flown path (line), the planned path (dots), the pad and the touchdown limits; after a loss of
+//! the link the predicted position (a cross) with its error circle.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::style::Color;
+use ratatui::symbols::Marker;
+use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
+
+use super::number::shortest;
+use super::theme::Theme;
+use crate::model::Model;
+use crate::model::dead_reckoning::predict_position;
+use crate::model::motion::NorthEastUp;
+
+/// Braille dots per cell.
+const DOTS_ACROSS: f64 = 2.0;
+const DOTS_UP: f64 = 4.0;
+/// The least altitude that the picture shows.
+const ALTITUDE_MIN_M: f64 = 5.0;
+/// The height of the mark of a touchdown limit, dots.
+const LIMIT_DOTS: f64 = 5.0;
+/// The columns that one picture needs.
+const PICTURE_COLUMNS: u16 = 22;
+/// The pad's half width, m.
+const PAD_HALF_M: f64 = 1.0;
+
+/// The touchdown limits are included if they enlarge the picture by no more than this factor.
+const LIMITS_COST_MAX: f64 = 2.0;
+
+/// Which part of the flight is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FlightPart {
+    Whole,
+    /// The landing burn, once it has begun.
+    Burn,
+}
+
+/// The direction from which the flight is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Viewpoint {
+    /// North is right. The plan is drawn only in this view.
+    East,
+    /// East is right.
+    South,
+}
+
+impl Viewpoint {
+    fn sees(self, [north_m, east_m, altitude_m]: NorthEastUp) -> (f64, f64) {
+        match self {
+            Self::East => (north_m, altitude_m),
+            Self::South => (east_m, altitude_m),
+        }
+    }
+}
+
+/// The pictures that fit into an area, with their titles: for a vehicle in space from the east and from the south, or
+/// from the east alone.
+pub fn pictures(model: &Model, area: Rect) -> Vec<(Viewpoint, &'static str, Rect)> {
+    if !model.vehicle.in_space {
+        return vec![(Viewpoint::East, "Side view", area)];
+    }
+    if area.width < 2 * PICTURE_COLUMNS {
+        return vec![(Viewpoint::East, "From east", area)];
+    }
+    let [east, south] = area.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+    vec![(Viewpoint::East, "From east", east), (Viewpoint::South, "From south", south)]
+}
+
+/// Draws the picture; both axes have the same scale.
+pub fn draw(
+    model: &Model,
+    (part, from): (FlightPart, Viewpoint),
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    if area.width < 8 || area.height < 3 {
+        return;
+    }
+    let vehicle = &model.vehicle;
+    let flown = match part {
+        FlightPart::Burn if !vehicle.burn.points().is_empty() => vehicle.burn.points(),
+        _ => vehicle.flown.points(),
+    };
+    let flown: Vec<(f64, f64)> = flown.iter().map(|point| from.sees(*point)).collect();
+    let predicted = if from == Viewpoint::East { vehicle.planned() } else { &[] };
+    let lost =
+        predict_position(vehicle, now).map(|at| (from.sees([at.x_m, at.y_m, at.altitude_m]), at.error_m));
+    let reckoned: Vec<(f64, f64)> = lost.iter().map(|(at, _)| *at).collect();
+    let points: Vec<(f64, f64)> = [&flown, predicted, &reckoned].concat();
+    let limit_m = vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m));
+    let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
+    let view = Bounds::around(&points, limit_m, area);
+    let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
+    let colour = |colour| if theme.colour { colour } else { Color::Reset };
+    let canvas = Canvas::default()
+        .marker(Marker::Braille)
+        .x_bounds([left, right])
+        .y_bounds([bottom, top])
+        .paint(|context| {
+            context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: colour(Color::DarkGray) });
+            for side in [-PAD_HALF_M, PAD_HALF_M] {
+                context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: colour(Color::Reset) });
+            }
+            for x in limit_m.into_iter().flat_map(|limit_m| [-limit_m, limit_m]) {
+                let y2 = LIMIT_DOTS * per_dot;
+                context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: colour(Color::Red) });
+            }
+            context.draw(&Points { coords: predicted, color: colour(Color::Cyan) });
+            for pair in flown.windows(2) {
+                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
+                context.draw(&Line { x1, y1, x2, y2, color: colour(Color::Yellow) });
+            }
+            if let Some(((x, y), radius)) = lost {
+                context.draw(&Circle { x, y, radius, color: colour(Color::Magenta) });
+                context.print(x, y, "+");
+            }
+            context.print(left, top, format!("{:.0} m up", top.floor()));
+            let corner = view.corner(limit_m);
+            let columns = corner.chars().count() as f64;
+            context.print(right - columns * DOTS_ACROSS * per_dot, bottom, corner);
+        });
+    frame.render_widget(canvas, area);
+}
+
+/// The section that the picture shows, m.
+struct Bounds {
+    x: [f64; 2],
+    y: [f64; 2],
+    per_dot: f64,
+}
+
+impl Bounds {
+    fn around(points: &[(f64, f64)], limit_m: Option<f64>, area: Rect) -> Self {
+        let (mut left, mut right, mut top) = (-PAD_HALF_M, PAD_HALF_M, ALTITUDE_MIN_M);
+        for (x, altitude) in points {
+            left = left.min(*x);
+            right = right.max(*x);
+            top = top.max(*altitude);
+        }
+        let across = f64::from(area.width) * DOTS_ACROSS;
+        let up = f64::from(area.height) * DOTS_UP;
+        // A margin around, and two rows of dots below the ground.
+        let per_dot = |left: f64, right: f64| ((right - left) * 1.1 / across).max(top * 1.05 / (up - 3.0));
+        if let Some(limit_m) = limit_m {
+            let (wider_left, wider_right) = (left.min(-limit_m), right.max(limit_m));
+            if per_dot(wider_left, wider_right) <= LIMITS_COST_MAX * per_dot(left, right) {
+                (left, right) = (wider_left, wider_right);
+            }
+        }
+        let per_dot = per_dot(left, right);
+        let middle = f64::midpoint(left, right);
+        let half = per_dot * across / 2.0;
+        Self { x: [middle - half, middle + half], y: [-2.0 * per_dot, per_dot * (up - 2.0)], per_dot }
+    }
+
+    /// The label in the corner: how far the picture reaches, or the limit if it lies outside.
+    fn corner(&self, limit_m: Option<f64>) -> String {
+        let [left, right] = self.x;
+        match limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
+            Some(limit_m) => format!("limit ±{} m", shortest(limit_m)),
+            None => format!("{:.0} m", right.floor()),
+        }
+    }
+}

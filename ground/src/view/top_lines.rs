@@ -1,0 +1,251 @@
+//! The top lines of every screen: phase, armed, countdown, link, abort, and the line of the latest command.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use super::next_event;
+use super::number::{STALE_MARK, age_mark};
+use super::theme::{TextRole, Theme};
+use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
+use crate::model::link_state::LinkState;
+use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::{Model, Role, abort_too_late, words};
+
+/// In flight, a command whose effect is not observed is shown instead of the next event for this long. Its alarm
+/// stays.
+const OPEN_SHOWN: Duration = Duration::from_secs(10);
+pub const ABORT_KEY: &str = "Ctrl-X Enter";
+
+/// The key that aborts from this screen, or why none does.
+pub fn abort_key(model: &Model) -> String {
+    match model.settings.role {
+        Role::Station | Role::Attached => format!("ABORT {ABORT_KEY}"),
+        Role::Watching => "WATCHING only".to_owned(),
+        Role::Replaying => "REPLAY".to_owned(),
+    }
+}
+
+/// The phase, with its age.
+pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.phase() {
+        None => Span::styled(" no vehicle", theme.style(TextRole::Label)),
+        Some(phase) => {
+            let (mark, stale) = age_mark(&phase, now);
+            let role = if stale == TextRole::Stale { stale } else { TextRole::Title };
+            Span::styled(format!("{mark}{}", words::phase(phase.value)), theme.style(role))
+        }
+    }
+}
+
+/// Whether the vehicle is armed, from HEARTBEAT.
+pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.armed() {
+        None => Span::styled(" armed ?", theme.style(TextRole::Label)),
+        Some(armed) => {
+            let (mark, stale) = age_mark(&armed, now);
+            match (armed.value, stale) {
+                (true, _) => Span::styled(format!("{mark}ARMED"), theme.style(TextRole::Alarm)),
+                (false, TextRole::Stale) => {
+                    Span::styled(format!("{mark}disarmed"), theme.style(TextRole::Stale))
+                }
+                (false, _) => Span::styled(format!("{mark}disarmed"), theme.style(TextRole::Good)),
+            }
+        }
+    }
+}
+
+/// Time to release, or since ignition.
+pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    match model.vehicle.countdown_s() {
+        None => Span::styled(" T --", theme.style(TextRole::Label)),
+        Some(time) => {
+            let (mark, role) = age_mark(&time, now);
+            let sign = if time.value > 0.0 { '-' } else { '+' };
+            let role = if role == TextRole::Stale { role } else { TextRole::Title };
+            Span::styled(format!("{mark}T{sign}{:.1}", time.value.abs()), theme.style(role))
+        }
+    }
+}
+
+/// Both directions of the link, each with the age of its last frame: hearing the vehicle does not prove that it hears
+/// us. Whole seconds, because heartbeats come only once a second.
+pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let down = model.link.state(now);
+    if down == LinkState::NeverHeard {
+        return Line::styled("down: not heard", theme.style(TextRole::Caution));
+    }
+    let direction = |name: &str, loud: &str, state| match state {
+        LinkState::NeverHeard => Span::styled(format!("{loud} NOT PROVEN"), theme.style(TextRole::Alarm)),
+        LinkState::Alive(age) => {
+            Span::styled(format!("{name} {}s", age.as_secs()), theme.style(TextRole::Good))
+        }
+        LinkState::Doubtful(age) => {
+            Span::styled(format!("{name} late {}s", age.as_secs()), theme.style(TextRole::Caution))
+        }
+        LinkState::Lost(age) => {
+            Span::styled(format!("{loud} LOST {}s", age.as_secs()), theme.style(TextRole::Alarm))
+        }
+    };
+    let up = match model.link.uplink.state(now) {
+        // There has been no report about the uplink since the downlink was lost.
+        LinkState::Lost(age) | LinkState::Doubtful(age) if !down.carries() => {
+            Span::styled(format!("{STALE_MARK}up {}s", age.as_secs()), theme.style(TextRole::Stale))
+        }
+        state => direction("up", "UP", state),
+    };
+    Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up])
+}
+
+/// What an abort would do now, or the progress of the commanded abort.
+pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let effect = abort_effect(model, now);
+    if model.abort_chord.is_begun(now) {
+        return Line::styled(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), theme.style(TextRole::Alarm));
+    }
+    if let Some(track) = model.commands.of(CommandKind::Abort) {
+        return command_facts(track, theme, now);
+    }
+    Line::from(vec![
+        Span::styled(" abort now: ", theme.style(TextRole::Label)),
+        Span::styled(effect, theme.style(TextRole::Plain)),
+    ])
+}
+
+/// What an abort would do now, marked if the report is stale.
+fn abort_effect(model: &Model, now: Duration) -> String {
+    let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
+    if let Some(why) = abort_too_late::reason(model, now) {
+        return why.to_owned();
+    }
+    let mark = if status.is_stale(now) { "~" } else { "" };
+    let reach = if let LinkState::Lost(_) = model.link.state(now) { "; MAY NOT ARRIVE" } else { "" };
+    format!("{mark}{}{reach}", words::abort_effect(&status.value))
+}
+
+/// The warning that nobody may approach the vehicle, and for how long.
+pub fn keep_away(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let away = KeepAway::of(&model.vehicle)?;
+    let stale = model.vehicle.status.as_ref().is_some_and(|status| status.is_stale(now));
+    let mark = if stale { STALE_MARK } else { " " };
+    let role = if away.danger == Danger::Hot { TextRole::Caution } else { TextRole::Alarm };
+    Some(Line::styled(format!("{mark}{}", away.words()), theme.style(role)))
+}
+
+/// The line of a held countdown: why, and what happens next.
+fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let words = hold_words(&model.vehicle, model.link.uplink.armed_by_us)?;
+    Some(Line::styled(words, theme.style(TextRole::Alarm)))
+}
+
+/// The three facts of a command, for narrow screens.
+pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
+    let (acknowledged, acknowledged_role) = match track.acknowledged {
+        Acknowledgement::Waiting | Acknowledgement::InProgress => ("-", TextRole::Caution),
+        Acknowledgement::GivenUp => ("NEVER", TextRole::Alarm),
+        Acknowledgement::Answered(_) if track.accepted() => ("ok", TextRole::Good),
+        Acknowledgement::Answered(_) => ("REFUSED", TextRole::Alarm),
+    };
+    let (observed, observed_role) = match track.observed_at {
+        Some(_) => ("ok", TextRole::Good),
+        None if track.disagrees(now) => ("NO", TextRole::Alarm),
+        None => ("-", TextRole::Plain),
+    };
+    Line::from(vec![
+        Span::styled(format!("{} x{}", track.kind.name(), track.attempts), theme.style(TextRole::Title)),
+        Span::styled(" ack ", theme.style(TextRole::Label)),
+        Span::styled(acknowledged, theme.style(acknowledged_role)),
+        Span::styled(" obs ", theme.style(TextRole::Label)),
+        Span::styled(observed, theme.style(observed_role)),
+    ])
+}
+
+/// The three facts of a command: commanded, acknowledged, observed.
+pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
+    let label = |text: &str| Span::styled(text.to_owned(), theme.style(TextRole::Label));
+    let (acknowledged, acknowledged_role) = match track.acknowledged {
+        Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
+        Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
+        Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
+        Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
+        Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),
+    };
+    let (observed, observed_role) = match track.observed_at {
+        Some(_) => ("yes".to_owned(), TextRole::Good),
+        None if track.disagrees(now) => ("NOT OBSERVED".to_owned(), TextRole::Alarm),
+        None => ("not yet".to_owned(), TextRole::Plain),
+    };
+    Line::from(vec![
+        Span::styled(format!(" {:<6} ", track.kind.name()), theme.style(TextRole::Title)),
+        label("commanded "),
+        Span::styled(
+            format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts),
+            theme.style(TextRole::Plain),
+        ),
+        label("  acknowledged "),
+        Span::styled(acknowledged, theme.style(acknowledged_role)),
+        label("  observed "),
+        Span::styled(observed, theme.style(observed_role)),
+    ])
+}
+
+fn refusal(result: u8) -> &'static str {
+    match result {
+        1 => "not now",
+        2 => "denied",
+        3 => "unsupported",
+        4 => "failed",
+        6 => "cancelled",
+        _ => "unknown",
+    }
+}
+
+/// The first of these that applies: the warning not to approach; a command (other than an abort) that is not observed
+/// yet; a hold; the next event of the flight; the latest command; whether the vehicle may be armed.
+pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(mut line) = keep_away(model, theme, now) {
+        // Under a parachute the next event is added, because the vehicle is still coming down.
+        let falls = model.vehicle.in_flight().then(|| next_event::line(model, theme, now)).flatten();
+        line.spans.extend(falls.into_iter().flat_map(|next| next.spans));
+        return line;
+    }
+    if open_command(model, now).is_none()
+        && let Some(hold) = hold(model, theme)
+    {
+        return hold;
+    }
+    let next = next_event::line(model, theme, now);
+    if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
+        return next;
+    }
+    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
+    if let Some(track) = latest {
+        return command_facts(track, theme, now);
+    }
+    readiness(model, theme, now).unwrap_or_default()
+}
+
+/// The latest command other than an abort, while its effect is not observed yet.
+pub fn open_command(model: &Model, now: Duration) -> Option<&TrackedCommand> {
+    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
+    latest.filter(|track| track.observed_at.is_none() && now.saturating_sub(track.commanded_at) < OPEN_SHOWN)
+}
+
+/// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the
+/// vehicle has reported its checks.
+pub fn readiness(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let status = model.vehicle.status.as_ref()?;
+    if status.is_stale(now) {
+        let words = format!(" {STALE_MARK}checks: no longer received");
+        return Some(Line::styled(words, theme.style(TextRole::Stale)));
+    }
+    let failing = words::failed_checks(status.value.checks_failed);
+    if !failing.is_empty() {
+        return Some(Line::styled(format!(" NO-GO: {}", failing.join(", ")), theme.style(TextRole::Caution)));
+    }
+    if !model.link.uplink.is_proven(now) {
+        let words = " NO-GO: uplink not proven, every other check passes";
+        return Some(Line::styled(words, theme.style(TextRole::Caution)));
+    }
+    Some(Line::styled(" GO: every arming check passes", theme.style(TextRole::Good)))
+}

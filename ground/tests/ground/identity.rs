@@ -1,0 +1,205 @@
+//! Who commands, which boot of which vehicle, and whether people may approach it.
+
+use ground::key::Key;
+use ground::model::seat::Seat;
+use ground::model::{Role, Settings};
+use ground::update::{Action, Msg};
+use protocol::dialect::{
+    MavCmd, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor, TdPhase,
+};
+use protocol::log::record::Record;
+
+use crate::keys::ladder;
+use crate::rig::{Rig, settings};
+
+fn first_line(rig: &Rig, columns: u16, rows: u16) -> String {
+    rig.screen(columns, rows).lines().next().unwrap_or_default().trim_matches('"').to_owned()
+}
+
+#[test]
+fn the_first_line_of_every_page_is_the_identity() {
+    let demo =
+        Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
+    let cases = [
+        (demo, true, " DEMO       system 1 boot 1A2B3C4D mk2"),
+        (settings(false, true), true, " SIM        system 1 boot 1A2B3C4D"),
+        (settings(false, true), false, " LIVE       system 1 boot 1A2B3C4D"),
+        (Settings { role: Role::Watching, ..settings(false, true) }, false, " WATCH LIVE system 1"),
+        (Settings { role: Role::Replaying, ..settings(false, true) }, true, " REPLAY SIM system 1"),
+    ];
+    for (settings, simulated, expected) in cases {
+        let mut rig = Rig::new(settings);
+        rig.simulated = simulated;
+        rig.run(2.0);
+        for digit in "123456789?".chars() {
+            rig.key(Key::Char(digit));
+            let line = first_line(&rig, 80, 24);
+            assert!(line.starts_with(expected) && line.contains("255/190 udpin:"), "{digit}: {line}");
+        }
+        let word = expected.split("  ").next().unwrap_or_default();
+        assert!(first_line(&rig, 20, 5).starts_with(word.trim_end_matches(" system 1")), "{word}");
+    }
+}
+
+/// A vehicle that once reported not to be simulated counts as real until it reboots.
+#[test]
+fn a_vehicle_that_contradicts_itself_is_live() {
+    let mut rig = Rig::crewed();
+    rig.run(2.0);
+    assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
+    for simulated in [false, true] {
+        rig.simulated = simulated;
+        rig.run(2.0);
+        assert!(!rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" LIVE"));
+    }
+    rig.boot_number += 1;
+    rig.run(2.0);
+    assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
+}
+
+#[test]
+fn several_operators_are_named() {
+    let mut rig = Rig::crewed();
+    let seats = vec![Seat::new(1, "ann on pts/1"), Seat::new(2, "bob on pts/2")];
+    rig.msg(Msg::Crew(seats));
+    assert!(first_line(&rig, 80, 24).contains("by ann,bob"), "{}", first_line(&rig, 80, 24));
+}
+
+/// The vehicle reboots four seconds after its boot, which its clock alone would not show.
+#[test]
+fn a_reboot_within_seconds_of_a_boot_voids_earlier_commands() {
+    let mut rig = Rig::crewed();
+    rig.keys(&ladder());
+    rig.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(2.0);
+    assert!(rig.screen(80, 24).contains("ARM    commanded"));
+    assert!(rig.model.commands.tracks[0].observed_at.is_some());
+    rig.key(Key::Char('S'));
+    rig.boot_number = 0x0000_00BB;
+    rig.armed = false;
+    rig.phase = TdPhase::TD_PHASE_PAD_IDLE;
+    rig.run(0.1);
+    let said = rig.events();
+    assert!(said.contains("rebooted, boot 000000BB"), "{said}");
+    assert!(said.contains("void since the reboot: ARM"), "{said}");
+    assert!(rig.model.commands.tracks.is_empty() && rig.model.vehicle.armed().is_none());
+    assert_eq!(rig.model.dialog, ground::model::dialog::Dialog::Closed);
+    assert!(rig.screen(80, 24).contains("ALARM the vehicle has REBOOTED"));
+    rig.keys(&[Key::Enter]);
+    assert!(!rig.commands().iter().any(|command| command.command == MavCmd::MAV_CMD_MISSION_START));
+    rig.run(2.0);
+    assert_eq!(rig.events().matches("has rebooted").count(), 1, "said once");
+}
+
+fn ended(motor: TdMotor, wait_s: u16, interlocks: TdInterlock) -> Rig {
+    let mut rig = Rig::crewed();
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.interlocks |= interlocks;
+    (rig.motor, rig.approach_wait_s) = (motor, wait_s);
+    rig.run(1.0);
+    rig
+}
+
+/// After a failed ignition, an inhibit or an abort: the warning is on every page and size, as an alarm and in the
+/// log.
+#[test]
+fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
+    for locks in [
+        TdInterlock::TD_INTERLOCK_NO_LIGHT,
+        TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
+        TdInterlock::TD_INTERLOCK_ABORT_LATCHED,
+    ] {
+        let mut rig = ended(TdMotor::TD_MOTOR_LIVE, 57, locks);
+        let words = "LIVE MOTOR: do not approach";
+        for phase in [TdPhase::TD_PHASE_CHUTE, TdPhase::TD_PHASE_TOUCHDOWN, TdPhase::TD_PHASE_SAFED] {
+            rig.phase = phase;
+            rig.run(0.2);
+            for digit in "123456789?".chars() {
+                rig.key(Key::Char(digit));
+                let screen = rig.screen(80, 24);
+                assert!(screen.contains("LIVE MOTOR: do not approach for 57 s"), "{digit}: {screen}");
+                assert!(rig.screen(40, 12).contains(words), "{digit}");
+            }
+        }
+        assert!(rig.screen(20, 5).contains("LIVE MOTOR"), "{}", rig.screen(20, 5));
+        let logged = rig.actions.iter().filter(
+            |action| matches!(action, Action::Record(Record::Event(event)) if event.message.contains(words)),
+        );
+        assert_eq!(logged.count(), 1);
+        assert!(rig.events().contains("LIVE MOTOR: do not approach for 57 s"));
+        rig.approach_wait_s = 0;
+        rig.run(0.1);
+        assert!(rig.screen(80, 24).contains("LIVE MOTOR: approach only to put the pin in"));
+        rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+        rig.run(0.1);
+        assert!(rig.events().contains("the pin is in: the vehicle may be approached"));
+        let screen = rig.screen(80, 24);
+        assert!(!screen.contains("do not approach for") && !screen.contains("ALARM LIVE"), "{screen}");
+    }
+}
+
+#[test]
+fn each_state_of_the_motor_has_its_warning() {
+    let none = TdInterlock::empty();
+    let cases = [
+        (TdMotor::TD_MOTOR_UNKNOWN, 0, "MOTOR NOT REPORTED: treat as live"),
+        (TdMotor::TD_MOTOR_LIVE, u16::MAX, "LIVE MOTOR: do not approach"),
+        (TdMotor::TD_MOTOR_BURNING, u16::MAX, "MOTOR BURNING: do not approach"),
+        (TdMotor::TD_MOTOR_HOT, 48, "MOTOR HOT: burnt out, do not touch for 48 s"),
+    ];
+    for (motor, wait_s, words) in cases {
+        let screen = ended(motor, wait_s, none).screen(80, 24);
+        assert!(screen.contains(words), "{screen}");
+    }
+    for safe in [TdMotor::TD_MOTOR_BURNT, TdMotor::TD_MOTOR_PIN_IN] {
+        let screen = ended(safe, 0, none).screen(80, 24);
+        assert!(!screen.contains("MOTOR") && !screen.contains("approach"), "{screen}");
+    }
+}
+
+/// Before a flight people work beside the vehicle.
+#[test]
+fn no_warning_while_the_vehicle_is_being_prepared() {
+    let mut rig = Rig::crewed();
+    assert!(!rig.screen(80, 24).contains("MOTOR"));
+    rig.pad_wait_s = 31;
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(0.1);
+    assert!(rig.screen(80, 24).contains("STAY OFF THE PAD for 31 s"));
+}
+
+#[test]
+fn a_hold_shows_its_reason_and_what_happens_next() {
+    let mut rig = Rig::crewed();
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(1.0);
+    rig.hold = TdHold::TD_HOLD_UPLINK_SILENT;
+    rig.run(0.2);
+    let words = "HOLD: the vehicle did not hear this station for 2 s; start anew; disarms in 42 s";
+    assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
+    assert!(rig.events().contains(words));
+    assert_eq!(rig.events().matches("HOLD").count(), 1);
+    rig.hold = TdHold::TD_HOLD_COMMANDED;
+    rig.run(0.2);
+    assert!(rig.screen(80, 24).contains("HOLD: a station asked for it; start anew"));
+    rig.hold = TdHold::TD_HOLD_NONE;
+    rig.run(0.2);
+    assert!(!rig.screen(80, 24).contains("\"HOLD: a station"));
+}
+
+/// An older vehicle does not report boot number, motor and hold.
+#[test]
+fn an_older_vehicle_counts_as_live() {
+    let mut rig = Rig::crewed();
+    rig.model = ground::model::Model::new(settings(false, true));
+    rig.heartbeat();
+    rig.hear(&protocol::dialect::MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        phase: TdPhase::TD_PHASE_PAD_IDLE,
+        ..TD_FLIGHT_STATUS_DATA::default()
+    }));
+    assert!(first_line(&rig, 80, 24).starts_with(" LIVE       system 1 boot --"));
+}

@@ -1,0 +1,354 @@
+//! A test rig: a model, a simulated clock, and a vehicle that exists only as frames.
+
+mod telemetry;
+
+use std::time::Duration;
+
+use ground::key::Key;
+use ground::model::key_timing::KeyTiming;
+use ground::model::{Model, Settings};
+use ground::update::{Action, Msg, update};
+use ground::view::theme::Theme;
+use ground::view::view;
+use protocol::command::CommandAnswer;
+use protocol::dialect::{
+    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
+    TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock, TdMotor, TdPhase,
+    TdVehicleFlag,
+};
+use protocol::frame::{Encoder, Frame};
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::text::chunks;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::buffer::Cell;
+use ratatui::style::{Color, Modifier};
+
+pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
+
+pub(crate) struct Rig {
+    pub(crate) model: Model,
+    pub(crate) now: Duration,
+    pub(crate) actions: Vec<Action>,
+    /// The state of the vehicle that its telemetry will show.
+    pub(crate) phase: TdPhase,
+    pub(crate) armed: bool,
+    pub(crate) countdown_ms: i32,
+    pub(crate) abort_effect: TdAbortEffect,
+    pub(crate) interlocks: TdInterlock,
+    pub(crate) checks_failed: u16,
+    pub(crate) pad_wait_s: u16,
+    pub(crate) boot_number: u32,
+    /// Whether both of its flags are set.
+    pub(crate) simulated: bool,
+    pub(crate) motor: TdMotor,
+    pub(crate) approach_wait_s: u16,
+    pub(crate) hold: TdHold,
+    /// Whether the vehicle sends anything at all.
+    pub(crate) speaks: bool,
+    /// Whether it reports that it hears this station.
+    pub(crate) hears: bool,
+    heard_at: Duration,
+    encoder: Encoder,
+}
+
+impl Rig {
+    pub(crate) fn new(settings: Settings) -> Self {
+        Self {
+            model: Model::new(settings),
+            now: Duration::ZERO,
+            actions: Vec::new(),
+            phase: TdPhase::TD_PHASE_PAD_IDLE,
+            armed: false,
+            countdown_ms: i32::MAX,
+            abort_effect: TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD,
+            interlocks: TdInterlock::TD_INTERLOCK_PIN_OUT,
+            checks_failed: 0,
+            pad_wait_s: 0,
+            boot_number: 0x1A2B_3C4D,
+            simulated: true,
+            motor: TdMotor::TD_MOTOR_LIVE,
+            approach_wait_s: 0,
+            hold: TdHold::TD_HOLD_NONE,
+            speaks: true,
+            hears: true,
+            heard_at: Duration::ZERO,
+            encoder: Encoder::new(VEHICLE),
+        }
+    }
+
+    /// A ground station with a crew that has heard its vehicle.
+    pub(crate) fn crewed() -> Self {
+        let mut rig = Self::new(settings(false, true));
+        rig.run(1.0);
+        rig
+    }
+
+    pub(crate) fn msg(&mut self, msg: Msg) {
+        let actions = update(&mut self.model, msg, self.now);
+        self.actions.extend(actions);
+    }
+
+    /// A key that is typed some time after the previous one.
+    pub(crate) fn key(&mut self, key: Key) {
+        self.model.key_timing = KeyTiming::default();
+        self.press(key);
+    }
+
+    /// A key at this moment.
+    pub(crate) fn press(&mut self, key: Key) {
+        self.msg(Msg::Key(key));
+    }
+
+    pub(crate) fn keys(&mut self, keys: &[Key]) {
+        for key in keys {
+            self.key(*key);
+        }
+    }
+
+    /// Ctrl-X, then Enter.
+    pub(crate) fn abort(&mut self) {
+        self.keys(&[Key::CtrlX, Key::Enter]);
+    }
+
+    /// Ctrl-X twice, then a pause that shows that it is not held.
+    pub(crate) fn abort_chord(&mut self) {
+        self.key(Key::CtrlX);
+        self.run(0.4);
+        self.key(Key::CtrlX);
+        self.run(0.2);
+    }
+
+    /// A key that is held on a terminal that does not report repeats: a press, a repeat after the keyboard's delay,
+    /// then further repeats. A tick every 10 ms.
+    pub(crate) fn hold(&mut self, key: Key, delay_ms: u64, period_ms: u64, seconds: u64) {
+        for elapsed_ms in (0..seconds * 1_000).step_by(1) {
+            let repeats = elapsed_ms >= delay_ms && (elapsed_ms - delay_ms).is_multiple_of(period_ms);
+            if elapsed_ms == 0 || repeats {
+                self.press(key);
+            }
+            if elapsed_ms.is_multiple_of(10) {
+                self.msg(Msg::Tick);
+            }
+            self.now += Duration::from_millis(1);
+        }
+    }
+
+    /// Lets time pass with ten ticks a second; the vehicle sends at its usual rates.
+    pub(crate) fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds * 10.0).round() as u64 {
+            self.now += Duration::from_millis(100);
+            if self.speaks {
+                if self.now.subsec_millis() == 0 {
+                    self.heartbeat();
+                }
+                self.flight_status();
+                if self.now.subsec_millis().is_multiple_of(500) {
+                    self.uplink();
+                }
+            }
+            self.msg(Msg::Tick);
+        }
+    }
+
+    pub(crate) fn boot_ms(&self) -> u32 {
+        u32::try_from(self.now.as_millis()).unwrap_or(u32::MAX)
+    }
+
+    pub(crate) fn hear(&mut self, message: &MavMessage) {
+        let frame = self.encoder.encode(message);
+        self.msg(Msg::Frame(frame));
+    }
+
+    pub(crate) fn hear_from(&mut self, source: Address, message: &MavMessage) {
+        let frame = Encoder::new(source).encode(message);
+        self.msg(Msg::Frame(frame));
+    }
+
+    pub(crate) fn hear_payload(&mut self, message_id: u32, payload: &[u8]) {
+        if let Some(frame) = self.encoder.encode_payload(message_id, payload) {
+            self.msg(Msg::Frame(frame));
+        }
+    }
+
+    pub(crate) fn heartbeat(&mut self) {
+        let mut base_mode = MavModeFlag::empty();
+        base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, self.armed);
+        base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated);
+        let phase = self.phase as u32;
+        self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: phase,
+            mavtype: MavType::MAV_TYPE_ROCKET,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            base_mode,
+            system_status: MavState::MAV_STATE_ACTIVE,
+            mavlink_version: 3,
+        }));
+    }
+
+    pub(crate) fn flight_status(&mut self) {
+        let status = TD_FLIGHT_STATUS_DATA {
+            time_boot_ms: self.boot_ms(),
+            countdown_ms: self.countdown_ms,
+            interlocks: self.interlocks,
+            checks_failed: TdCheck::from_bits_truncate(self.checks_failed),
+            pad_wait_s: self.pad_wait_s,
+            phase: self.phase,
+            abort_effect: self.abort_effect,
+            boot_number: self.boot_number,
+            approach_wait_s: self.approach_wait_s,
+            vehicle_flags: if self.simulated {
+                TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED
+            } else {
+                TdVehicleFlag::empty()
+            },
+            motor: self.motor,
+            abort_impact_m_s: 0,
+            hold: self.hold,
+            hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
+        };
+        self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
+    }
+
+    /// The uplink report: while the vehicle hears this station, its last frame is 0.2 s old.
+    pub(crate) fn uplink(&mut self) {
+        let fresh = self.now.saturating_sub(Duration::from_millis(200));
+        if self.hears {
+            self.heard_at = fresh;
+        }
+        let age_ms = (self.now.saturating_sub(self.heard_at)).as_millis().min(65_534) as u16;
+        self.uplink_of(GROUND, age_ms, self.armed);
+    }
+
+    pub(crate) fn uplink_of(&mut self, station: Address, accepted_age_ms: u16, commands: bool) {
+        self.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+            time_boot_ms: self.boot_ms(),
+            accepted_age_ms,
+            refused_age_ms: u16::MAX,
+            target_system: station.system_id,
+            target_component: station.component_id,
+            commands: u8::from(commands),
+            ..TD_UPLINK_DATA::default()
+        }));
+    }
+
+    pub(crate) fn answer(&mut self, command: MavCmd, result: u8) {
+        self.answer_to(GROUND, command, result);
+    }
+
+    pub(crate) fn answer_to(&mut self, target: Address, command: MavCmd, result: u8) {
+        let answer = CommandAnswer { command: command as u16, result, progress: 0, target };
+        let frame: Option<Frame> = answer.encode(&mut self.encoder);
+        if let Some(frame) = frame {
+            self.msg(Msg::Frame(frame));
+        }
+    }
+
+    pub(crate) fn text(&mut self, text: &str) {
+        for chunk in chunks(protocol::dialect::MavSeverity::MAV_SEVERITY_WARNING, text, 7) {
+            self.hear(&MavMessage::STATUSTEXT(chunk));
+        }
+    }
+
+    /// Clears the actions since the last call and returns the commands among them.
+    pub(crate) fn take_commands(&mut self) -> Vec<COMMAND_LONG_DATA> {
+        let commands = self.commands();
+        self.actions.clear();
+        commands
+    }
+
+    /// The commands sent since the last [`Self::take_commands`].
+    pub(crate) fn commands(&self) -> Vec<COMMAND_LONG_DATA> {
+        let command = |action: &Action| match action {
+            Action::Send(message) => match &**message {
+                MavMessage::COMMAND_LONG(command) => Some(command.clone()),
+                _ => None,
+            },
+            _ => None,
+        };
+        self.actions.iter().filter_map(command).collect()
+    }
+
+    pub(crate) fn wants_to_quit(&self) -> bool {
+        self.actions.contains(&Action::Quit)
+    }
+
+    pub(crate) fn events(&self) -> String {
+        self.model.events.newest(500).map(|event| event.text.as_str()).collect::<Vec<_>>().join("\n")
+    }
+
+    pub(crate) fn screen(&self, columns: u16, rows: u16) -> String {
+        let terminal = self.draw(columns, rows, MONO);
+        terminal.backend().to_string()
+    }
+
+    /// The styles of the same screen, one letter per cell, with a legend of the letters that occur. Plain cells at
+    /// the end of a line are left out.
+    pub(crate) fn styles(&self, columns: u16, rows: u16) -> String {
+        let terminal = self.draw(columns, rows, Theme { colour: true, ascii: false });
+        let cells = &terminal.backend().buffer().content;
+        let letters: Vec<String> =
+            cells.chunks(usize::from(columns)).map(|line| line.iter().map(letter).collect()).collect();
+        let legend = LEGEND.iter().filter(|(known, _)| letters.iter().any(|line| line.contains(*known)));
+        let legend = legend.map(|(letter, meaning)| format!("{letter} {meaning}"));
+        let legend = format!("\nLegend: {}", legend.collect::<Vec<_>>().join(", "));
+        let lines = letters.iter().map(|line| line.trim_end_matches('.').to_owned());
+        lines.chain([legend]).collect::<Vec<_>>().join("\n")
+    }
+
+    pub(crate) fn draw(&self, columns: u16, rows: u16, theme: Theme) -> Terminal<TestBackend> {
+        let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test terminal");
+        terminal.draw(|frame| view(&self.model, theme, self.now, frame)).expect("drawing in memory");
+        terminal
+    }
+}
+
+/// The letters of [`Rig::styles`] and what they mean.
+const LEGEND: [(char, &str); 15] = [
+    ('.', "plain"),
+    ('b', "bold"),
+    ('d', "dim"),
+    ('s', "dim italic"),
+    ('!', "reversed"),
+    ('c', "cyan"),
+    ('C', "bold cyan"),
+    ('g', "green"),
+    ('G', "bold green"),
+    ('m', "magenta"),
+    ('M', "bold magenta"),
+    ('r', "red"),
+    ('R', "bold red"),
+    ('y', "yellow"),
+    ('Y', "bold yellow"),
+];
+
+fn letter(cell: &Cell) -> char {
+    let (bold, dim) = (cell.modifier.contains(Modifier::BOLD), cell.modifier.contains(Modifier::DIM));
+    let letter = match cell.fg {
+        _ if cell.modifier.contains(Modifier::REVERSED) => '!',
+        _ if cell.modifier.contains(Modifier::ITALIC) => 's',
+        Color::Reset if bold => 'b',
+        Color::Reset if dim => 'd',
+        Color::Reset => '.',
+        Color::DarkGray => 'd',
+        other => other.to_string().to_lowercase().chars().next().unwrap_or('?'),
+    };
+    if bold && cell.fg != Color::Reset { letter.to_ascii_uppercase() } else { letter }
+}
+
+pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
+    let log_path = Some("flight.mcap".to_owned());
+    Settings { log_path, auto, interactive, ..Settings::on_screen("udpin:127.0.0.1:14550") }
+}
+
+pub(crate) fn is_arm(command: &COMMAND_LONG_DATA) -> bool {
+    command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 > 0.5
+}
+
+pub(crate) fn is_abort(command: &COMMAND_LONG_DATA) -> bool {
+    command.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION && command.param1 > 0.5
+}
+
+pub(crate) fn typed(word: &str) -> Vec<Key> {
+    word.chars().map(Key::Char).collect()
+}

@@ -1,0 +1,221 @@
+//! The telemetry of the vehicle of a rig.
+
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA, TD_DESCENT_DATA,
+    TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdChute, TdControlLevel, TdLimit, TdMotor, TdSolverStatus,
+};
+
+use super::Rig;
+
+impl Rig {
+    /// State in the plane of north and up: position, velocity and pitch.
+    pub(crate) fn state(&mut self, x: f32, altitude: f32, vx: f32, climb: f32, pitch_deg: f64) {
+        let (sin, cos) = libm::sincos(pitch_deg.to_radians() / 2.0);
+        self.attitude([cos, 0.0, sin, 0.0], [0.0, -0.005, 0.0]);
+        self.motion([x, 0.0, -altitude], [vx, 0.0, -climb]);
+    }
+
+    /// State in space: position and velocity north, east and up, and the lean with its heading.
+    pub(crate) fn state_in_space(
+        &mut self,
+        position: [f32; 3],
+        velocity: [f32; 3],
+        (heading_deg, lean_deg): (f64, f64),
+    ) {
+        // Upright is a quarter turn about east; the lean is a rotation about the horizontal axis across the heading.
+        let (sin_lean, cos_lean) = libm::sincos(lean_deg.to_radians() / 2.0);
+        let (across_north, across_east) = {
+            let (sin, cos) = libm::sincos(heading_deg.to_radians());
+            (sin * sin_lean, -cos * sin_lean)
+        };
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let (w, x, y) = (cos_lean, across_north, across_east);
+        self.attitude([half * (w - y), half * x, half * (w + y), half * x], [0.0, -0.02, 0.03]);
+        let down = |[north, east, up]: [f32; 3]| [north, east, -up];
+        self.motion(down(position), down(velocity));
+    }
+
+    fn attitude(&mut self, [q1, q2, q3, q4]: [f64; 4], [rollspeed, pitchspeed, yawspeed]: [f32; 3]) {
+        let [q1, q2, q3, q4] = [q1, q2, q3, q4].map(|part| part as f32);
+        self.hear(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+            time_boot_ms: self.boot_ms(),
+            q1,
+            q2,
+            q3,
+            q4,
+            rollspeed,
+            pitchspeed,
+            yawspeed,
+            ..Default::default()
+        }));
+    }
+
+    fn motion(&mut self, [x, y, z]: [f32; 3], [vx, vy, vz]: [f32; 3]) {
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+            time_boot_ms,
+            x,
+            y,
+            z,
+            vx,
+            vy,
+            vz,
+        }));
+    }
+
+    pub(crate) fn actuators(&mut self, gimbal_cdeg: i16) {
+        self.actuated_fins();
+        self.gimbal([(gimbal_cdeg, gimbal_cdeg / 2), (0, 0)]);
+    }
+
+    /// Commanded and measured, in the pitch and in the yaw plane.
+    pub(crate) fn gimbal(&mut self, [pitch, yaw]: [(i16, i16); 2]) {
+        self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+            time_boot_ms: self.boot_ms(),
+            pitch_commanded: pitch.0,
+            pitch_measured: pitch.1,
+            yaw_commanded: yaw.0,
+            yaw_measured: yaw.1,
+        }));
+    }
+
+    /// Every fin fully open.
+    pub(crate) fn actuated_fins(&mut self) {
+        let time_boot_ms = self.boot_ms();
+        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+            time_boot_ms,
+            commanded: [9000; 4],
+            measured: [9000, 8990, 9000, 8400],
+        }));
+    }
+
+    /// The controller level and the state of its solver.
+    pub(crate) fn controller(&mut self, level: TdControlLevel) {
+        self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+            time_boot_ms: self.boot_ms(),
+            tick: 12,
+            cost: 8465.2,
+            kkt_stationarity: 2.4e-7,
+            kkt_feasibility: 1.1e-9,
+            thrust_scale: 1.0,
+            solve_time_us: 1_234,
+            deadline_margin_us: 98_766,
+            iterations: 3,
+            level,
+            solver_status: TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
+        }));
+    }
+
+    pub(crate) fn plan(&mut self, violated: TdLimit) {
+        let time_boot_ms = self.boot_ms();
+        self.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
+        self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+            time_boot_ms,
+            time_to_go_ms: 2_300,
+            x_m: -1.4,
+            altitude_m: 0.0,
+            pitch_rad: 1.555,
+            u_m_s: -0.05,
+            w_m_s: 0.03,
+            q_rad_s: -0.008,
+            limits_violated: violated,
+        }));
+        let points: Vec<(f64, f64)> =
+            (0..12).rev().map(|k| (-1.4 + 0.1 * f64::from(k), 0.6 * f64::from(k))).collect();
+        self.path(&points);
+    }
+
+    /// A plan inside every limit along these points, north and up.
+    pub(crate) fn plan_along(&mut self, points: &[(f64, f64)]) {
+        self.plan(TdLimit::empty());
+        self.path(points);
+    }
+
+    fn path(&mut self, points: &[(f64, f64)]) {
+        let (mut x, mut altitude) = ([0; 12], [0; 12]);
+        for (place, (north, up)) in points.iter().enumerate() {
+            x[place] = (100.0 * north).round() as i16;
+            altitude[place] = (100.0 * up).round() as i16;
+        }
+        self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
+            time_boot_ms: self.boot_ms(),
+            x,
+            altitude,
+            count: points.len() as u8,
+        }));
+    }
+
+    /// A descent under fins at this height above the pad.
+    pub(crate) fn descent(&mut self, height_m: f32) {
+        self.descent_with(height_m, -21.5, TdChute::TD_CHUTE_STOWED);
+    }
+
+    /// The same with a vertical speed, up, m/s, and a state of the parachute.
+    pub(crate) fn descent_with(&mut self, height_m: f32, vertical_speed_m_s: f32, chute: TdChute) {
+        let falls_to_m = height_m - 58.0;
+        let time_to_ignition_s = if falls_to_m > 0.0 { falls_to_m / -vertical_speed_m_s } else { f32::NAN };
+        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+            time_boot_ms: self.boot_ms(),
+            height_m,
+            vertical_speed_m_s,
+            band_low_m: 48.0,
+            band_high_m: 71.5,
+            chosen_height_m: 58.0,
+            commit_height_m: 95.0,
+            time_to_ignition_s,
+            wind_x_m_s: 2.4,
+            wind_y_m_s: -1.8,
+            drag_scale: 1.042,
+            thrust_scale: 0.985,
+            touchdown_x_m: 0.8,
+            touchdown_y_m: -1.1,
+            chute,
+        }));
+    }
+
+    /// The limits of Table 2 of the landing paper.
+    pub(crate) fn limits(&mut self) {
+        self.touchdown_limits([20.0, 5.0, 0.4, 0.1, 2.0, 20.0]);
+    }
+
+    /// The limits of mk2: its landing legs, inside its fence.
+    pub(crate) fn limits_of_legs(&mut self) {
+        self.touchdown_limits([120.0, 10.0, 1.0, 0.7, 30.0, 7.0]);
+    }
+
+    fn touchdown_limits(&mut self, [x_m, pitch_deg, u_m_s, w_m_s, q_deg_s, gimbal_deg]: [f32; 6]) {
+        self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+            x_m,
+            altitude_min_m: 0.0,
+            altitude_max_m: 0.2,
+            pitch_error_rad: pitch_deg.to_radians(),
+            u_m_s,
+            w_m_s,
+            q_rad_s: q_deg_s.to_radians(),
+            gimbal_limit_rad: gimbal_deg.to_radians(),
+        }));
+    }
+
+    pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
+        self.contact([-1.428, 1.554, if landed { -0.058 } else { -1.2 }, 0.029, -0.0078], landed, violated);
+    }
+
+    /// A verdict with the values at contact: distance, pitch, speeds, rate.
+    pub(crate) fn contact(&mut self, figures: [f32; 5], landed: bool, limits_violated: TdLimit) {
+        // The motor has burnt out and is hot.
+        (self.motor, self.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 55);
+        let [x_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = figures;
+        self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+            time_boot_ms: self.boot_ms(),
+            x_m,
+            altitude_m: 0.0,
+            pitch_rad,
+            u_m_s,
+            w_m_s,
+            q_rad_s,
+            limits_violated,
+            landed: u8::from(landed),
+        }));
+    }
+}

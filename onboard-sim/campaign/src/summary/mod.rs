@@ -1,0 +1,224 @@
+//! The summary of a campaign.
+//!
+//! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
+
+mod text;
+
+pub use text::{to_markdown, to_text};
+
+use serde::Serialize;
+
+use crate::order::Manifest;
+use crate::row::{Row, column};
+use crate::statistics::{Share, quantile, rank_correlation, sorted};
+
+/// Columns whose percentiles are in the summary.
+const TOLD: [&str; 14] = [
+    "touchdown_vertical_m_s",
+    "touchdown_lateral_m_s",
+    "touchdown_tilt_deg",
+    "touchdown_rate_deg_s",
+    "leg_use",
+    "chosen_onset_height_m",
+    "onset_height_m",
+    "burn_time_at_contact_s",
+    "gimbal_saturation_share",
+    "error_vertical_m_s",
+    "error_lateral_m_s",
+    "error_height_m",
+    "error_nose_deg",
+    "flight_time_s",
+];
+
+/// A campaign's summary.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The manifest of the campaign.
+    pub manifest: Manifest,
+    /// Flights that landed within the limits of the legs.
+    pub legs: Share,
+    /// Flights that landed inside the landing paper's Table 2.
+    pub strict: Share,
+    /// Why the others did not land within the limits of the legs, the most frequent reason first.
+    pub failures: Vec<Failures>,
+    /// Ignitions while a check of the gate failed. This must be zero.
+    pub ignitions_outside_gate: u64,
+    /// Plans by control level, and the work of the solver.
+    pub plans: Plans,
+    pub distributions: Vec<Distribution>,
+    /// Drawn quantities, the one that costs most landings first.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// A reason and the number of flights with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failures {
+    pub reason: String,
+    /// The number of flights.
+    pub flights: u64,
+}
+
+/// All flights' plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Plans {
+    pub converged: u64,
+    pub best_feasible: u64,
+    /// The previous plan, shifted.
+    pub shifted: u64,
+    /// The upright law.
+    pub stabiliser: u64,
+    pub solver_iterations: u64,
+    /// Solves that did not converge.
+    pub solver_failures: u64,
+}
+
+/// Percentiles of a column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Distribution {
+    /// The column, with its unit.
+    pub column: &'static str,
+    /// Flights that have a value.
+    pub flights: u64,
+    pub least: f64,
+    /// Percentiles 5, 25, 50, 75, 95 and 99.
+    pub p5: f64,
+    /// 25th percentile.
+    pub p25: f64,
+    /// Median.
+    pub p50: f64,
+    /// 75th percentile.
+    pub p75: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    pub greatest: f64,
+}
+
+/// How many landings a drawn quantity costs.
+///
+/// A flight's deviation is the distance of its draw from the nominal value, or the draw itself where more is worse
+/// (wind, distance and motion at apogee). The median deviation divides the flights into an inner and an outer half.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The quantity, with its unit.
+    pub column: &'static str,
+    pub median_deviation: f64,
+    /// Fraction of the inner half that landed within the limits of the legs.
+    pub inner: Share,
+    /// The same fraction of the outer half.
+    pub outer: Share,
+    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' limits used at contact.
+    pub rank_correlation: f64,
+}
+
+impl Sensitivity {
+    /// How much smaller the fraction of landings is in the outer half than in the inner half.
+    pub fn cost(&self) -> f64 {
+        self.inner.share - self.outer.share
+    }
+}
+
+impl Summary {
+    /// The summary of rows in any order.
+    pub fn new(manifest: &Manifest, rows: &[Row]) -> Self {
+        let of = rows.len() as u64;
+        let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let sum = |read: fn(&Row) -> u64| rows.iter().map(read).sum();
+        Self {
+            manifest: manifest.clone(),
+            legs: Share::new(count(|row| row.legs), of),
+            strict: Share::new(count(|row| row.strict), of),
+            failures: failures(rows),
+            ignitions_outside_gate: count(|row| row.ignition_outside_gate),
+            plans: Plans {
+                converged: sum(|row| row.plans_converged),
+                best_feasible: sum(|row| row.plans_best_feasible),
+                shifted: sum(|row| row.plans_shifted),
+                stabiliser: sum(|row| row.plans_stabiliser),
+                solver_iterations: sum(|row| row.solver_iterations),
+                solver_failures: sum(|row| row.solver_failures),
+            },
+            distributions: TOLD.iter().filter_map(|name| distribution(rows, name)).collect(),
+            sensitivity: sensitivity(rows),
+        }
+    }
+}
+
+fn failures(rows: &[Row]) -> Vec<Failures> {
+    let mut found: Vec<Failures> = Vec::new();
+    for row in rows.iter().filter(|row| !row.failure.is_empty()) {
+        match found.iter_mut().find(|known| known.reason == row.failure) {
+            Some(known) => known.flights += 1,
+            None => found.push(Failures { reason: row.failure.clone(), flights: 1 }),
+        }
+    }
+    found.sort_by(|one, two| two.flights.cmp(&one.flights).then_with(|| one.reason.cmp(&two.reason)));
+    found
+}
+
+/// The numbers in a column.
+pub(crate) fn numbers<'a>(rows: &'a [Row], name: &str) -> impl Iterator<Item = f64> + use<'a> {
+    let column = column(name);
+    rows.iter().filter_map(move |row| (column?.value)(row).number())
+}
+
+fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
+    let values = sorted(numbers(rows, name));
+    let at = |share| quantile(&values, share);
+    Some(Distribution {
+        column: name,
+        flights: values.len() as u64,
+        least: at(0.0)?,
+        p5: at(0.05)?,
+        p25: at(0.25)?,
+        p50: at(0.5)?,
+        p75: at(0.75)?,
+        p95: at(0.95)?,
+        p99: at(0.99)?,
+        greatest: at(1.0)?,
+    })
+}
+
+fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
+    let mut found: Vec<Sensitivity> = Row::DRAWN
+        .iter()
+        .filter_map(|(name, nominal)| {
+            let drawn = numbers(rows, name);
+            let deviations: Vec<f64> =
+                drawn.map(|value| nominal.map_or(value, |nominal| (value - nominal).abs())).collect();
+            sensitivity_to(rows, name, &deviations)
+        })
+        .collect();
+    found.sort_by(|one, two| {
+        let cost = two.cost().total_cmp(&one.cost());
+        cost.then_with(|| two.rank_correlation.total_cmp(&one.rank_correlation))
+    });
+    found
+}
+
+/// `None` for a quantity that does not vary.
+fn sensitivity_to(rows: &[Row], name: &'static str, deviations: &[f64]) -> Option<Sensitivity> {
+    let order = sorted(deviations.iter().copied());
+    let median = quantile(&order, 0.5)?;
+    if order.first()?.to_bits() == order.last()?.to_bits() {
+        return None;
+    }
+    let half = |outer: bool| {
+        let mine =
+            || rows.iter().zip(deviations).filter(move |(_, deviation)| (**deviation > median) == outer);
+        Share::new(mine().filter(|(row, _)| row.legs).count() as u64, mine().count() as u64)
+    };
+    let pairs: Vec<(f64, f64)> = rows
+        .iter()
+        .zip(deviations)
+        .filter_map(|(row, deviation)| row.leg_use.map(|leg_use| (*deviation, leg_use)))
+        .collect();
+    Some(Sensitivity {
+        column: name,
+        median_deviation: median,
+        inner: half(false),
+        outer: half(true),
+        rank_correlation: rank_correlation(&pairs),
+    })
+}

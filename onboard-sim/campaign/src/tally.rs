@@ -1,0 +1,204 @@
+//! Flies one flight of a campaign and collects the values of its row.
+
+use flight::computer::pilot::FRAMES_PER_PLAN;
+use flight::guidance::controller::ControlLevel;
+use flight::rules::phase::Phase;
+use nmpc::SolveStatus;
+use world::{RestOutcome, Touchdown};
+
+use crate::row::Row;
+use sim::recipe::Recipe;
+use sim::sortie::{SetUpError, Sortie};
+
+/// Fraction of the gimbal's travel from which a command counts as at its stop.
+const AT_STOP_SHARE: f64 = 0.999;
+
+/// A running flight, and the values collected for its row.
+pub struct Tally {
+    number: u64,
+    flight: Sortie,
+    leg_limits: [f64; 4],
+    gimbal_limit_rad: f64,
+    ignition: Option<AtIgnition>,
+    onset: Option<(f64, f64)>,
+    plans: [u64; ControlLevel::ALL.len()],
+    solver_iterations: u64,
+    solver_failures: u64,
+    burning_frames: u64,
+    saturated_frames: u64,
+}
+
+/// The state at the ignition command.
+struct AtIgnition {
+    chosen_onset_m: Option<f64>,
+    height_m: f64,
+    outside_gate: bool,
+}
+
+impl Tally {
+    /// Flight `number` of a recipe, before its release.
+    ///
+    /// # Errors
+    /// The flight cannot be set up.
+    pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
+        let mission = &recipe.mission;
+        let legs = &mission.leg_limits;
+        Ok(Self {
+            number,
+            flight: Sortie::new(recipe, number)?,
+            leg_limits: [legs.vertical_m_s, legs.lateral_m_s, legs.tilt_deg, legs.rate_deg_s],
+            gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
+            ignition: None,
+            onset: None,
+            plans: [0; ControlLevel::ALL.len()],
+            solver_iterations: 0,
+            solver_failures: 0,
+            burning_frames: 0,
+            saturated_frames: 0,
+        })
+    }
+
+    pub fn flight(&self) -> &Sortie {
+        &self.flight
+    }
+
+    /// The flight, for a caller that asks for an abort.
+    pub fn flight_mut(&mut self) -> &mut Sortie {
+        &mut self.flight
+    }
+
+    /// Flies one frame. Returns `false` when the flight is over.
+    pub fn step(&mut self) -> bool {
+        self.flight.step();
+        self.count();
+        self.flight.goes_on()
+    }
+
+    fn count(&mut self) {
+        let (flight, world) = (&self.flight, self.flight.world());
+        let pilot = flight.pilot();
+        if self.ignition.is_none() && pilot.ignited_at_s().is_some() {
+            self.ignition = Some(AtIgnition {
+                chosen_onset_m: pilot.outlook().ignition.chosen_m,
+                height_m: world.height_m(),
+                outside_gate: pilot.gate_refusal().is_some(),
+            });
+        }
+        if self.onset.is_none() && world.thrust_n() > 0.0 {
+            self.onset = Some((world.height_m(), world.state().velocity_m_s.z));
+        }
+        let piloted = flight.computer().piloted().filter(|_| !flight.computer_is_dead());
+        let Some((_, output)) = piloted else { return };
+        if output.phase != Phase::Powered || world.touchdown().is_some() {
+            return;
+        }
+        self.burning_frames += 1;
+        let stop_rad = AT_STOP_SHARE * self.gimbal_limit_rad;
+        self.saturated_frames += u64::from(output.gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
+        if flight.frame().is_multiple_of(FRAMES_PER_PLAN) {
+            let report = pilot.report();
+            self.plans[usize::from(output.level.index())] += 1;
+            self.solver_iterations += report.iterations as u64;
+            let solved = matches!(report.status, SolveStatus::Converged | SolveStatus::NotRun);
+            self.solver_failures += u64::from(!solved);
+        }
+    }
+
+    /// The row of the flight so far.
+    pub fn row(&self) -> Row {
+        let outcome = self.flight.outcome();
+        let touchdown = outcome.touchdown.as_ref();
+        let world = self.flight.world();
+        let errors = self.flight.largest_errors();
+        let drawn = self.flight.drawn();
+        let (truth, apogee) = (&drawn.truth, &drawn.apogee);
+        let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
+        let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
+        let ignition = self.ignition.as_ref();
+        Row {
+            number: self.number,
+            impulse_scale: truth.impulse_scale,
+            burn_time_scale: truth.burn_time_scale,
+            ignition_delay_s: truth.ignition_delay_s,
+            thrust_misalignment_pitch_deg: truth.thrust_misalignment_rad[0].to_degrees(),
+            thrust_misalignment_yaw_deg: truth.thrust_misalignment_rad[1].to_degrees(),
+            mass_scale: truth.mass_scale,
+            drag_scale: truth.drag_scale,
+            cg_offset_y_m: truth.cg_offset_m[1],
+            cg_offset_z_m: truth.cg_offset_m[2],
+            wind_m_s: truth.wind_m_s,
+            wind_towards_deg: truth.wind_towards_rad.to_degrees(),
+            apogee_height_m: apogee.position_m.z,
+            apogee_distance_m: libm::hypot(apogee.position_m.x, apogee.position_m.y),
+            apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
+            apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
+            apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
+            ignited: ignition.is_some(),
+            ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
+            parachute: world.parachute_ejected(),
+            chosen_onset_height_m: ignition.and_then(|ignition| ignition.chosen_onset_m),
+            ignition_height_m: ignition.map(|ignition| ignition.height_m),
+            onset_height_m: self.onset.map(|(height_m, _)| height_m),
+            onset_vertical_m_s: self.onset.map(|(_, vertical_m_s)| vertical_m_s),
+            burn_time_at_contact_s: touchdown
+                .zip(world.thrust_begins_s())
+                .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)
+                .filter(|burning_s| *burning_s >= 0.0),
+            touchdown_time_s: at(|touchdown| touchdown.time_s),
+            touchdown_vertical_m_s: at(|touchdown| touchdown.vertical_m_s),
+            touchdown_lateral_m_s: at(|touchdown| touchdown.lateral_m_s),
+            touchdown_tilt_deg: at(|touchdown| touchdown.tilt_rad.to_degrees()),
+            touchdown_rate_deg_s: at(|touchdown| touchdown.rate_rad_s.to_degrees()),
+            touchdown_x_m: at(|touchdown| touchdown.state.position_m.x),
+            touchdown_y_m: at(|touchdown| touchdown.state.position_m.y),
+            touchdown_thrust_over_weight: at(|touchdown| touchdown.thrust_n / touchdown.weight_n),
+            leg_use: touchdown.map(|touchdown| self.leg_use(touchdown)),
+            strict: outcome.strict,
+            legs: outcome.legs,
+            failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
+            rest: outcome.rest.map_or("", rest_name).to_owned(),
+            phase: outcome.phase.name().to_owned(),
+            plans_converged: plans(ControlLevel::Converged),
+            plans_best_feasible: plans(ControlLevel::BestFeasible),
+            plans_shifted: plans(ControlLevel::ShiftedPlan),
+            plans_stabiliser: plans(ControlLevel::Stabiliser),
+            solver_iterations: self.solver_iterations,
+            solver_failures: self.solver_failures,
+            gimbal_saturation_share: self.saturated_frames as f64 / self.burning_frames.max(1) as f64,
+            error_vertical_m_s: errors.vertical_m_s,
+            error_lateral_m_s: errors.lateral_m_s,
+            error_height_m: errors.height_m,
+            error_nose_deg: errors.nose_rad.to_degrees(),
+            faults: self.flight.faults_happened(),
+            flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
+        }
+    }
+
+    fn leg_use(&self, touchdown: &Touchdown) -> f64 {
+        let found = [
+            touchdown.vertical_m_s.abs(),
+            touchdown.lateral_m_s,
+            touchdown.tilt_rad.to_degrees(),
+            touchdown.rate_rad_s.to_degrees(),
+        ];
+        found.iter().zip(&self.leg_limits).fold(0.0, |most, (found, limit)| (found / limit).max(most))
+    }
+}
+
+/// Flies a whole flight.
+///
+/// # Errors
+/// The flight cannot be set up.
+pub fn fly(recipe: &Recipe, number: u64) -> Result<Row, SetUpError> {
+    let mut tally = Tally::new(recipe, number)?;
+    while tally.step() {}
+    Ok(tally.row())
+}
+
+fn rest_name(rest: RestOutcome) -> &'static str {
+    match rest {
+        RestOutcome::Upright => "upright",
+        RestOutcome::TippedOver => "tipped over",
+        RestOutcome::BodyStrike => "body strike",
+    }
+}

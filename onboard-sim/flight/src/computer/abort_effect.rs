@@ -1,0 +1,81 @@
+//! What an abort would do now, in terms of what becomes of the vehicle.
+
+use super::{Computer, Vehicle};
+use crate::guidance::controller::ControlLevel;
+use crate::rules::phase::{Effect, Event, Phase, transition};
+
+/// What an abort would do now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AbortEffect {
+    /// Nothing is left to abort.
+    None,
+    /// Disarm and inhibit on the pad.
+    SafeOnPad,
+    /// Inhibit the landing motor, parachute at apogee.
+    ChuteAtApogee,
+    /// Inhibit the landing motor, parachute now.
+    ChuteNow,
+    /// Too low for a parachute, and the gate is open: light the landing motor and land on the ground below.
+    Burn,
+    /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing motor.
+    Impact {
+        /// Speed at the ground, rounded up, m/s.
+        m_s: u8,
+    },
+    /// The motor burns and has no cut-off: land on the ground below instead of at the pad.
+    LandHere,
+    /// The same, where no plan can be had: hold upright.
+    UprightOnly,
+}
+
+impl Computer {
+    /// The abort as it would be meant now, by what the last frame has found.
+    pub(super) fn abort_event(&self) -> Event {
+        match &self.vehicle {
+            Vehicle::Plane(plane) => plane.abort_event(&self.table, self.igniter_continuity),
+            Vehicle::Space(space) if self.release.is_some() => {
+                space.pilot.abort_event(self.table.mode(), space.last.as_ref().map(|(input, _)| input))
+            }
+            Vehicle::Space(_) => Event::AbortRequested { above_commit_height: false, gate_open: false },
+        }
+    }
+
+    /// Whether a plan to land can be had under thrust; true as long as nobody has tried.
+    fn plans_a_landing(&self) -> bool {
+        match &self.vehicle {
+            Vehicle::Plane(plane) => plane.plans_a_landing(),
+            Vehicle::Space(space) => space.pilot.report().level != ControlLevel::Stabiliser,
+        }
+    }
+
+    /// Speed at the ground after a fall from here without thrust, m/s, falling positive.
+    fn impact_m_s(&self) -> f64 {
+        match &self.vehicle {
+            Vehicle::Plane(plane) => plane.impact_m_s(),
+            Vehicle::Space(space) => space.pilot.impact_m_s().unwrap_or(0.0),
+        }
+    }
+
+    /// What an abort would do. The phase table itself is asked, so that the words beside the abort key are what it would do.
+    pub fn abort_effect(&self) -> AbortEffect {
+        let mode = self.table.mode();
+        let next = transition(mode, self.abort_event(), self.table.time_s());
+        let does = |effect| next.effects.contains(effect);
+        // To be sure, more rather than less; 254 is the most that is told, 255 would be "unknown".
+        let impact = || AbortEffect::Impact { m_s: libm::ceil(self.impact_m_s()).clamp(0.0, 254.0) as u8 };
+        match () {
+            () if next.refusal.is_some() => AbortEffect::None,
+            () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
+            () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
+            () if does(Effect::IgniteLandingMotor) => AbortEffect::Burn,
+            () if does(Effect::RecordLoss) => impact(),
+            () if next.mode.interlocks.lands_here => match () {
+                // It was commanded to light and has not.
+                () if mode.phase == Phase::Ignition && mode.interlocks.no_light_latched => impact(),
+                () if self.plans_a_landing() => AbortEffect::LandHere,
+                () => AbortEffect::UprightOnly,
+            },
+            () => AbortEffect::ChuteAtApogee,
+        }
+    }
+}

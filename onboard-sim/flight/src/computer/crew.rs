@@ -1,0 +1,117 @@
+//! What the crew may ask for by radio, and how the flight computer answers.
+
+use alloc::format;
+use alloc::string::String;
+
+use crate::rules::arming::{self, Check, Uplink};
+use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal};
+
+use super::news::Severity;
+use super::table::PhaseTable;
+
+/// What can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    Arm,
+    /// Disarm; cancels a countdown.
+    Disarm,
+    /// Start the countdown.
+    Start,
+    /// Hold the countdown.
+    Hold,
+    /// Abort, irreversibly.
+    Abort,
+}
+
+/// A request.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Request {
+    pub asked: Asked,
+    /// How well the station that asks is heard. [`Uplink::NotNeeded`] for the vehicle's own programme.
+    pub uplink: Uplink,
+    /// MAVLink system and component of the station; `None` for the vehicle's own programme.
+    pub station: Option<(u8, u8)>,
+}
+
+impl Request {
+    /// A request of the vehicle's own programme.
+    pub fn of_the_programme(asked: Asked) -> Self {
+        Self { asked, uplink: Uplink::NotNeeded, station: None }
+    }
+}
+
+/// How a request ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// Done, or already so.
+    Accepted,
+    /// Not now: the reason can be mended.
+    NotNow,
+    /// Not in this phase or state.
+    Denied,
+    /// Understood and impossible.
+    Failed,
+}
+
+/// The answer to a request, with the reason if it was not accepted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    pub ending: Ending,
+    pub reason: Option<String>,
+}
+
+impl Answer {
+    pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
+}
+
+/// Whether what is asked for is so already. A repeated request is accepted: it must not frighten the crew.
+pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
+    let locks = mode.interlocks;
+    match asked {
+        Asked::Arm => locks.armed && mode.phase == Phase::PadArmed,
+        Asked::Disarm => {
+            !locks.armed && matches!(mode.phase, Phase::PadIdle | Phase::Touchdown | Phase::Safed)
+        }
+        Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
+        Asked::Hold => mode.hold.is_some(),
+        // Repeated, an abort may mean more than the first time: the phase table decides.
+        Asked::Abort => false,
+    }
+}
+
+/// The event that a request is. `abort` is the abort as it would be meant now.
+pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: Event) -> Event {
+    match asked {
+        Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
+        Asked::Disarm => Event::DisarmRequested,
+        Asked::Start => Event::StartRequested { countdown_s },
+        Asked::Hold => Event::Hold { cause: HoldCause::Commanded },
+        Asked::Abort => abort,
+    }
+}
+
+/// The answer to a request whose event the table has refused; the crew is told why.
+pub(super) fn refused(
+    table: &mut PhaseTable,
+    asked: Asked,
+    event: Event,
+    refusal: Refusal,
+    checks: &[Check],
+) -> Answer {
+    // Its first answer may have been lost: under the parachute and on the ground, too, an abort that is latched is so.
+    let latched = asked == Asked::Abort && table.mode().interlocks.abort_latched;
+    if latched || refusal == Refusal::AlreadyAborted {
+        return Answer::ACCEPTED;
+    }
+    let reason = match refusal {
+        Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| refusal.reason()),
+        other => other.reason(),
+    };
+    let ending = match (asked, refusal) {
+        (Asked::Abort, _) => Ending::Failed,
+        (_, Refusal::ChecksFailed | Refusal::PinIn) => Ending::NotNow,
+        _ => Ending::Denied,
+    };
+    table.say(Severity::Warning, format!("{} refused: {reason}", event.name()));
+    Answer { ending, reason: Some(reason) }
+}

@@ -1,0 +1,159 @@
+//! Numbers for what the flight computer remembers: all of it, and what of it decides in the air.
+
+use super::self_test::SelfTest;
+use super::{Commands, Computer, LogState, Release, Vehicle};
+use crate::computer::memory::{Memory, Remembers, remembers};
+use crate::guidance::controller::ControllerState;
+use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
+
+/// What of the phase table decides in the air. Times of the vehicle's clock decide nothing there, nor do the pin and the
+/// arming, which a person may change on the ground.
+struct InTheAir<'a>(&'a Computer);
+
+impl Remembers for InTheAir<'_> {
+    fn remember(&self, memory: &mut Memory) {
+        let mode = self.0.mode();
+        mode.phase.index().remember(memory);
+        let Interlocks {
+            pin_out: _,
+            armed: _,
+            landing_motor_inhibited,
+            abort_latched,
+            no_light_latched,
+            lands_here,
+        } = mode.interlocks;
+        [landing_motor_inhibited, abort_latched, no_light_latched, lands_here].remember(memory);
+        stage(mode.motor).remember(memory);
+        if let Vehicle::Space(space) = &self.0.vehicle {
+            space.pilot.remember(memory);
+        }
+    }
+}
+
+fn stage(motor: Motor) -> u8 {
+    match motor {
+        Motor::Unlit => 0,
+        Motor::Commanded => 1,
+        Motor::Burning => 2,
+        Motor::BurntOut { .. } => 3,
+    }
+}
+
+remembers!(Interlocks {
+    pin_out,
+    armed,
+    landing_motor_inhibited,
+    abort_latched,
+    no_light_latched,
+    lands_here
+});
+remembers!(Hold { cause, at_s });
+remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute });
+remembers!(Release { frame, time_s });
+remembers!(LogState { running } but { space_bytes });
+
+impl Remembers for HoldCause {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+impl Remembers for SelfTest {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+impl Remembers for MotorStatus {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+impl Remembers for Motor {
+    fn remember(&self, memory: &mut Memory) {
+        stage(*self).remember(memory);
+        if let Self::BurntOut { at_s } = self {
+            at_s.remember(memory);
+        }
+    }
+}
+
+impl Remembers for Mode {
+    fn remember(&self, memory: &mut Memory) {
+        let Self { phase, interlocks, entered_at_s, countdown_end_s, hold, motor } = self;
+        phase.index().remember(memory);
+        interlocks.remember(memory);
+        (*entered_at_s, *countdown_end_s).remember(memory);
+        hold.remember(memory);
+        motor.remember(memory);
+    }
+}
+
+impl Remembers for ControllerState {
+    fn remember(&self, memory: &mut Memory) {
+        self.digest().remember(memory);
+    }
+}
+
+impl Remembers for Vehicle {
+    fn remember(&self, memory: &mut Memory) {
+        match self {
+            Self::Space(space) => space.remember(memory),
+            Self::Plane(plane) => plane.remember(memory),
+        }
+    }
+}
+
+/// Everything. Time, frame and uplink come with each input; limits and the length of the countdown never change.
+struct Whole<'a>(&'a Computer);
+
+impl Remembers for Whole<'_> {
+    fn remember(&self, memory: &mut Memory) {
+        let Computer {
+            table,
+            vehicle,
+            frame: _,
+            arming: _,
+            countdown_s: _,
+            commands,
+            self_test,
+            readiness,
+            rehearsed,
+            motor_watch,
+            log,
+            uplink: _,
+            fins_answering,
+            igniter_continuity,
+            release,
+            level,
+        } = self.0;
+        table.mode().remember(memory);
+        vehicle.remember(memory);
+        commands.remember(memory);
+        self_test.remember(memory);
+        readiness.remember(memory);
+        rehearsed.is_some().remember(memory);
+        motor_watch.remember(memory);
+        log.remember(memory);
+        fins_answering.remember(memory);
+        igniter_continuity.remember(memory);
+        release.remember(memory);
+        level.index().remember(memory);
+    }
+}
+
+impl Computer {
+    /// A number that differs whenever anything differs that the computer remembers, from power-up on.
+    pub fn digest(&self) -> u64 {
+        Memory::digest_of(&Whole(self))
+    }
+
+    /// A number that differs whenever what decides in the air differs, to compare a replay with a log.
+    ///
+    /// What the mission says is not remembered but known, and the room that a solve works in holds nothing that the next
+    /// one reads.
+    pub fn flight_digest(&self) -> u64 {
+        Memory::digest_of(&InTheAir(self))
+    }
+}

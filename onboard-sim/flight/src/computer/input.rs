@@ -1,0 +1,105 @@
+//! What a frame of the flight computer depends on besides what it remembers.
+
+use alloc::string::String;
+
+use super::crew::{Asked, Request};
+use super::pilot::{PilotInput, Sensed};
+use super::plane::PlaneSensed;
+use crate::rules::arming::{PredictedLanding, Uplink};
+
+/// How the log fares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogState {
+    /// The log is being written, or the operator chose to fly without one.
+    pub running: bool,
+    /// Free space for it, bytes.
+    pub space_bytes: u64,
+}
+
+impl LogState {
+    /// No log yet.
+    pub const NONE: Self = Self { running: false, space_bytes: 0 };
+}
+
+/// What a rehearsal of the landing came to. Whoever simulates the flight computer rehearses: it takes a world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rehearsed {
+    /// It found plans, and landed within what the legs take.
+    pub warm: bool,
+    /// In words.
+    pub found: String,
+    /// Its touchdown; `None` if it did not come down.
+    pub landing: Option<PredictedLanding>,
+}
+
+/// What the sensors say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "plain data, one a frame")]
+pub enum Feeling {
+    /// Of a rocket in space.
+    InSpace(Sensed),
+    /// Of the planar vehicle.
+    InPlane(PlaneSensed),
+}
+
+/// The station that armed the vehicle, and how long ago it was last heard, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Commander {
+    /// MAVLink system and component.
+    pub station: (u8, u8),
+    pub age_s: f64,
+}
+
+/// Everything that a frame depends on besides what the computer remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Input<'a> {
+    /// Number of the frame since power-up.
+    pub frame: u64,
+    /// Vehicle time at its end, s.
+    pub time_s: f64,
+    pub feeling: Feeling,
+    /// Where the gimbal is (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Where the fins are, rad.
+    pub fins_rad: [f64; 4],
+    /// A foot touches the ground.
+    pub contact: bool,
+    pub igniter_continuity: bool,
+    pub pin_out: bool,
+    pub log: LogState,
+    /// How well the station is heard that is heard best.
+    pub uplink: Uplink,
+    /// The station that armed the vehicle, if one did.
+    pub commander: Option<Commander>,
+    /// What was asked for since the last frame, in order.
+    pub requests: &'a [Request],
+    /// What the rehearsal came to, once it is over. The planar vehicle rehearses on board.
+    pub rehearsed: Option<&'a Rehearsed>,
+    /// The planar vehicle's last tick came too late to be applied.
+    pub late: bool,
+}
+
+impl<'a> Input<'a> {
+    /// A frame in the air of a computer that was [released at once](Computer::released), by what a pilot's log holds of it:
+    /// nobody watches, and a recorded abort is asked for.
+    pub fn in_the_air(input: &PilotInput) -> Self {
+        const ABORT: [Request; 1] =
+            [Request { asked: Asked::Abort, uplink: Uplink::NotNeeded, station: None }];
+        Self {
+            frame: input.frame,
+            time_s: input.time_s,
+            feeling: Feeling::InSpace(input.sensed),
+            gimbal_rad: [0.0; 2],
+            fins_rad: input.fins_rad,
+            contact: input.contact,
+            igniter_continuity: input.igniter_continuity,
+            pin_out: true,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            requests: if input.abort { &ABORT } else { &[] },
+            rehearsed: None,
+            late: false,
+        }
+    }
+}

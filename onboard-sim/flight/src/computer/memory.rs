@@ -1,0 +1,171 @@
+//! A number for what a flight computer remembers, by bits.
+//!
+//! Everything that decides the future goes in, in a fixed order; what cannot, stays out by name: constants of the
+//! mission, and room that is written before it is read. [`remembers!`] takes a type apart field by field, so a field
+//! that is added to it and named on neither side does not compile.
+
+use alloc::vec::Vec;
+
+use core::hash::Hasher as _;
+
+use nalgebra::{ArrayStorage, Const, Matrix, UnitQuaternion};
+use twox_hash::XxHash64;
+
+/// The hash that is being taken: XXH64, of words in little-endian order.
+pub(crate) struct Memory(XxHash64);
+
+impl Memory {
+    pub(crate) fn digest_of(remembered: &impl Remembers) -> u64 {
+        let mut memory = Self(XxHash64::with_seed(0));
+        remembered.remember(&mut memory);
+        memory.0.finish()
+    }
+
+    fn word(&mut self, word: u64) {
+        self.0.write(&word.to_le_bytes());
+    }
+}
+
+/// What has a memory that decides the future.
+pub(crate) trait Remembers {
+    /// Puts all of it into the hash.
+    fn remember(&self, memory: &mut Memory);
+}
+
+impl Remembers for f64 {
+    fn remember(&self, memory: &mut Memory) {
+        memory.word(self.to_bits());
+    }
+}
+
+macro_rules! whole_numbers {
+    ($($number:ty),*) => {
+        $(impl Remembers for $number {
+            fn remember(&self, memory: &mut Memory) {
+                memory.word(u64::from(*self));
+            }
+        })*
+    };
+}
+whole_numbers!(bool, u8, u32, u64);
+
+impl Remembers for usize {
+    fn remember(&self, memory: &mut Memory) {
+        memory.word(*self as u64);
+    }
+}
+
+/// A list is its length and its elements, so that two lists in a row cannot trade places.
+impl<T: Remembers> Remembers for [T] {
+    fn remember(&self, memory: &mut Memory) {
+        self.len().remember(memory);
+        for element in self {
+            element.remember(memory);
+        }
+    }
+}
+
+impl<T: Remembers> Remembers for Vec<T> {
+    fn remember(&self, memory: &mut Memory) {
+        self.as_slice().remember(memory);
+    }
+}
+
+impl<T: Remembers, const LENGTH: usize> Remembers for [T; LENGTH] {
+    fn remember(&self, memory: &mut Memory) {
+        for element in self {
+            element.remember(memory);
+        }
+    }
+}
+
+impl<T: Remembers> Remembers for Option<T> {
+    fn remember(&self, memory: &mut Memory) {
+        self.is_some().remember(memory);
+        if let Some(value) = self {
+            value.remember(memory);
+        }
+    }
+}
+
+impl<A: Remembers, B: Remembers> Remembers for (A, B) {
+    fn remember(&self, memory: &mut Memory) {
+        self.0.remember(memory);
+        self.1.remember(memory);
+    }
+}
+
+impl Remembers for &str {
+    fn remember(&self, memory: &mut Memory) {
+        self.len().remember(memory);
+        memory.0.write(self.as_bytes());
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Remembers
+    for Matrix<f64, Const<ROWS>, Const<COLUMNS>, ArrayStorage<f64, ROWS, COLUMNS>>
+{
+    fn remember(&self, memory: &mut Memory) {
+        for number in self.iter() {
+            number.remember(memory);
+        }
+    }
+}
+
+impl Remembers for UnitQuaternion<f64> {
+    fn remember(&self, memory: &mut Memory) {
+        self.coords.remember(memory);
+    }
+}
+
+/// [`Remembers`] for a struct: the fields it remembers, and behind `but` those that decide nothing or never change.
+macro_rules! remembers {
+    ($type:ty { $($field:ident),* $(,)? } $(but { $($left_out:ident),* $(,)? })?) => {
+        impl $crate::computer::memory::Remembers for $type {
+            fn remember(&self, memory: &mut $crate::computer::memory::Memory) {
+                let Self { $($field,)* $($($left_out: _,)*)? } = self;
+                $($crate::computer::memory::Remembers::remember($field, memory);)*
+            }
+        }
+    };
+}
+pub(crate) use remembers;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Sample {
+        numbers: Vec<f64>,
+        more: Vec<f64>,
+        maybe: Option<u32>,
+        constant: f64,
+    }
+    remembers!(Sample { numbers, more, maybe } but { constant });
+
+    fn sample() -> Sample {
+        Sample { numbers: vec![1.0, 0.0], more: vec![2.0], maybe: None, constant: 1.0 }
+    }
+
+    #[test]
+    fn every_bit_that_is_remembered_tells() {
+        let digest = Memory::digest_of(&sample());
+        let other_constant = Sample { constant: sample().constant + 6.0, ..sample() };
+        assert_eq!(Memory::digest_of(&other_constant), digest);
+        let others = [
+            Sample { numbers: vec![1.0, -0.0], ..sample() },
+            Sample { numbers: vec![f64::from_bits(1.0_f64.to_bits() + 1), 0.0], ..sample() },
+            Sample { numbers: vec![1.0], more: vec![0.0, 2.0], ..sample() },
+            Sample { maybe: Some(0), ..sample() },
+        ];
+        for other in others {
+            assert_ne!(Memory::digest_of(&other), digest);
+        }
+    }
+
+    /// The published value of XXH64 for no input and seed 0.
+    #[test]
+    fn val_xxh64_of_nothing() {
+        assert_eq!(Memory(XxHash64::with_seed(0)).0.finish(), 0xef46_db37_51d8_e999);
+    }
+}

@@ -1,0 +1,351 @@
+//! The flight computer: everything that decides on board, from power-up to safed.
+//!
+//! [`Computer::step`] is the only way forward: one [`Input`] a frame, one [`Output`] back, and the same inputs give the same
+//! outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing are all decided here,
+//! through one [phase table](crate::rules::phase).
+//!
+//! * [`table`]: the phase table as the computer uses it: each event is put to it once.
+//! * [`crew`], `requests`: what a crew may ask for, and how it is decided.
+//! * [`news`], `motor_watch`: what the computer tells.
+//! * [`pad`], `self_test`, `readiness`, `on_the_pad`: from power-up to the release.
+//! * [`pilot`]: what flies a rocket in space from its release.
+//! * [`plane`]: the landing paper's planar vehicle.
+//! * `start`: power-up, and going on from elsewhere.
+//! * `abort_effect`: what an abort would do now.
+//! * `memory`, `digest`: one number for what is remembered, to compare a replay with a log.
+
+mod abort_effect;
+pub mod crew;
+mod digest;
+mod input;
+pub(crate) mod memory;
+mod motor_watch;
+pub mod news;
+mod on_the_pad;
+mod output;
+pub mod pad;
+pub mod pilot;
+pub mod plane;
+mod readiness;
+mod requests;
+mod self_test;
+mod space;
+mod start;
+pub mod table;
+
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::vec::Vec;
+
+pub use self::abort_effect::AbortEffect;
+use self::crew::Answer;
+pub use self::input::{Commander, Feeling, Input, LogState, Rehearsed};
+use self::motor_watch::MotorWatch;
+use self::news::{Readiness, Severity};
+pub use self::output::{Commands, Output};
+use self::plane::{PlanarTick, Plane};
+use self::self_test::{ANSWERING_RAD, SelfTest};
+use self::space::Space;
+use self::table::PhaseTable;
+use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
+use crate::guidance::controller::ControlLevel;
+use crate::guidance::powered::LandingSolved;
+use crate::rules::arming::Uplink;
+use crate::rules::phase::{Event, HOLD_LIMIT_S, Mode, Motor, Phase};
+use crate::vehicle::profile::ArmingLimits;
+
+/// Length of a frame of a rocket in space, ms.
+pub const FRAME_MS: u32 = 5;
+/// The same, s.
+pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
+/// Time on the ground after which the flight is over, s.
+pub const AT_REST_S: f64 = 1.0;
+
+/// When the vehicle was let go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Release {
+    frame: u64,
+    time_s: f64,
+}
+
+/// The vehicle that is flown.
+#[derive(Debug, Clone)]
+enum Vehicle {
+    Space(Box<Space>),
+    Plane(Box<Plane>),
+}
+
+/// The flight computer and everything that it remembers.
+#[derive(Debug, Clone)]
+pub struct Computer {
+    table: PhaseTable,
+    vehicle: Vehicle,
+    frame: u64,
+    arming: ArmingLimits,
+    countdown_s: f64,
+    commands: Commands,
+    self_test: SelfTest,
+    readiness: Readiness,
+    rehearsed: Option<Rehearsed>,
+    motor_watch: MotorWatch,
+    log: LogState,
+    uplink: Uplink,
+    fins_answering: [bool; 4],
+    igniter_continuity: bool,
+    release: Option<Release>,
+    level: ControlLevel,
+}
+
+impl Computer {
+    /// One frame.
+    pub fn step(&mut self, input: &Input<'_>) -> Output {
+        self.frame = input.frame;
+        self.table.begin(input.time_s);
+        self.take_note(input);
+        self.feel(input);
+        let asked: Vec<Option<Answer>> = input.requests.iter().map(|request| self.answer(request)).collect();
+        self.watch_the_commander(input);
+        let abort = asked.iter().any(Option::is_none);
+        let mut output = self.decide(input, abort);
+        self.keep_time();
+        output.answers =
+            asked.into_iter().map(|answer| answer.unwrap_or_else(|| self.abort_answer())).collect();
+        output.news = self.table.take_news();
+        output
+    }
+
+    /// One frame, and the landing that a rocket's pilot plans in it, solved alone; none if it plans none.
+    pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
+        let before = self.pilot().cloned();
+        let output = self.step(input);
+        let solved = match (&before, &self.vehicle) {
+            (Some(before), Vehicle::Space(space)) => space
+                .last
+                .as_ref()
+                .and_then(|(input, _)| space.pilot.landing_planned(before, self.table.mode(), input)),
+            _ => None,
+        };
+        (output, solved)
+    }
+
+    /// Switches, log and actuators, as they are found.
+    fn take_note(&mut self, input: &Input<'_>) {
+        let pin_out = self.table.mode().interlocks.pin_out;
+        if input.pin_out != pin_out {
+            // Refused in the air, where nobody can move it.
+            let _ = self.table.happen(if input.pin_out { Event::PinPulled } else { Event::PinInserted });
+        }
+        if self.log.running && !input.log.running {
+            let words = "the log has stopped: this flight is no longer recorded whole";
+            self.table.say(Severity::Error, words.into());
+        }
+        self.log = input.log;
+        self.uplink = input.uplink;
+        self.igniter_continuity = input.igniter_continuity;
+        let told = self.commands.fins_rad;
+        self.fins_answering =
+            core::array::from_fn(|fin| (told[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);
+        if self.rehearsed.is_none() {
+            self.rehearsed = input.rehearsed.cloned();
+        }
+    }
+
+    fn feel(&mut self, input: &Input<'_>) {
+        let on_pad = self.table.mode().phase.on_pad();
+        match (&mut self.vehicle, &input.feeling) {
+            (Vehicle::Space(space), Feeling::InSpace(sensed)) if on_pad => space.pad.feel(sensed),
+            (Vehicle::Plane(plane), Feeling::InPlane(sensed)) => {
+                plane.feel(&mut self.table, sensed, input);
+            }
+            _ => {}
+        }
+    }
+
+    fn happen(&mut self, event: Event) -> Result<(), crate::rules::phase::Refusal> {
+        let effects = self.table.happen(event)?;
+        if let Vehicle::Plane(plane) = &mut self.vehicle {
+            plane.carry_out(effects, self.frame);
+        }
+        Ok(())
+    }
+
+    fn decide(&mut self, input: &Input<'_>, abort: bool) -> Output {
+        let released_before = self.release.is_some();
+        let (mut tick, mut planned) = (None, false);
+        if matches!(self.vehicle, Vehicle::Plane(_)) {
+            tick = self.sample(input);
+            planned = tick.is_some();
+        } else if released_before {
+            planned = self.fly(input, abort);
+        } else {
+            self.wait_on_the_pad(input);
+        }
+        let mode = self.table.mode();
+        self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;
+        self.commands.parachute = mode.phase == Phase::Chute;
+        Output {
+            commands: self.commands,
+            released: !released_before && self.release.is_some(),
+            answers: Vec::new(),
+            news: Vec::new(),
+            planned,
+            tick,
+        }
+    }
+
+    /// A sample of the planar vehicle, if one falls into this frame.
+    fn sample(&mut self, input: &Input<'_>) -> Option<Box<PlanarTick>> {
+        let on_sample = matches!(&self.vehicle, Vehicle::Plane(plane) if plane.is_on_sample(input.frame));
+        if !on_sample {
+            return None;
+        }
+        if self.table.mode().phase == Phase::Safe {
+            self.test_itself(input, true);
+        } else if let Vehicle::Plane(plane) = &mut self.vehicle {
+            plane.apply(input.late);
+            let (gimbal_rad, fins_rad) = plane.told;
+            self.commands = Commands { gimbal_rad: [gimbal_rad, 0.0], fins_rad, ..self.commands };
+        }
+        if self.countdown_is_over() {
+            self.let_go();
+        }
+        let over = self.is_over();
+        let Vehicle::Plane(plane) = &mut self.vehicle else { return None };
+        let due = !over && plane.controller_is_due(self.table.mode().phase, input.frame);
+        let tick = due.then(|| plane.run_controller(&mut self.table, input));
+        if due {
+            self.complain_of_readiness();
+        }
+        // After the controller: the gate judges a plan from where the vehicle is now, not a rehearsal.
+        if let (Vehicle::Plane(plane), Phase::LandArmed) = (&mut self.vehicle, self.table.mode().phase) {
+            plane.consider_ignition(&mut self.table, input);
+        }
+        tick
+    }
+
+    /// A rocket in the air, or on the ground after its flight. Returns whether it planned.
+    fn fly(&mut self, input: &Input<'_>, abort: bool) -> bool {
+        let (Vehicle::Space(space), Feeling::InSpace(sensed), Some(release)) =
+            (&mut self.vehicle, input.feeling, self.release)
+        else {
+            return false;
+        };
+        let frame = input.frame.saturating_sub(release.frame);
+        let input = PilotInput {
+            frame,
+            time_s: flight_time_s(frame),
+            sensed,
+            fins_rad: input.fins_rad,
+            contact: input.contact,
+            igniter_continuity: input.igniter_continuity,
+            abort,
+        };
+        let PilotOutput { gimbal_rad, fins_rad, level, .. } = space.fly(&mut self.table, input);
+        self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
+        let phase = self.table.mode().phase;
+        if phase.in_landing_burn() && level != self.level {
+            self.table.say(Severity::Notice, format!("controller level {}", level.name()));
+        }
+        self.level = level;
+        (phase.in_descent() || phase.in_landing_burn())
+            && frame.is_multiple_of(crate::computer::pilot::FRAMES_PER_PLAN)
+    }
+
+    /// What time alone brings about, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
+    fn keep_time(&mut self) {
+        let (mode, time_s) = (*self.table.mode(), self.table.time_s());
+        if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
+            let words = format!("held for {HOLD_LIMIT_S} s without a new start");
+            self.table.say(Severity::Warning, words);
+            let _ = self.table.happen(Event::HoldElapsed);
+        }
+        if mode.phase == Phase::Touchdown && self.is_over() {
+            if mode.interlocks.armed {
+                let _ = self.table.happen(Event::DisarmRequested);
+            }
+            if mode.may_be_safed(time_s).is_ok() {
+                let _ = self.table.happen(Event::SafingDone);
+            }
+        }
+        if let Some((severity, words)) = self.motor_watch.news(&mode, time_s) {
+            self.table.say(severity, words);
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn into_table(self) -> PhaseTable {
+        self.table
+    }
+
+    /// Number of the last frame.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// Phase, latches, countdown and motor.
+    pub fn mode(&self) -> &Mode {
+        self.table.mode()
+    }
+
+    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED may come much later, or
+    /// never: that is a matter of its motor.
+    pub fn is_over(&self) -> bool {
+        let mode = self.table.mode();
+        let in_phase_s = self.table.time_s() - mode.entered_at_s;
+        match mode.phase {
+            Phase::Touchdown => in_phase_s >= AT_REST_S && mode.motor != Motor::Burning,
+            Phase::Safed => true,
+            phase => phase.on_pad() && mode.interlocks.abort_latched,
+        }
+    }
+
+    /// The pilot of a rocket in space.
+    pub fn pilot(&self) -> Option<&Pilot> {
+        match &self.vehicle {
+            Vehicle::Space(space) => Some(&space.pilot),
+            Vehicle::Plane(_) => None,
+        }
+    }
+
+    /// The planar vehicle's part.
+    pub fn plane(&self) -> Option<&Plane> {
+        match &self.vehicle {
+            Vehicle::Space(_) => None,
+            Vehicle::Plane(plane) => Some(plane),
+        }
+    }
+
+    /// The last frame of the pilot: what it was given and what it decided.
+    pub fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
+        match &self.vehicle {
+            Vehicle::Space(space) => space.last.as_ref().map(|(input, output)| (input, output)),
+            Vehicle::Plane(_) => None,
+        }
+    }
+
+    /// Vehicle time of the release, s.
+    pub fn released_at_s(&self) -> Option<f64> {
+        self.release.map(|release| release.time_s)
+    }
+
+    /// What the actuators were told last.
+    pub fn commands(&self) -> &Commands {
+        &self.commands
+    }
+
+    /// What the rehearsal came to, once it is over.
+    pub fn rehearsed(&self) -> Option<&Rehearsed> {
+        self.rehearsed.as_ref()
+    }
+
+    /// Length of the countdown, s.
+    pub fn countdown_s(&self) -> f64 {
+        self.countdown_s
+    }
+}
+
+/// Time since its release at the end of a frame, s.
+pub fn flight_time_s(frame: u64) -> f64 {
+    // A recorded frame may have any number.
+    frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3
+}

@@ -1,0 +1,37 @@
+//! What a frame of the flight computer decides.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::crew::Answer;
+use super::news::News;
+use super::plane::PlanarTick;
+
+/// What the actuators are told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Commands {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Opening angles of the fins, rad.
+    pub fins_rad: [f64; 4],
+    /// Current through the landing motor's igniter.
+    pub ignite: bool,
+    /// The parachute is thrown out.
+    pub parachute: bool,
+}
+
+/// What a frame decides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    pub commands: Commands,
+    /// The countdown has ended in this frame: the simulation lets the vehicle go where its flight begins.
+    pub released: bool,
+    /// An answer to each request, in order.
+    pub answers: Vec<Answer>,
+    /// What has happened, in order.
+    pub news: Vec<News>,
+    /// A plan or a tick of the landing controller was made.
+    pub planned: bool,
+    /// The planar vehicle's tick, if one fell into this frame.
+    pub tick: Option<Box<PlanarTick>>,
+}

@@ -1,0 +1,77 @@
+//! What a plan assumes of motor and fins.
+//!
+//! What turns out to be too much thrust can be thrown away late, what is missing cannot be had: a plan is made for a
+//! motor that is weaker than estimated, by as many standard deviations as the mission is cautious. But not for one that
+//! could not be landed any more: its plan would lie across the air to brake, and lose the landing of all others. So of
+//! the weaker motors the weakest is taken that still lands from here. The fins are assumed as that motor would have
+//! them, for they follow what is learnt of it.
+//!
+//! High in the band of feasible heights a plan for a weak motor that ends hard means something else: that it has not
+//! found how to sink faster. There the motor as estimated is tried as well, because braking upright, which helps a
+//! vehicle that is too low, would make this one hover.
+
+use super::known::{Burning, Known};
+use crate::estimation::estimator::Estimate;
+use crate::guidance::powered::PoweredSituation;
+use crate::guidance::vertical::{Band, share_for};
+use crate::vehicle::burn::Burn;
+
+/// Steps from the whole caution to none.
+const CAUTION_STEPS: u32 = 3;
+
+/// Above this place in the band the motor as estimated is tried as well.
+const HIGH_PLACE: f64 = 0.5;
+
+/// A motor, and how far open its fins would be on average until touchdown, 0 to 1.
+struct Assumed<'a> {
+    burn: Burn<'a>,
+    fin_share: f64,
+}
+
+impl Known {
+    /// What to plan with: first the situation to be preferred, and the one to fall back on if its plan ends hard.
+    pub(super) fn situations_to_plan<'a>(
+        &'a self,
+        estimate: &Estimate,
+        burning: &Burning,
+        fins_rad: &[f64; 4],
+    ) -> (PoweredSituation<'a>, Option<PoweredSituation<'a>>) {
+        let column = self.column(burning.density_kg_m3, self.mission.fin_soft_tilt_deg);
+        let height_m = estimate.state.position_m.z - self.feet_below_cg_m(&burning.mass);
+        let band = |burn: &Burn<'_>| column.band(burn, burning.burning_s, estimate.state.velocity_m_s.z);
+        let fin_share = |band: Option<Band>| {
+            band.map_or(0.5, |band| share_for(self.mission.fin_place, band.place(height_m)))
+        };
+        let situation = |assumed: Assumed<'a>| {
+            let kept = self.mission.fins_kept;
+            let fin_drag_area_m2 = kept * self.fin_drag_area_m2(fins_rad)
+                + (1.0 - kept) * assumed.fin_share * self.largest_fin_drag_area_m2();
+            self.powered_situation(estimate, burning, assumed.burn, fin_drag_area_m2)
+        };
+
+        let estimated = self.burn();
+        let estimated_band = band(&estimated);
+        let caution_sigmas = self.caution_sigmas(burning.burning_s);
+        // Without caution the motor as estimated is all there is to try.
+        let steps = if caution_sigmas > 0.0 { CAUTION_STEPS } else { 0 };
+        let weaker = (0..steps).find_map(|step| {
+            let share = 1.0 - f64::from(step) / f64::from(CAUTION_STEPS);
+            let burn = self.doubted_burn(burning.burning_s, -caution_sigmas * share);
+            let found = band(&burn).filter(|band| band.place(height_m) >= 0.0)?;
+            Some(Assumed { burn, fin_share: fin_share(Some(found)) })
+        });
+        let as_estimated = || Assumed { burn: estimated, fin_share: fin_share(estimated_band) };
+        let high = estimated_band.is_some_and(|band| band.place(height_m) > HIGH_PLACE);
+        let fallback = (high && weaker.is_some()).then(as_estimated).map(situation);
+        (situation(weaker.unwrap_or_else(as_estimated)), fallback)
+    }
+
+    /// Standard deviations that a plan takes the motor to be weaker than estimated: all the mission's caution early,
+    /// none in the last moments, when nothing can be thrown away any more.
+    fn caution_sigmas(&self, burning_s: f64) -> f64 {
+        let carried_until_s =
+            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
+        self.mission.caution_sigmas * (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0)
+    }
+}

@@ -1,0 +1,139 @@
+//! What the pilot knows of its vehicle, and has learnt of motor and drag.
+
+use crate::estimation::estimator::Estimate;
+use crate::estimation::motor_estimate::MotorEstimate;
+use crate::guidance::powered::PoweredSituation;
+use crate::guidance::vertical::{Braking, Column};
+use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
+use crate::vehicle::burn::Burn;
+use crate::vehicle::mission::Mission;
+
+/// The vehicle as the pilot knows it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Known {
+    pub(super) mission: Mission,
+    pub(super) mass: MassModel,
+    /// Motor and scale of the air's forces, as felt.
+    pub(super) motor: MotorEstimate,
+}
+
+/// The burning vehicle of a frame.
+#[expect(clippy::struct_field_names, reason = "the time since thrust began is called that everywhere")]
+pub(super) struct Burning {
+    pub(super) burning_s: f64,
+    pub(super) mass: MassProperties,
+    pub(super) density_kg_m3: f64,
+    /// After an abort: on the ground below, wherever the pad is.
+    pub(super) lands_here: bool,
+}
+
+impl Known {
+    pub(super) fn airframe(&self) -> &Airframe {
+        &self.mission.airframe
+    }
+
+    pub(super) fn crossflow_area_m2(&self) -> f64 {
+        let body = &self.airframe().body;
+        body.crossflow_drag_coefficient * body.length_m * body.diameter_m
+    }
+
+    pub(super) fn body_drag_area_m2(&self) -> f64 {
+        self.airframe().drag_area_m2(0.0)
+    }
+
+    pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
+        let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
+        each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+    }
+
+    pub(super) fn largest_fin_drag_area_m2(&self) -> f64 {
+        self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
+    }
+
+    /// Time since the landing motor's thrust began, s.
+    pub(super) fn burning_s(&self, time_s: f64) -> Option<f64> {
+        self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
+    }
+
+    /// Whether the motor has burnt as long as it does: also one that went out early is not called burnt out before.
+    pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
+        let whole_s = self.motor.burn_time_stretch() * self.mission.motor_curve.burn_time_s();
+        self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
+    }
+
+    pub(super) fn mass_now(&self, burning_s: Option<f64>) -> MassProperties {
+        self.mass.at(burning_s.map_or(0.0, |burning_s| self.burn().burnt_kg(burning_s)))
+    }
+
+    pub(super) fn burn(&self) -> Burn<'_> {
+        Burn {
+            curve: &self.mission.motor_curve,
+            impulse_scale: self.motor.impulse_scale(),
+            time_scale: self.motor.burn_time_stretch(),
+        }
+    }
+
+    /// The motor that is so many standard deviations weaker (below zero) or stronger than expected in what it has yet
+    /// to give until its thrust falls through the weight. What is measured tells thrust, not how long it lasts: while
+    /// that is so, the weaker motor burns out sooner.
+    pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
+        let burn = self.burn();
+        let carried_until_s =
+            burn.falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let Some(until_s) = carried_until_s.filter(|until_s| *until_s > burning_s) else { return burn };
+        let to_come_n_s = burn.mean_thrust_n(burning_s, until_s - burning_s) * (until_s - burning_s);
+        let derivatives = [
+            to_come_n_s / burn.impulse_scale,
+            (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
+        ];
+        let [impulse_scale, time_scale] = self.motor.doubted(derivatives, sigmas);
+        Burn { impulse_scale, time_scale, ..burn }
+    }
+
+    pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {
+        let mission = &self.mission;
+        let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;
+        Column {
+            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
+            gravity_m_s2: mission.gravity_m_s2,
+            air_density_kg_m3: density_kg_m3,
+            body_drag_area_m2: scaled(self.body_drag_area_m2()),
+            crossflow_area_m2: self.crossflow_area_m2(),
+            soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
+            hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
+            touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
+            latest_after_s: mission.powered.latest_after_s,
+            settle_s: mission.settle_s,
+        }
+    }
+
+    pub(super) fn feet_below_cg_m(&self, mass: &MassProperties) -> f64 {
+        self.airframe().above_feet_m(mass.cg_station_m)
+    }
+
+    /// The burning vehicle with a motor, and with its fins this far open as certified.
+    pub(super) fn powered_situation<'a>(
+        &'a self,
+        estimate: &Estimate,
+        situation: &Burning,
+        burn: Burn<'a>,
+        fin_drag_area_m2: f64,
+    ) -> PoweredSituation<'a> {
+        PoweredSituation {
+            burn,
+            burning_s: situation.burning_s,
+            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
+            inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
+            arm_m: situation.mass.cg_station_m,
+            feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
+            gravity_m_s2: self.mission.gravity_m_s2,
+            air_density_kg_m3: situation.density_kg_m3,
+            wind_m_s: estimate.wind_m_s.push(0.0),
+            body_drag_area_m2: self.motor.air_scale() * self.body_drag_area_m2(),
+            crossflow_area_m2: self.crossflow_area_m2(),
+            fin_drag_area_m2: self.motor.air_scale() * fin_drag_area_m2,
+            gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
+            lands_here: situation.lands_here,
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! What flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
+//!
+//! It is a part of the [flight computer](crate::computer) and deterministic as that is. A frame is 5 ms: estimate, watch the
+//! motor, move through the phases, point fins and gimbal. Every tenth frame the outlook and the landing are planned.
+
+mod assumed;
+mod digest;
+mod fin_watch;
+mod hopeless;
+mod inspect;
+mod known;
+mod outlook;
+mod restart;
+#[cfg(test)]
+mod sample;
+mod step;
+
+use fin_watch::FinWatch;
+use known::Known;
+pub use outlook::{Outlook, touchdown_m};
+
+use crate::control::aim::AimLoop;
+use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
+use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
+use crate::guidance::baseline::{Baseline, Law};
+use crate::guidance::controller::ControlLevel;
+use crate::guidance::powered::{PoweredGuidance, PoweredReport};
+use crate::rules::phase::Phase;
+use crate::vehicle::airframe::MassModel;
+use crate::vehicle::mission::Mission;
+use crate::vehicle::rigid::RigidState;
+use crate::vehicle::thrust_curve::ThrustCurve;
+
+/// Frames between plans.
+pub const FRAMES_PER_PLAN: u64 = 10;
+
+/// What the flight computer knows of its motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "plain data, one a frame, so that a log of it is whole")]
+pub enum Sensed {
+    /// Sensors, through the estimator.
+    Measured(Measurements),
+    /// The truth as the estimate: for studies of guidance alone.
+    Known(Estimate),
+}
+
+/// Everything a frame depends on besides the pilot's memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PilotInput {
+    /// Number of the frame.
+    pub frame: u64,
+    /// End of the frame, s.
+    pub time_s: f64,
+    /// What was sensed.
+    pub sensed: Sensed,
+    /// Fin angles that the servos report, rad.
+    pub fins_rad: [f64; 4],
+    /// A foot touches the ground.
+    pub contact: bool,
+    /// The igniter has continuity.
+    pub igniter_continuity: bool,
+    /// The operator asked for an abort.
+    pub abort: bool,
+}
+
+/// The commands of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PilotOutput {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Fin openings, rad.
+    pub fins_rad: [f64; 4],
+    /// Current through the landing motor's igniter.
+    pub ignite: bool,
+    /// The parachute is released.
+    pub parachute: bool,
+    /// The phase after the frame.
+    pub phase: Phase,
+    /// What decided where the nose points.
+    pub level: ControlLevel,
+}
+
+/// The pilot and everything that it remembers.
+#[derive(Debug, Clone)]
+pub struct Pilot {
+    known: Known,
+    estimator: Estimator,
+    estimate: Option<Estimate>,
+    ignited_at_s: Option<f64>,
+    outlook: Outlook,
+    powered: PoweredGuidance,
+    /// The law that flies the landing burn instead of a plan.
+    baseline: Option<Baseline>,
+    aim_loop: AimLoop,
+    fin_share: f64,
+    fins_rad: [f64; 4],
+    fin_watch: FinWatch,
+    gimbal_rad: [f64; 2],
+    gate_refusal: Option<&'static str>,
+    /// Since when something lasting has stood in the gate's way, s.
+    gate_shut_since_s: Option<f64>,
+}
+
+impl Pilot {
+    /// A pilot that is released at apogee, with its idea of where it is and how sure it is of that.
+    pub fn at_apogee(
+        mission: &Mission,
+        time_s: f64,
+        believed: &RigidState,
+        uncertainty: &StartUncertainty,
+    ) -> Self {
+        let airframe = &mission.airframe;
+        let frame_s = mission.estimator.frame_s;
+        Self {
+            estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
+            estimate: None,
+            ignited_at_s: None,
+            outlook: Outlook::default(),
+            powered: PoweredGuidance::new(mission.powered),
+            baseline: None,
+            aim_loop: AimLoop::new(mission.aim, frame_s),
+            fin_share: 1.0,
+            fins_rad: [airframe.fins.closed_rad(); 4],
+            fin_watch: FinWatch::default(),
+            gimbal_rad: [0.0; 2],
+            gate_refusal: None,
+            gate_shut_since_s: None,
+            known: Known {
+                mission: mission.clone(),
+                mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
+                motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
+            },
+        }
+    }
+
+    /// Who flies the landing burn from now on.
+    pub(crate) fn set_law(&mut self, law: Law) {
+        self.baseline = match law {
+            Law::Nmpc => None,
+            Law::Baseline(baseline) => Some(baseline),
+        };
+    }
+
+    /// The estimate of the last frame.
+    pub fn estimate(&self) -> Option<&Estimate> {
+        self.estimate.as_ref()
+    }
+
+    /// The estimator, to compare it with the truth.
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
+    /// The guidance of the landing burn, with the plan that is flown.
+    pub fn powered(&self) -> &PoweredGuidance {
+        &self.powered
+    }
+
+    /// What the last plan found.
+    pub fn report(&self) -> &PoweredReport {
+        self.powered.report()
+    }
+
+    /// The outlook on ignition and abort.
+    pub fn outlook(&self) -> &Outlook {
+        &self.outlook
+    }
+
+    /// The landing motor as certified.
+    pub fn curve(&self) -> &ThrustCurve {
+        &self.known.mission.motor_curve
+    }
+
+    /// The motor as estimated in flight, and the scale of the air's forces.
+    pub fn motor(&self) -> &MotorEstimate {
+        &self.known.motor
+    }
+
+    /// Time since the landing motor's thrust began, s.
+    pub fn burning_s(&self, time_s: f64) -> Option<f64> {
+        self.known.burning_s(time_s)
+    }
+
+    /// When the landing motor was commanded to light, s.
+    pub fn ignited_at_s(&self) -> Option<f64> {
+        self.ignited_at_s
+    }
+
+    /// The gate check that stands in the way, if one did at the last evaluation.
+    pub fn gate_refusal(&self) -> Option<&'static str> {
+        self.gate_refusal
+    }
+}

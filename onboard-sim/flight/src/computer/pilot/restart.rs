@@ -1,0 +1,66 @@
+//! The flight computer after a restart in the air.
+
+use super::{Outlook, Pilot};
+use crate::control::aim::AimLoop;
+use crate::estimation::estimator::{Estimator, StartUncertainty};
+use crate::guidance::powered::PoweredGuidance;
+
+impl Pilot {
+    /// What is left of a pilot that starts again at `time_s`.
+    ///
+    /// Kept, as in memory that outlives the power: what is known of motor and drag, the last
+    /// commands, and the last estimate, which is carried on by what was last felt over the time that was lost, and
+    /// believed no better than at apogee. Estimator, outlook, plan and gimbal loop begin anew.
+    #[must_use]
+    pub fn restarted(&self, time_s: f64) -> Self {
+        let mission = &self.known.mission;
+        let uncertainty = StartUncertainty::at_apogee();
+        let estimator = self.estimate.map_or_else(
+            || self.estimator.clone(),
+            |estimate| {
+                let lost_s = (time_s - estimate.time_s).max(0.0);
+                let mut believed = estimate.state;
+                // Turning on as it turned last; the force as it points halfway.
+                let half = nalgebra::UnitQuaternion::from_scaled_axis(believed.rate_rad_s * (0.5 * lost_s));
+                believed.world_from_body *= half;
+                let force = believed.world_from_body * estimate.specific_force_m_s2;
+                believed.world_from_body *= half;
+                let acceleration_m_s2 = force - nalgebra::Vector3::z() * mission.gravity_m_s2;
+                believed.position_m +=
+                    believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
+                believed.velocity_m_s += acceleration_m_s2 * lost_s;
+                Estimator::new(&mission.estimator, &uncertainty, time_s, &believed)
+                    .with_gyro_bias(estimate.gyro_bias_rad_s)
+            },
+        );
+        Self {
+            estimator,
+            outlook: Outlook::default(),
+            powered: PoweredGuidance::new(mission.powered),
+            aim_loop: AimLoop::new(mission.aim, mission.estimator.frame_s),
+            gate_refusal: None,
+            gate_shut_since_s: None,
+            ..self.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use crate::computer::pilot::sample::{falling, input, released};
+
+    #[test]
+    fn it_has_turned_on_meanwhile() {
+        let mut pilot = falling();
+        pilot.step(&mut released(), &input(1, 0.0));
+        let mut estimate = pilot.estimate.expect("it has felt something");
+        estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
+        pilot.estimate = Some(estimate);
+        let found = pilot.restarted(estimate.time_s + 0.2).estimator.estimate().state.world_from_body;
+        let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
+        let expected = estimate.state.world_from_body * turned;
+        assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
+    }
+}

@@ -1,0 +1,398 @@
+//! One frame of the flight.
+
+use nalgebra::Vector3;
+
+use super::known::Burning;
+use super::outlook::{commit_height_m, touchdown_m};
+use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
+use crate::computer::table::PhaseTable;
+use crate::control::aim::Aim;
+use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+use crate::estimation::estimator::{Estimate, VehicleNow};
+use crate::estimation::motor_estimate::MotorSample;
+use crate::guidance::controller::ControlLevel;
+use crate::guidance::descent::DescentSituation;
+use crate::rules::gate::{GateInput, gate_checks};
+use crate::rules::phase::{Effect, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase};
+use crate::vehicle::airframe::MassProperties;
+use crate::vehicle::atmosphere::Air;
+use crate::vehicle::fins::Moments;
+
+/// Frames between outlooks while the ignition is seconds away.
+const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
+/// A fin that is farther than this from its command is not there, rad.
+pub(super) const FIN_THERE_RAD: f64 = 0.1;
+/// Less thrust than this turns nothing, N.
+const STEERING_THRUST_N: f64 = 3.0;
+
+/// Lying across the air by more than this, the body turns the vehicle harder than a fin that gives way lets it be
+/// turned back, rad: all of them are opened then.
+const ACROSS_THE_AIR_RAD: f64 = 0.65;
+/// Slower than this, air turns nothing, m/s.
+const AIR_TURNS_M_S: f64 = 12.0;
+
+/// Whether the air comes so much from the side that only open fins turn the vehicle back.
+fn lies_across_the_air(estimate: &Estimate) -> bool {
+    let through_air = estimate.velocity_through_air_m_s();
+    let airspeed_m_s = through_air.norm();
+    let along_m_s = -through_air.dot(&estimate.state.nose_in_world());
+    airspeed_m_s > AIR_TURNS_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
+}
+
+impl Pilot {
+    /// One frame. Every event goes through the `table`.
+    pub(crate) fn step(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
+        let time_s = input.time_s;
+        let estimate = self.sense(table.mode().phase, input);
+        self.estimate = Some(estimate);
+        let density_kg_m3 =
+            Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
+        self.feel(table.mode().phase, input, &estimate, density_kg_m3);
+        let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
+        let far = table.mode().phase == Phase::AeroDescent;
+        let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
+        // Without one, right after apogee and after a restart, an abort would not know whether the parachute has room.
+        let looking = looking || self.outlook == Outlook::default();
+        if looking && table.mode().phase.in_descent() {
+            self.look_ahead(&estimate, density_kg_m3);
+        }
+        self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
+        self.move_through_phases(table, input, &estimate);
+        let mode = *table.mode();
+
+        let burning_s = self.known.burning_s(time_s);
+        let mass = self.known.mass_now(burning_s);
+        let lands_here = mode.interlocks.lands_here;
+        let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3, lands_here });
+        let flying = mode.phase.in_landing_burn();
+        let burning = situation.as_ref().filter(|_| flying);
+        let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, &estimate));
+        if let Some((gimbal_rad, fins_rad)) = by_baseline {
+            (self.gimbal_rad, self.fins_rad) = (gimbal_rad, fins_rad);
+        } else {
+            self.gimbal_rad = match burning {
+                Some(burning) => {
+                    if planning {
+                        self.plan(time_s, &estimate, burning, &input.fins_rad);
+                    }
+                    self.gimbal(time_s, &estimate, burning, &input.fins_rad)
+                }
+                None => [0.0; 2],
+            };
+            self.fins_rad = self.fins(&mode, &estimate, &mass, density_kg_m3, burning.is_some());
+        }
+        PilotOutput {
+            gimbal_rad: self.gimbal_rad,
+            fins_rad: self.fins_rad,
+            ignite: mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited,
+            parachute: mode.phase == Phase::Chute,
+            phase: mode.phase,
+            level: match flying {
+                true if by_baseline.is_some() => ControlLevel::Stabiliser,
+                true => self.powered.report().level,
+                false => ControlLevel::Idle,
+            },
+        }
+    }
+
+    /// What a simpler law commands, if one flies the landing burn: gimbal and fins, rad.
+    fn baseline_commands(&mut self, burning_s: f64, estimate: &Estimate) -> Option<([f64; 2], [f64; 4])> {
+        let baseline = self.baseline.as_mut()?;
+        Some(baseline.commands_rad(burning_s, estimate, &self.known.motor))
+    }
+
+    fn sense(&mut self, phase: Phase, input: &PilotInput) -> Estimate {
+        match input.sensed {
+            Sensed::Known(estimate) => estimate,
+            Sensed::Measured(measurements) => {
+                let burning_s = self.known.burning_s(input.time_s);
+                let mass = self.known.mass_now(burning_s);
+                let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
+                let air = Air::at_height_m(self.known.mission.pad_altitude_m + height_m);
+                let vehicle = VehicleNow::of(
+                    self.known.airframe(),
+                    &mass,
+                    air.density_kg_m3,
+                    input.fins_rad,
+                    burning_s.is_some() || phase.in_landing_burn(),
+                    self.known.mission.lidar_ahead_of_feet_m,
+                );
+                self.estimator.step(&measurements, &vehicle)
+            }
+        }
+    }
+
+    /// Motor and drag from the specific force along the axis. On the ground it says nothing about either.
+    fn feel(&mut self, phase: Phase, input: &PilotInput, estimate: &Estimate, density_kg_m3: f64) {
+        if input.contact || phase == Phase::Chute {
+            return;
+        }
+        let mass = self.known.mass_now(self.known.burning_s(input.time_s));
+        let burning = phase.in_landing_burn();
+        let vehicle = VehicleNow::of(
+            self.known.airframe(),
+            &mass,
+            density_kg_m3,
+            input.fins_rad,
+            burning,
+            self.known.mission.lidar_ahead_of_feet_m,
+        );
+        let through_air_m_s =
+            estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
+        let sample = MotorSample {
+            time_s: input.time_s,
+            axial_specific_force_m_s2: estimate.specific_force_m_s2.x,
+            mass_kg: mass.mass_kg,
+            axial_air_force_n: vehicle.air_force_n(&through_air_m_s, &estimate.state.rate_rad_s).x,
+            gimbal_rad: self.gimbal_rad,
+            may_burn: burning,
+        };
+        self.known.motor.update(&self.known.mission.motor_curve, &sample);
+    }
+
+    fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
+        let column = self.known.column(density_kg_m3, self.known.mission.soft_tilt_deg);
+        let state = &estimate.state;
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
+        let vertical_m_s = state.velocity_m_s.z;
+        let fins_m2 = self.known.motor.air_scale() * self.known.fin_drag_area_m2(&self.fins_rad);
+        let ignition = self.known.mission.ignition.outlook(
+            &column,
+            &self.known.mission.motor_curve,
+            height_m,
+            vertical_m_s,
+            fins_m2,
+        );
+        let parachute = &self.known.airframe().parachute;
+        let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
+        // What the fall from apogee has made of the speed so far, by drag as certified.
+        let terminal_m_s = column.terminal_speed_m_s(fins_m2);
+        let fallen_m = (self.known.mission.start.height_m - state.position_m.z).max(0.0);
+        let shed =
+            libm::exp(-2.0 * self.known.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
+        self.outlook = Outlook {
+            ignition,
+            commit_height_m: commit_height_m(
+                state.velocity_m_s.norm(),
+                parachute.ejection_delay_s,
+                parachute.inflation_distance_m,
+            ),
+            height_m,
+            predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
+            touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
+        };
+    }
+
+    fn move_through_phases(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+        let time_s = input.time_s;
+        if input.abort {
+            let gate_open = self.gate_open(table.mode(), input, estimate);
+            let above_commit_height = self.above_commit_height();
+            self.happen(table, Event::AbortRequested { above_commit_height, gate_open }, time_s);
+        }
+        if self.gate_will_not_open(table.mode().phase, input, estimate) {
+            self.happen(table, Event::AbortRequested { above_commit_height: true, gate_open: false }, time_s);
+        }
+        match table.mode().phase {
+            Phase::Deploy if self.fins_there(&input.fins_rad) => {
+                self.happen(table, Event::FinsConfirmed, time_s);
+            }
+            Phase::AeroDescent => {
+                let soon = self
+                    .outlook
+                    .ignition
+                    .command_in_s
+                    .is_some_and(|in_s| in_s <= self.known.mission.ignition.arm_before_s);
+                if soon {
+                    self.happen(table, Event::LandArm, time_s);
+                }
+            }
+            Phase::LandArmed => self.consider_ignition(table, input, estimate),
+            Phase::Ignition => {
+                if self.known.burning_s(time_s).is_some() {
+                    self.happen(table, Event::ThrustConfirmed, time_s);
+                } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
+                    && !table.mode().interlocks.no_light_latched
+                {
+                    self.happen(table, Event::NoThrustTimeout, time_s);
+                }
+            }
+            _ => {}
+        }
+        if input.contact && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed) {
+            let burning_s = self.known.burning_s(time_s);
+            let mass = self.known.mass_now(burning_s);
+            let thrust_n = burning_s.map_or(0.0, |burning_s| self.known.burn().thrust_n(burning_s));
+            let thrust_below_weight = thrust_n < mass.mass_kg * self.known.mission.gravity_m_s2;
+            self.happen(table, Event::Contact { thrust_below_weight }, time_s);
+        }
+        if table.mode().motor == Motor::Burning && self.known.burn_is_over(time_s) {
+            self.happen(table, Event::Burnout, time_s);
+        }
+    }
+
+    /// The chosen instant is now when thrust, commanded at the next frame, would begin below the chosen height.
+    fn consider_ignition(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+        let ignition = &self.outlook.ignition;
+        let height_m = estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
+        let fallen_since_m = self.outlook.height_m - height_m;
+        let due =
+            ignition.chosen_m.is_some_and(|chosen_m| ignition.onset_height_m - fallen_since_m <= chosen_m);
+        if due {
+            let open = self.gate_open(table.mode(), input, estimate);
+            self.happen(table, Event::IgnitionGate { open }, input.time_s);
+        }
+    }
+
+    /// An abort in the next frame, as far as the last one tells, if there was one.
+    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&PilotInput>) -> Event {
+        let found = last.zip(self.estimate.as_ref());
+        let gate_open =
+            found.is_some_and(|(input, estimate)| self.gate_shut_by(mode, input, estimate).is_none());
+        Event::AbortRequested { above_commit_height: self.above_commit_height(), gate_open }
+    }
+
+    fn above_commit_height(&self) -> bool {
+        self.outlook.height_m > self.outlook.commit_height_m
+    }
+
+    fn gate_open(&mut self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> bool {
+        self.gate_refusal = self.gate_shut_by(mode, input, estimate);
+        self.gate_refusal.is_none()
+    }
+
+    /// The first check that keeps the gate shut.
+    fn gate_shut_by(&self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> Option<&'static str> {
+        let state = &estimate.state;
+        let ignition = &self.outlook.ignition;
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
+        let onset_m = ignition.onset_height_m - (self.outlook.height_m - height_m);
+        let gate = GateInput {
+            tilt_rad: state.tilt_rad(),
+            vertical_speed_m_s: state.velocity_m_s.z,
+            pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
+            speed_m_s: state.velocity_m_s.norm(),
+            predicted_speed_m_s: self.outlook.predicted_speed_m_s,
+            // One source left is no disagreement; whether it may be relied on is the estimator's health.
+            height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
+            landing_feasible: ignition.band.is_some_and(|band| band.contains(onset_m)),
+            predicted_touchdown_x_m: self.outlook.touchdown_distance_m,
+            fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
+            parachute_stowed: mode.phase != Phase::Chute,
+            igniter_continuity: input.igniter_continuity,
+            estimator_healthy: estimate.health.is_good(),
+        };
+        let checks = gate_checks(&self.known.mission.gate, &gate);
+        checks.iter().find(|check| !check.passed).map(|check| check.name)
+    }
+
+    pub(super) fn fins_there(&self, fins_rad: &[f64; 4]) -> bool {
+        fins_rad.iter().zip(&self.fins_rad).all(|(there, wanted)| (there - wanted).abs() < FIN_THERE_RAD)
+    }
+
+    /// Events that the table refuses change nothing.
+    fn happen(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
+        if table.happen(event).is_ok_and(|effects| effects.contains(Effect::IgniteLandingMotor)) {
+            self.ignited_at_s = Some(time_s);
+        }
+    }
+
+    fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
+        let column = self.known.column(situation.density_kg_m3, self.known.mission.fin_soft_tilt_deg);
+        let state = &estimate.state;
+        let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
+        let sigmas = self.known.mission.fin_sigmas;
+        let [weak, strong] =
+            [-sigmas, sigmas].map(|sigmas| self.known.doubted_burn(situation.burning_s, sigmas));
+        self.fin_share = column.fin_share(
+            [&weak, &strong],
+            situation.burning_s,
+            state.velocity_m_s.z,
+            height_m,
+            self.known.mission.fin_place,
+        );
+        let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
+        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
+    }
+
+    fn gimbal(
+        &mut self,
+        time_s: f64,
+        estimate: &Estimate,
+        situation: &Burning,
+        fins_rad: &[f64; 4],
+    ) -> [f64; 2] {
+        let thrust_n = self.known.burn().thrust_n(situation.burning_s);
+        let fins_m2 = self.known.fin_drag_area_m2(fins_rad);
+        let aim: Aim = self.powered.aim(
+            time_s,
+            &estimate.state,
+            &self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2),
+        );
+        let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
+            thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2
+        } else {
+            0.0
+        };
+        let limit_rad = self.known.airframe().gimbal.limit_rad();
+        self.aim_loop.command_rad(
+            &estimate.state.world_from_body,
+            &estimate.state.rate_rad_s,
+            turning_rad_s2,
+            &aim,
+            limit_rad,
+        )
+    }
+
+    fn fins(
+        &self,
+        mode: &Mode,
+        estimate: &Estimate,
+        mass: &MassProperties,
+        density_kg_m3: f64,
+        burning: bool,
+    ) -> [f64; 4] {
+        let fins = &self.known.airframe().fins;
+        // Without a landing to steer to they brake, fully open.
+        let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
+            && !mode.interlocks.landing_motor_inhibited;
+        if !(steering || burning) {
+            // On the ground they stay where they are: nobody needs a servo moving there.
+            let keep = matches!(mode.phase, Phase::Touchdown | Phase::Safed);
+            return if keep { self.fins_rad } else { [fins.open_rad(); 4] };
+        }
+        let largest_m2 = self.known.largest_fin_drag_area_m2();
+        let situation = DescentSituation {
+            mass_kg: mass.mass_kg,
+            inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
+            air_density_kg_m3: density_kg_m3,
+            wind_m_s: estimate.wind_m_s.push(0.0),
+            drag_area_m2: self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(&self.fins_rad),
+            crossflow_area_m2: self.known.crossflow_area_m2(),
+            fin_restoring_m3: self.known.fin_drag_area_m2(&self.fins_rad)
+                * (fins.station_m - mass.cg_station_m),
+            body_behind_cg_m: mass.cg_station_m - 0.5 * self.known.airframe().body.length_m,
+            time_to_go_s: self.outlook.ignition.command_in_s,
+        };
+        let demand =
+            self.known.mission.descent.demand(&estimate.state, &situation, self.known.mission.steered);
+        let (moments, drag_area_m2, min_rad) = if burning {
+            // The gimbal turns the vehicle now; the fins brake, and keep it from rolling.
+            (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
+        } else if self.known.mission.steered && !lies_across_the_air(estimate) {
+            (demand.moment_n_m, largest_m2, fins.control_min_rad())
+        } else {
+            return [fins.open_rad(); 4];
+        };
+        let allocation = Allocation {
+            model: self.known.airframe().fin_model(),
+            arm_m: fins.station_m - mass.cg_station_m,
+            range: OpeningRange { min_rad, max_rad: fins.open_rad() },
+        };
+        let command = FinCommand {
+            moments: Moments { roll_n_m: moments.x, pitch_n_m: moments.y, yaw_n_m: moments.z },
+            drag_area_m2,
+        };
+        allocation.openings_rad(&command, demand.dynamic_pressure_pa)
+    }
+}

@@ -1,0 +1,74 @@
+//! Whether the vehicle may be armed, by what it has found out about itself on the pad.
+
+use alloc::vec::Vec;
+
+use super::news::Severity;
+use super::pad::Stance;
+use super::{Computer, Vehicle};
+use crate::rules::arming::{ArmingInput, Check, PredictedLanding, Uplink, arming_checks};
+use crate::rules::phase::Phase;
+use crate::vehicle::rigid::RigidState;
+
+impl Computer {
+    /// How the vehicle stands on its pad.
+    pub fn stance(&self) -> Stance {
+        match &self.vehicle {
+            Vehicle::Space(space) => space.pad.stance(),
+            Vehicle::Plane(plane) => plane.stance(),
+        }
+    }
+
+    /// The state that is believed on the pad, at rest at the origin; of a rocket in space.
+    pub fn believed_on_the_pad(&self) -> Option<RigidState> {
+        match &self.vehicle {
+            Vehicle::Space(space) => Some(space.pad.believed()),
+            Vehicle::Plane(_) => None,
+        }
+    }
+
+    /// The arming checks with the values found now, by the station that is heard best.
+    pub fn arming_checks(&self) -> Vec<Check> {
+        self.arming_checks_by(self.uplink)
+    }
+
+    pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Vec<Check> {
+        let locks = &self.table.mode().interlocks;
+        let stance = self.stance();
+        let (controller_warm, controller_found, predicted_landing) = match (&self.vehicle, &self.rehearsed) {
+            (Vehicle::Plane(plane), _) => {
+                let (warm, found) = plane.rehearsal();
+                (warm, found, plane.predicted_landing().as_ref().map(PredictedLanding::from))
+            }
+            (Vehicle::Space(_), Some(rehearsed)) => {
+                (rehearsed.warm, rehearsed.found.clone(), rehearsed.landing.clone())
+            }
+            (Vehicle::Space(_), None) => (false, "no rehearsal yet".into(), None),
+        };
+        let input = ArmingInput {
+            pin_out: locks.pin_out,
+            abort_latched: locks.abort_latched,
+            tilt_rad: stance.tilt_rad,
+            rotation_rad_s: stance.rotation_rad_s,
+            speed_m_s: stance.speed_m_s,
+            self_test_passed: self.table.mode().phase != Phase::Safe,
+            estimator_converged: stance.settled,
+            fins_answering: self.fins_answering,
+            igniter_continuity: self.igniter_continuity,
+            log_running: self.log.running,
+            log_space_bytes: self.log.space_bytes,
+            controller_warm,
+            controller_found,
+            predicted_landing,
+            uplink,
+        };
+        arming_checks(&self.arming, &input)
+    }
+
+    pub(super) fn complain_of_readiness(&mut self) {
+        if self.table.mode().phase == Phase::PadIdle
+            && let Some(words) = self.readiness.news(&self.arming_checks())
+        {
+            self.table.say(Severity::Warning, words);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! The self-test at power-up: every actuator is moved and brought back.
+
+/// Fins and gimbal are moved by this much, rad.
+const MOVED_RAD: f64 = 0.05;
+/// An actuator that is farther than this from its command does not answer, rad.
+pub(super) const ANSWERING_RAD: f64 = 0.02;
+/// The self-test has failed if it has not passed by then, s.
+const LIMIT_S: f64 = 3.0;
+
+/// How far it has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SelfTest {
+    NotBegun,
+    Moved,
+    BroughtBack,
+    Failed,
+}
+
+/// What is to be done next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum TestStep {
+    /// Command every actuator to this angle from its rest, rad.
+    Command(f64),
+    /// It has passed.
+    Passed,
+    /// It has failed just now.
+    Failed,
+    /// Nothing yet.
+    Wait,
+}
+
+impl SelfTest {
+    /// Called until it has passed, with whether every actuator has come to its commanded angle.
+    pub(super) fn step(&mut self, answering: bool, time_s: f64) -> TestStep {
+        match self {
+            Self::NotBegun => {
+                *self = Self::Moved;
+                TestStep::Command(MOVED_RAD)
+            }
+            Self::Moved if answering => {
+                *self = Self::BroughtBack;
+                TestStep::Command(0.0)
+            }
+            Self::BroughtBack if answering => TestStep::Passed,
+            Self::Moved | Self::BroughtBack if time_s > LIMIT_S => {
+                *self = Self::Failed;
+                TestStep::Failed
+            }
+            Self::Moved | Self::BroughtBack | Self::Failed => TestStep::Wait,
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! How a flight computer begins: at power-up, at its release, at a moment of a recorded landing, and again after it died; and
+//! with what other settings it goes on.
+
+use alloc::boxed::Box;
+
+use super::motor_watch::MotorWatch;
+use super::news::Readiness;
+use super::plane::{Moment, PlanarLaw, Plane, PlaneError};
+use super::self_test::SelfTest;
+use super::space::Space;
+use super::table::PhaseTable;
+use super::{Commands, Computer, LogState, Vehicle};
+use crate::guidance::baseline::Law;
+use crate::guidance::controller::ControlLevel;
+use crate::rules::arming::Uplink;
+use crate::rules::phase::{Event, Phase};
+use crate::vehicle::dynamics::PlanarState;
+use crate::vehicle::mission::Mission;
+use crate::vehicle::profile::{ArmingLimits, Profile};
+use crate::vehicle::rigid::RigidState;
+
+impl Computer {
+    /// The computer of a rocket at power-up on its pad. No ascent is flown: `believed` is its idea of its state at the
+    /// release at apogee.
+    pub fn in_space(mission: &Mission, law: Law, believed: &RigidState) -> Self {
+        let space = Space::new(mission, law, believed);
+        let closed_rad = mission.airframe.fins.closed_rad();
+        let (arming, countdown_s) = (mission.arming, mission.start.countdown_s);
+        Self::new(Vehicle::Space(Box::new(space)), arming, countdown_s, closed_rad)
+    }
+
+    /// The computer of the planar vehicle at power-up in its rig, which lets it go in the state `release`.
+    ///
+    /// # Errors
+    /// The profile asks for what this computer does not do.
+    pub fn in_plane(profile: &Profile, release: PlanarState) -> Result<Self, PlaneError> {
+        let plane = Plane::new(profile, release)?;
+        let (arming, countdown_s) = (profile.arming, profile.start.countdown_s);
+        Ok(Self::new(Vehicle::Plane(Box::new(plane)), arming, countdown_s, profile.fins.closed_rad()))
+    }
+
+    /// The computer of the planar vehicle at a moment of a recorded landing, to go on from there.
+    ///
+    /// # Errors
+    /// The profile asks for what this computer does not do.
+    pub fn at_moment(profile: &Profile, moment: &Moment, law: PlanarLaw) -> Result<Self, PlaneError> {
+        let computer = Self::in_plane(profile, moment.input.state)?;
+        let mut computer = computer.released();
+        let Vehicle::Plane(plane) = &mut computer.vehicle else { return Ok(computer) };
+        **plane = plane.clone().at(moment);
+        plane.law = law;
+        computer.frame = plane.frame_at(moment.input.time_s);
+        // By the table, as the record came there.
+        let (table, input) = (&mut computer.table, &moment.input);
+        if let Some(ignited_at_s) = plane.ignited_at_s() {
+            table.begin(ignited_at_s);
+            let _ = table.happen(Event::IgnitionGate { open: true });
+        }
+        table.begin(input.time_s);
+        if input.phase == Phase::Powered {
+            let _ = table.happen(Event::ThrustConfirmed);
+        }
+        if input.lands_here {
+            let _ = table.happen(Event::AbortRequested { above_commit_height: false, gate_open: false });
+        }
+        table.take_news();
+        Ok(computer)
+    }
+
+    fn new(vehicle: Vehicle, arming: ArmingLimits, countdown_s: f64, closed_rad: f64) -> Self {
+        Self {
+            table: PhaseTable::new(0.0),
+            vehicle,
+            frame: 0,
+            arming,
+            countdown_s,
+            commands: Commands {
+                gimbal_rad: [0.0; 2],
+                fins_rad: [closed_rad; 4],
+                ignite: false,
+                parachute: false,
+            },
+            self_test: SelfTest::NotBegun,
+            readiness: Readiness::default(),
+            rehearsed: None,
+            motor_watch: MotorWatch::default(),
+            log: LogState::NONE,
+            uplink: Uplink::NeverHeard,
+            fins_answering: [false; 4],
+            igniter_continuity: false,
+            release: None,
+            level: ControlLevel::Idle,
+        }
+    }
+
+    /// The same released at once at the start of its clock, as flights are that begin without a pad.
+    #[must_use]
+    pub fn released(mut self) -> Self {
+        for event in [
+            Event::SelfTestPassed,
+            Event::PinPulled,
+            Event::ArmRequested { checks_passed: true },
+            Event::StartRequested { countdown_s: 0.0 },
+        ] {
+            // Accepted in this order: a test holds that.
+            let _ = self.table.happen(event);
+        }
+        self.let_go();
+        self.table.take_news();
+        self.motor_watch.news(self.table.mode(), 0.0);
+        self.log = LogState { running: true, space_bytes: u64::MAX };
+        self
+    }
+
+    /// What is left of a computer that starts again in the air: what it keeps in memory that outlives the power.
+    pub fn restart(&mut self, time_s: f64) {
+        if let (Vehicle::Space(space), Some(release)) = (&mut self.vehicle, self.release) {
+            space.pilot = space.pilot.restarted(time_s - release.time_s);
+        }
+    }
+
+    /// Another mission from now on; what is remembered stays.
+    pub fn reconfigure(&mut self, mission: &Mission) {
+        if let Vehicle::Space(space) = &mut self.vehicle {
+            space.pilot = space.pilot.reconfigured(mission);
+        }
+    }
+
+    /// Another profile for the planar vehicle's landing controller; what it remembers stays.
+    pub fn reconfigure_controller(&mut self, profile: &Profile) {
+        if let Vehicle::Plane(plane) = &mut self.vehicle {
+            plane.reconfigure(profile);
+        }
+    }
+
+    /// Another law for the landing burn from now on.
+    pub fn set_law(&mut self, law: Law) {
+        if let Vehicle::Space(space) = &mut self.vehicle {
+            space.pilot.set_law(law);
+        }
+    }
+}

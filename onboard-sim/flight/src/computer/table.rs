@@ -1,0 +1,83 @@
+//! The phase table as the flight computer uses it: every event of a vehicle goes through here, once.
+
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::news::{News, Severity, words_of, words_of_landing_here};
+use crate::rules::phase::{Effect, Effects, Event, Mode, Refusal, transition};
+
+/// Phase and latches, and what has happened to them in this frame.
+#[derive(Debug, Clone)]
+pub struct PhaseTable {
+    mode: Mode,
+    /// Vehicle time of this frame, s.
+    time_s: f64,
+    news: Vec<News>,
+}
+
+impl PhaseTable {
+    /// At power-up.
+    pub(super) fn new(time_s: f64) -> Self {
+        Self { mode: Mode::power_up(time_s), time_s, news: Vec::new() }
+    }
+
+    /// A frame begins.
+    pub(super) fn begin(&mut self, time_s: f64) {
+        self.time_s = time_s;
+    }
+
+    /// Phase, latches, countdown and motor.
+    pub fn mode(&self) -> &Mode {
+        &self.mode
+    }
+
+    /// Vehicle time of this frame, s.
+    pub(super) fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Puts an event to the phase table. Its effects are the caller's to carry out; the crew is told of them here.
+    ///
+    /// # Errors
+    /// The table refuses the event, and nothing has changed.
+    pub(crate) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
+        let before = self.mode;
+        let next = transition(&before, event, self.time_s);
+        if let Some(refusal) = next.refusal {
+            return Err(refusal);
+        }
+        self.mode = next.mode;
+        let countdown_s = if let Event::StartRequested { countdown_s } = event { countdown_s } else { 0.0 };
+        for effect in next.effects.iter() {
+            // The motor of a vehicle that touches down may have been inhibited long before.
+            let known = effect == Effect::InhibitLandingMotor && before.interlocks.landing_motor_inhibited;
+            if let Some((severity, words)) = words_of(effect, countdown_s).filter(|_| !known) {
+                self.say(severity, words);
+            }
+        }
+        if let Some((severity, words)) = words_of_landing_here(before.interlocks, self.mode.interlocks) {
+            self.say(severity, words.to_owned());
+        }
+        if self.mode.phase != before.phase {
+            self.news.push(News::PhaseChanged { from: before.phase, to: self.mode.phase });
+        }
+        Ok(next.effects)
+    }
+
+    /// Tells the crew something.
+    pub(crate) fn say(&mut self, severity: Severity, words: String) {
+        self.news.push(News::Said { severity, words });
+    }
+
+    /// Tells the crew that the ignition gate is shut.
+    pub(crate) fn say_gate_shut(&mut self, reason: &str) {
+        self.say(Severity::Critical, format!("ignition gate closed: {reason}"));
+    }
+
+    /// What has happened in this frame, in order.
+    pub(super) fn take_news(&mut self) -> Vec<News> {
+        core::mem::take(&mut self.news)
+    }
+}

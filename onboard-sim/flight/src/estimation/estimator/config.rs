@@ -1,0 +1,277 @@
+//! The assumed sensor errors, as data. The defaults are those of hobby-grade sensors: a consumer inertial unit, a
+//! barometer, a single-frequency satellite receiver and a 12 m lidar.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+/// Standard gravity, m/s^2.
+pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+
+/// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation unless its name says
+/// otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EstimatorConfig {
+    /// Length of one frame, s.
+    pub frame_s: f64,
+    pub gravity_m_s2: f64,
+    /// Gyro noise density, deg/s/sqrt(Hz).
+    pub gyro_noise_deg_s_sqrt_hz: f64,
+    /// Wander of the gyro bias, deg/s in one second.
+    pub gyro_bias_walk_deg_s_sqrt_s: f64,
+    /// Accelerometer noise density, mg/sqrt(Hz).
+    pub accelerometer_noise_mg_sqrt_hz: f64,
+    /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
+    pub accelerometer_bias_walk_mg_sqrt_s: f64,
+    /// Barometer noise of one sample, m.
+    pub barometer_m: f64,
+    /// Wander of the barometer's offset, m in one second.
+    pub barometer_offset_walk_m_sqrt_s: f64,
+    /// Wander of the ram coefficient, in one second.
+    pub barometer_ram_walk_sqrt_s: f64,
+    /// White noise of a satellite position, horizontal, m.
+    pub gnss_horizontal_m: f64,
+    /// White noise of a satellite position, vertical, m.
+    pub gnss_vertical_m: f64,
+    /// Noise of a satellite velocity, m/s.
+    pub gnss_velocity_m_s: f64,
+    /// Wander of the satellite position's offset, horizontal, m in one second.
+    pub gnss_horizontal_walk_m_sqrt_s: f64,
+    /// Wander of the satellite position's offset, vertical, m in one second.
+    pub gnss_vertical_walk_m_sqrt_s: f64,
+    /// Lidar noise of one sample, m.
+    pub lidar_m: f64,
+    /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers that it falls through.
+    pub wind_walk_m_s_sqrt_s: f64,
+    /// Exponent of the wind's power law over height; the estimated wind decreases with it.
+    pub wind_shear_exponent: f64,
+    /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
+    pub sideways_force_share: f64,
+    /// A measurement that differs from its prediction by more than this many standard deviations is rejected.
+    pub gate_sigmas: f64,
+    /// Beyond these limits the estimate is unhealthy.
+    pub health: HealthLimits,
+}
+
+/// Largest standard deviations of a healthy estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HealthLimits {
+    /// Velocity, any axis, m/s.
+    pub velocity_m_s: f64,
+    pub height_m: f64,
+    /// Horizontal position, either axis, m.
+    pub horizontal_m: f64,
+    /// Tilt, either axis, degrees.
+    pub tilt_deg: f64,
+}
+
+impl Default for EstimatorConfig {
+    fn default() -> Self {
+        Self {
+            frame_s: 0.005,
+            gravity_m_s2: GRAVITY_M_S2,
+            gyro_noise_deg_s_sqrt_hz: 0.05,
+            gyro_bias_walk_deg_s_sqrt_s: 0.002,
+            accelerometer_noise_mg_sqrt_hz: 0.65,
+            accelerometer_bias_walk_mg_sqrt_s: 0.4,
+            barometer_m: 0.08,
+            barometer_offset_walk_m_sqrt_s: 0.03,
+            barometer_ram_walk_sqrt_s: 0.001,
+            gnss_horizontal_m: 0.2,
+            gnss_vertical_m: 0.3,
+            gnss_velocity_m_s: 0.05,
+            gnss_horizontal_walk_m_sqrt_s: 0.15,
+            gnss_vertical_walk_m_sqrt_s: 0.25,
+            lidar_m: 0.06,
+            wind_walk_m_s_sqrt_s: 0.5,
+            wind_shear_exponent: 1.0 / 7.0,
+            sideways_force_share: 0.1,
+            gate_sigmas: 5.0,
+            health: HealthLimits::default(),
+        }
+    }
+}
+
+/// Why a value of the configuration is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("estimator: {field} is {found}, accepted is {accepted}")]
+pub struct EstimatorConfigError {
+    pub field: &'static str,
+    /// The value found.
+    pub found: f64,
+    /// What would be accepted.
+    pub accepted: &'static str,
+}
+
+impl EstimatorConfig {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that is out of range.
+    pub fn validate(&self) -> Result<(), EstimatorConfigError> {
+        if !(0.001..=0.02).contains(&self.frame_s) {
+            let accepted = "0.001 to 0.02";
+            return Err(EstimatorConfigError { field: "frame_s", found: self.frame_s, accepted });
+        }
+        let sizes = [
+            ("gravity_m_s2", self.gravity_m_s2),
+            ("gyro_noise_deg_s_sqrt_hz", self.gyro_noise_deg_s_sqrt_hz),
+            ("accelerometer_noise_mg_sqrt_hz", self.accelerometer_noise_mg_sqrt_hz),
+            ("barometer_m", self.barometer_m),
+            ("gnss_horizontal_m", self.gnss_horizontal_m),
+            ("gnss_vertical_m", self.gnss_vertical_m),
+            ("gnss_velocity_m_s", self.gnss_velocity_m_s),
+            ("lidar_m", self.lidar_m),
+            ("gate_sigmas", self.gate_sigmas),
+            ("health.velocity_m_s", self.health.velocity_m_s),
+            ("health.height_m", self.health.height_m),
+            ("health.horizontal_m", self.health.horizontal_m),
+            ("health.tilt_deg", self.health.tilt_deg),
+        ];
+        for (field, found) in sizes {
+            if !(found.is_finite() && found > 0.0) {
+                return Err(EstimatorConfigError { field, found, accepted: "a finite number above 0" });
+            }
+        }
+        let walks = [
+            ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
+            ("accelerometer_bias_walk_mg_sqrt_s", self.accelerometer_bias_walk_mg_sqrt_s),
+            ("barometer_offset_walk_m_sqrt_s", self.barometer_offset_walk_m_sqrt_s),
+            ("barometer_ram_walk_sqrt_s", self.barometer_ram_walk_sqrt_s),
+            ("gnss_horizontal_walk_m_sqrt_s", self.gnss_horizontal_walk_m_sqrt_s),
+            ("gnss_vertical_walk_m_sqrt_s", self.gnss_vertical_walk_m_sqrt_s),
+            ("wind_walk_m_s_sqrt_s", self.wind_walk_m_s_sqrt_s),
+            ("wind_shear_exponent", self.wind_shear_exponent),
+            ("sideways_force_share", self.sideways_force_share),
+        ];
+        for (field, found) in walks {
+            if !(found.is_finite() && found >= 0.0) {
+                return Err(EstimatorConfigError { field, found, accepted: "a finite number not below 0" });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Default for HealthLimits {
+    fn default() -> Self {
+        Self { velocity_m_s: 0.5, height_m: 2.5, horizontal_m: 6.0, tilt_deg: 3.0 }
+    }
+}
+
+/// Standard deviations of the initial state.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartUncertainty {
+    /// Horizontal position, each axis, m.
+    pub horizontal_m: f64,
+    pub height_m: f64,
+    /// Velocity, each axis, m/s.
+    pub velocity_m_s: f64,
+    /// Lean, about each horizontal axis, degrees.
+    pub tilt_deg: f64,
+    /// Heading, about the vertical, degrees.
+    pub heading_deg: f64,
+    /// Gyro bias that remains after the calibration on the pad, each axis, deg/s.
+    pub gyro_bias_deg_s: f64,
+    /// Accelerometer bias, each axis, mg.
+    pub accelerometer_bias_mg: f64,
+    /// Wind, each horizontal axis, m/s.
+    pub wind_m_s: f64,
+    pub barometer_offset_m: f64,
+    /// Ram coefficient of the barometer: its height error is this times `V^2 / 2 g`.
+    pub barometer_ram: f64,
+    /// Offset of the satellite position since it was zeroed on the pad, horizontal, m.
+    pub gnss_horizontal_offset_m: f64,
+    /// Offset of the satellite position since it was zeroed on the pad, vertical, m.
+    pub gnss_vertical_offset_m: f64,
+}
+
+impl StartUncertainty {
+    /// At rest on the pad after [`alignment`](super::alignment).
+    pub fn on_pad() -> Self {
+        Self {
+            horizontal_m: 0.05,
+            height_m: 0.02,
+            velocity_m_s: 0.01,
+            tilt_deg: 0.2,
+            heading_deg: 2.0,
+            gyro_bias_deg_s: 0.02,
+            accelerometer_bias_mg: 3.0,
+            wind_m_s: 4.0,
+            barometer_offset_m: 0.1,
+            barometer_ram: 0.05,
+            gnss_horizontal_offset_m: 0.1,
+            gnss_vertical_offset_m: 0.1,
+        }
+    }
+
+    /// At apogee, after an ascent of about 10 s during which the estimator ran.
+    pub fn at_apogee() -> Self {
+        Self {
+            horizontal_m: 0.7,
+            height_m: 0.5,
+            velocity_m_s: 0.15,
+            tilt_deg: 0.7,
+            heading_deg: 2.0,
+            gyro_bias_deg_s: 0.02,
+            accelerometer_bias_mg: 3.0,
+            wind_m_s: 4.0,
+            barometer_offset_m: 0.3,
+            barometer_ram: 0.05,
+            gnss_horizontal_offset_m: 0.65,
+            gnss_vertical_offset_m: 1.1,
+        }
+    }
+
+    /// Of the position, each axis of the world, m.
+    pub(super) fn position_m(&self) -> Vector3<f64> {
+        Vector3::new(self.horizontal_m, self.horizontal_m, self.height_m)
+    }
+
+    /// Of the attitude, about each axis of the world, rad.
+    pub(super) fn attitude_rad(&self) -> Vector3<f64> {
+        Vector3::new(self.tilt_deg, self.tilt_deg, self.heading_deg).map(f64::to_radians)
+    }
+
+    /// Of the satellite position's offset, each axis of the world, m.
+    pub(super) fn gnss_offset_m(&self) -> Vector3<f64> {
+        Vector3::new(
+            self.gnss_horizontal_offset_m,
+            self.gnss_horizontal_offset_m,
+            self.gnss_vertical_offset_m,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_changes_only_the_keys_it_has_and_a_value_out_of_range_is_named_in_the_error() {
+        let config: EstimatorConfig = toml::from_str("lidar_m = 0.1\n[health]\ntilt_deg = 2.0").unwrap();
+        assert_eq!(config.validate(), Ok(()));
+        let expected = EstimatorConfig {
+            lidar_m: 0.1,
+            health: HealthLimits { tilt_deg: 2.0, ..HealthLimits::default() },
+            ..EstimatorConfig::default()
+        };
+        assert_eq!(config, expected);
+        assert!(toml::from_str::<EstimatorConfig>("lidar = 0.1").is_err());
+        let refused = |config: EstimatorConfig| config.validate().unwrap_err().to_string();
+        assert_eq!(
+            refused(EstimatorConfig { frame_s: 0.0, ..config }),
+            "estimator: frame_s is 0, accepted is 0.001 to 0.02"
+        );
+        assert_eq!(
+            refused(EstimatorConfig { lidar_m: f64::NAN, ..config }),
+            "estimator: lidar_m is NaN, accepted is a finite number above 0"
+        );
+        assert_eq!(
+            refused(EstimatorConfig { wind_walk_m_s_sqrt_s: -1.0, ..config }),
+            "estimator: wind_walk_m_s_sqrt_s is -1, accepted is a finite number not below 0"
+        );
+    }
+}

@@ -1,0 +1,311 @@
+//! Estimates position, motion, attitude and wind from the sensors.
+//!
+//! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
+//! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
+//! every frame. The error of the state, 22 numbers, is corrected by scalar measurements: barometer with offset and ram
+//! error, late satellite fixes with a slowly wandering offset, lidar, and the sideways force that shows the wind.
+//!
+//! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
+//!   same bits again.
+//! * [`EstimatorConfig`] and [`StartUncertainty`] are the assumed errors of the sensors and of the initial state.
+//! * [`Estimate`] is the output: state, wind, standard deviations, two heights, health.
+//! * [`alignment`] finds the initial attitude on the pad.
+//!
+//! A measurement that does not fit is rejected and counted ([`Gates`]). If the state is not a number, the filter
+//! restarts from the last good state with a larger uncertainty.
+
+pub mod alignment;
+mod config;
+mod covariance;
+mod digest;
+mod gates;
+mod health;
+mod heights;
+mod history;
+mod measurements;
+mod strapdown;
+#[cfg(test)]
+mod tests;
+mod updates;
+mod vehicle;
+mod wind;
+
+use nalgebra::{Vector2, Vector3};
+
+pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
+use self::covariance::{
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GYRO_BIAS, N,
+    POSITION, Row, VELOCITY, WIND,
+};
+use self::gates::Surprise;
+pub use self::gates::{GateCounters, Gates};
+pub use self::health::{Doubt, Health};
+use self::heights::HeightChannel;
+pub use self::heights::HeightSources;
+use self::history::History;
+pub use self::measurements::{
+    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements,
+};
+use self::strapdown::{Noise, Nominal, Pending};
+pub use self::vehicle::VehicleNow;
+use self::wind::Sideways;
+use crate::vehicle::rigid::RigidState;
+
+/// Standard deviations of an estimate, from the diagonal of the covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sigmas {
+    pub position_m: Vector3<f64>,
+    pub velocity_m_s: Vector3<f64>,
+    /// Attitude, about the world's axes, rad: x and y are lean, z is heading.
+    pub attitude_rad: Vector3<f64>,
+    /// Gyro bias, body, rad/s.
+    pub gyro_bias_rad_s: Vector3<f64>,
+    /// Accelerometer bias, body, m/s^2.
+    pub accelerometer_bias_m_s2: Vector3<f64>,
+    /// Wind, world x and y, m/s.
+    pub wind_m_s: Vector2<f64>,
+}
+
+/// The output of the estimator after a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// End of the frame, s.
+    pub time_s: f64,
+    /// Position, velocity, attitude and rotation.
+    pub state: RigidState,
+    /// Specific force without its estimated bias, body axes, mean over the frame, m/s^2.
+    pub specific_force_m_s2: Vector3<f64>,
+    /// Horizontal wind at the vehicle, world x and y, m/s: the velocity of the air.
+    pub wind_m_s: Vector2<f64>,
+    /// Gyro bias, body, rad/s.
+    pub gyro_bias_rad_s: Vector3<f64>,
+    /// Accelerometer bias, body, m/s^2.
+    pub accelerometer_bias_m_s2: Vector3<f64>,
+    pub sigmas: Sigmas,
+    /// Two independent heights.
+    pub heights: HeightSources,
+    /// Whether the estimate may be used.
+    pub health: Health,
+}
+
+impl Estimate {
+    /// An exact estimate from the true state, for flights and tests without an estimator.
+    pub fn exact(
+        time_s: f64,
+        state: RigidState,
+        specific_force_m_s2: Vector3<f64>,
+        wind_m_s: Vector2<f64>,
+    ) -> Self {
+        let (zero, height_m) = (Vector3::zeros(), state.position_m.z);
+        Self {
+            time_s,
+            state,
+            specific_force_m_s2,
+            wind_m_s,
+            gyro_bias_rad_s: zero,
+            accelerometer_bias_m_s2: zero,
+            sigmas: Sigmas {
+                position_m: zero,
+                velocity_m_s: zero,
+                attitude_rad: zero,
+                gyro_bias_rad_s: zero,
+                accelerometer_bias_m_s2: zero,
+                wind_m_s: Vector2::zeros(),
+            },
+            heights: HeightSources {
+                inertial_m: height_m,
+                inertial_sigma_m: 0.0,
+                barometric_m: Some(height_m),
+            },
+            health: Health::Good,
+        }
+    }
+
+    pub fn velocity_through_air_m_s(&self) -> Vector3<f64> {
+        self.state.velocity_m_s - self.wind_m_s.push(0.0)
+    }
+}
+
+/// The filter. Only `step` advances it. A clone continues with exactly the same bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimator {
+    config: EstimatorConfig,
+    noise: Noise,
+    start: StartUncertainty,
+    start_s: f64,
+    frames: u64,
+    nominal: Nominal,
+    covariance: Covariance,
+    pending: Pending,
+    history: History,
+    heights: HeightChannel,
+    sideways: Sideways,
+    gates: Gates,
+    surprise: Surprise,
+    last_imu: ImuSample,
+    rate_rad_s: Vector3<f64>,
+    specific_force_m_s2: Vector3<f64>,
+    last_good: Nominal,
+    restarts: u32,
+    restarted_at_s: f64,
+    surprised_at_s: f64,
+}
+
+impl Estimator {
+    /// Starts at a time, s, from a state with this uncertainty.
+    pub fn new(config: &EstimatorConfig, start: &StartUncertainty, time_s: f64, state: &RigidState) -> Self {
+        let nominal = Nominal::at(state);
+        Self {
+            config: *config,
+            noise: Noise::of(config),
+            start: *start,
+            start_s: time_s,
+            frames: 0,
+            nominal,
+            covariance: start_covariance(start),
+            pending: Pending::default(),
+            history: History::new(time_s),
+            heights: HeightChannel::new(state.position_m.z, start.height_m, start.gnss_vertical_offset_m),
+            sideways: Sideways::default(),
+            gates: Gates::default(),
+            surprise: Surprise::default(),
+            last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
+            rate_rad_s: state.rate_rad_s,
+            specific_force_m_s2: Vector3::zeros(),
+            last_good: nominal,
+            restarts: 0,
+            restarted_at_s: f64::NEG_INFINITY,
+            surprised_at_s: f64::NEG_INFINITY,
+        }
+    }
+
+    /// The same filter with a gyro bias known from the pad, body, rad/s.
+    #[must_use]
+    pub fn with_gyro_bias(mut self, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        self.nominal.gyro_bias_rad_s = gyro_bias_rad_s;
+        self.last_good = self.nominal;
+        self
+    }
+
+    /// End of the last frame, s.
+    pub fn time_s(&self) -> f64 {
+        self.start_s + self.frames as f64 * self.config.frame_s
+    }
+
+    /// Runs one frame: propagates the state with the inertial sample, then corrects it with the other measurements.
+    pub fn step(&mut self, measurements: &Measurements, vehicle: &VehicleNow) -> Estimate {
+        self.frames += 1;
+        self.carry_forward(&measurements.imu);
+        if let Some(altitude_m) = measurements.pressure_altitude_m {
+            self.take_barometer(altitude_m);
+        }
+        if let Some(fix) = &measurements.gnss {
+            self.take_gnss(fix);
+        }
+        if let Some(range_m) = measurements.lidar_range_m {
+            self.take_lidar(range_m, vehicle.lidar_behind_cg_m);
+        }
+        self.feel_wind(vehicle);
+        self.guard();
+        self.estimate()
+    }
+
+    /// The estimate now.
+    pub fn estimate(&self) -> Estimate {
+        let time_s = self.time_s();
+        let sigmas = Sigmas {
+            position_m: self.covariance.sigmas(POSITION),
+            velocity_m_s: self.covariance.sigmas(VELOCITY),
+            attitude_rad: self.covariance.sigmas(ATTITUDE),
+            gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),
+            accelerometer_bias_m_s2: self.covariance.sigmas(ACCELEROMETER_BIAS),
+            wind_m_s: self.covariance.sigmas(WIND).xy(),
+        };
+        Estimate {
+            time_s,
+            state: RigidState {
+                position_m: self.nominal.position_m,
+                velocity_m_s: self.nominal.velocity_m_s,
+                world_from_body: self.nominal.world_from_body,
+                rate_rad_s: self.rate_rad_s,
+            },
+            specific_force_m_s2: self.specific_force_m_s2,
+            wind_m_s: self.nominal.wind_m_s,
+            gyro_bias_rad_s: self.nominal.gyro_bias_rad_s,
+            accelerometer_bias_m_s2: self.nominal.accelerometer_bias_m_s2,
+            health: health::judge(
+                &self.config,
+                &self.gates,
+                &sigmas,
+                time_s - self.restarted_at_s,
+                time_s - self.surprised_at_s,
+            ),
+            sigmas,
+            heights: self.heights.sources(),
+        }
+    }
+
+    /// The counts of the gates.
+    pub fn gates(&self) -> &Gates {
+        &self.gates
+    }
+
+    /// How often the filter has restarted because its state was not a number.
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
+    /// Normalised estimation error squared of position, velocity and attitude against the truth. In a consistent filter
+    /// it is chi-square with 9 degrees of freedom. `None` if the covariance has lost rank.
+    pub fn nees_of_motion(&self, truth: &RigidState) -> Option<f64> {
+        let turn = (truth.world_from_body * self.nominal.world_from_body.inverse()).scaled_axis();
+        let position = truth.position_m - self.nominal.position_m;
+        let velocity = truth.velocity_m_s - self.nominal.velocity_m_s;
+        let error = nalgebra::SVector::<f64, 9>::from_iterator(
+            position.iter().chain(velocity.iter()).chain(turn.iter()).copied(),
+        );
+        let covariance =
+            nalgebra::SMatrix::<f64, 9, 9>::from_fn(|row, column| self.covariance.covariance(row, column));
+        Some(error.dot(&covariance.cholesky()?.solve(&error)))
+    }
+
+    fn velocity_through_air_m_s(&self) -> Vector3<f64> {
+        self.nominal.velocity_m_s - self.nominal.wind_m_s.push(0.0)
+    }
+
+    /// Keeps the last good state, and returns to it when the present state is not a number.
+    fn guard(&mut self) {
+        if self.nominal.is_finite() && self.covariance.is_finite() && self.heights.is_finite() {
+            self.last_good = self.nominal;
+            return;
+        }
+        let time_s = self.time_s();
+        self.restarts = self.restarts.saturating_add(1);
+        self.restarted_at_s = time_s;
+        self.nominal = self.last_good;
+        self.covariance = start_covariance(&self.start);
+        self.pending = Pending::default();
+        self.history = History::new(time_s);
+        self.sideways.clear();
+        self.heights = HeightChannel::new(
+            self.nominal.position_m.z,
+            self.start.height_m,
+            self.start.gnss_vertical_offset_m,
+        );
+    }
+}
+
+fn start_covariance(start: &StartUncertainty) -> Covariance {
+    let milli_g = 1e-3 * GRAVITY_M_S2;
+    let mut sigmas: Row = [0.0; N];
+    sigmas[POSITION..VELOCITY].copy_from_slice(start.position_m().as_slice());
+    sigmas[VELOCITY..ATTITUDE].fill(start.velocity_m_s);
+    sigmas[ATTITUDE..GYRO_BIAS].copy_from_slice(start.attitude_rad().as_slice());
+    sigmas[GYRO_BIAS..ACCELEROMETER_BIAS].fill(start.gyro_bias_deg_s.to_radians());
+    sigmas[ACCELEROMETER_BIAS..WIND].fill(start.accelerometer_bias_mg * milli_g);
+    sigmas[WIND..BAROMETER_OFFSET].fill(start.wind_m_s);
+    sigmas[BAROMETER_OFFSET] = start.barometer_offset_m;
+    sigmas[BAROMETER_RAM] = start.barometer_ram;
+    sigmas[GNSS_OFFSET..].copy_from_slice(start.gnss_offset_m().as_slice());
+    Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
+}

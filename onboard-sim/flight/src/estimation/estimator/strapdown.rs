@@ -1,0 +1,179 @@
+//! Propagates the state and its error with the inertial unit.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+
+use super::covariance::{
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GYRO_BIAS, N, Row,
+    Transition, VELOCITY, WIND,
+};
+use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
+use crate::computer::memory::remembers;
+use crate::vehicle::rigid::RigidState;
+
+/// The covariance is propagated once in this many frames, and before every correction.
+const FRAMES_BETWEEN: u32 = 2;
+/// Below this height the wind's power law is not used, m.
+const LOWEST_SHEAR_M: f64 = 2.0;
+
+/// The estimated state; its error is in the filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Nominal {
+    pub(super) position_m: Vector3<f64>,
+    pub(super) velocity_m_s: Vector3<f64>,
+    pub(super) world_from_body: UnitQuaternion<f64>,
+    pub(super) gyro_bias_rad_s: Vector3<f64>,
+    pub(super) accelerometer_bias_m_s2: Vector3<f64>,
+    pub(super) wind_m_s: Vector2<f64>,
+    pub(super) barometer_offset_m: f64,
+    pub(super) barometer_ram: f64,
+    pub(super) gnss_offset_m: Vector3<f64>,
+}
+
+impl Nominal {
+    pub(super) fn at(state: &RigidState) -> Self {
+        Self {
+            position_m: state.position_m,
+            velocity_m_s: state.velocity_m_s,
+            world_from_body: state.world_from_body,
+            gyro_bias_rad_s: Vector3::zeros(),
+            accelerometer_bias_m_s2: Vector3::zeros(),
+            wind_m_s: Vector2::zeros(),
+            barometer_offset_m: 0.0,
+            barometer_ram: 0.0,
+            gnss_offset_m: Vector3::zeros(),
+        }
+    }
+
+    /// Adds an error to the state.
+    pub(super) fn inject(&mut self, error: &Row) {
+        let three = |first: usize| Vector3::new(error[first], error[first + 1], error[first + 2]);
+        self.position_m += three(0);
+        self.velocity_m_s += three(VELOCITY);
+        self.world_from_body = UnitQuaternion::from_scaled_axis(three(ATTITUDE)) * self.world_from_body;
+        self.gyro_bias_rad_s += three(GYRO_BIAS);
+        self.accelerometer_bias_m_s2 += three(ACCELEROMETER_BIAS);
+        self.wind_m_s += three(WIND).xy();
+        self.barometer_offset_m += error[BAROMETER_OFFSET];
+        self.barometer_ram += error[BAROMETER_RAM];
+        self.gnss_offset_m += three(GNSS_OFFSET);
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.position_m
+            .iter()
+            .chain(self.velocity_m_s.iter())
+            .chain(self.world_from_body.coords.iter())
+            .chain(self.gyro_bias_rad_s.iter())
+            .chain(self.accelerometer_bias_m_s2.iter())
+            .chain(self.wind_m_s.iter())
+            .chain(self.gnss_offset_m.iter())
+            .chain([&self.barometer_offset_m, &self.barometer_ram])
+            .all(|value| value.is_finite())
+    }
+}
+
+/// The configured noise in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    pub(super) accelerometer_m_s2_sqrt_hz: f64,
+    /// Variance that each error gains in a second.
+    per_second: Row,
+}
+
+impl Noise {
+    pub(super) fn of(config: &EstimatorConfig) -> Self {
+        let milli_g = 1e-3 * GRAVITY_M_S2;
+        let accelerometer = config.accelerometer_noise_mg_sqrt_hz * milli_g;
+        let mut sigmas: Row = [0.0; N];
+        sigmas[VELOCITY..ATTITUDE].fill(accelerometer);
+        sigmas[ATTITUDE..GYRO_BIAS].fill(config.gyro_noise_deg_s_sqrt_hz.to_radians());
+        sigmas[GYRO_BIAS..ACCELEROMETER_BIAS].fill(config.gyro_bias_walk_deg_s_sqrt_s.to_radians());
+        sigmas[ACCELEROMETER_BIAS..WIND].fill(config.accelerometer_bias_walk_mg_sqrt_s * milli_g);
+        sigmas[WIND..BAROMETER_OFFSET].fill(config.wind_walk_m_s_sqrt_s);
+        sigmas[BAROMETER_OFFSET] = config.barometer_offset_walk_m_sqrt_s;
+        sigmas[BAROMETER_RAM] = config.barometer_ram_walk_sqrt_s;
+        sigmas[GNSS_OFFSET] = config.gnss_horizontal_walk_m_sqrt_s;
+        sigmas[GNSS_OFFSET + 1] = config.gnss_horizontal_walk_m_sqrt_s;
+        sigmas[GNSS_OFFSET + 2] = config.gnss_vertical_walk_m_sqrt_s;
+        Self { accelerometer_m_s2_sqrt_hz: accelerometer, per_second: sigmas.map(|sigma| sigma * sigma) }
+    }
+}
+
+/// The motion over the frames that the covariance does not contain yet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pending {
+    frames: u32,
+    felt_m_s: Vector3<f64>,
+    world_from_body_s: Matrix3<f64>,
+    wind_factor: f64,
+}
+
+remembers!(Pending { frames, felt_m_s, world_from_body_s, wind_factor });
+
+impl Default for Pending {
+    fn default() -> Self {
+        Self { frames: 0, felt_m_s: Vector3::zeros(), world_from_body_s: Matrix3::zeros(), wind_factor: 1.0 }
+    }
+}
+
+impl Estimator {
+    /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force turned by the
+    /// attitude in the middle of the frame.
+    pub(super) fn carry_forward(&mut self, imu: &ImuSample) {
+        let interval_s = self.config.frame_s;
+        if self.gates.imu.count(imu.is_plausible()) {
+            self.last_imu = *imu;
+        }
+        let state = &mut self.nominal;
+        self.rate_rad_s = self.last_imu.gyro_rad_s - state.gyro_bias_rad_s;
+        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 - state.accelerometer_bias_m_s2;
+
+        let half_turn = UnitQuaternion::from_scaled_axis(self.rate_rad_s * (0.5 * interval_s));
+        let middle = state.world_from_body * half_turn;
+        state.world_from_body = middle * half_turn;
+        // Products of unit quaternions drift from unit length by rounding.
+        state.world_from_body.renormalize_fast();
+        let middle = middle.to_rotation_matrix();
+        let felt_m_s = middle * self.specific_force_m_s2 * interval_s;
+        let gained_m_s = felt_m_s - Vector3::z() * (self.config.gravity_m_s2 * interval_s);
+        let moved_m = (state.velocity_m_s + gained_m_s * 0.5) * interval_s;
+        state.position_m += moved_m;
+        state.velocity_m_s += gained_m_s;
+
+        let climb = state.velocity_m_s.z * interval_s / state.position_m.z.max(LOWEST_SHEAR_M);
+        let wind_factor = if state.position_m.z > LOWEST_SHEAR_M {
+            1.0 + self.config.wind_shear_exponent * climb
+        } else {
+            1.0
+        };
+        state.wind_m_s *= wind_factor;
+
+        self.pending.frames += 1;
+        self.pending.felt_m_s += felt_m_s;
+        self.pending.world_from_body_s += middle.matrix() * interval_s;
+        self.pending.wind_factor *= wind_factor;
+        let time_s = self.time_s();
+        self.history.push(time_s, interval_s, &gained_m_s);
+        let velocity_m2_s2 = self.covariance.variance(VELOCITY + 2);
+        self.heights.predict(&self.config, moved_m.z, velocity_m2_s2, interval_s);
+        if self.pending.frames >= FRAMES_BETWEEN {
+            self.catch_up();
+        }
+    }
+
+    /// Propagates the covariance over the frames that it does not contain yet.
+    pub(super) fn catch_up(&mut self) {
+        if self.pending.frames == 0 {
+            return;
+        }
+        let interval_s = f64::from(self.pending.frames) * self.config.frame_s;
+        self.covariance.propagate(&Transition {
+            interval_s,
+            felt_m_s: self.pending.felt_m_s,
+            world_from_body_s: self.pending.world_from_body_s,
+            wind_factor: self.pending.wind_factor,
+            noise: self.noise.per_second.map(|variance| variance * interval_s),
+        });
+        self.pending = Pending::default();
+    }
+}

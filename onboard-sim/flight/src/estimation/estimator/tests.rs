@@ -1,0 +1,209 @@
+//! Edge cases: inputs that are not numbers, silent sensors, impossible measurements.
+
+use proptest::prelude::*;
+
+use super::*;
+
+const VEHICLE: VehicleNow = VehicleNow {
+    mass_kg: 3.0,
+    air_density_kg_m3: 1.2,
+    body_drag_area_m2: 0.0043,
+    fin_drag_area_m2: 0.031,
+    fin_lift_area_m2: Vector2::new(0.0, 0.0),
+    fin_ahead_of_cg_m: 0.11,
+    crossflow_area_m2: 0.09,
+    motor_burning: false,
+    lidar_behind_cg_m: 0.4,
+};
+
+fn at(height_m: f64) -> Estimator {
+    let state = RigidState::upright(height_m);
+    Estimator::new(&EstimatorConfig::default(), &StartUncertainty::at_apogee(), 0.0, &state)
+}
+
+/// The measurements of every sensor in an upright hover.
+fn hovering(frame: u64) -> Measurements {
+    Measurements {
+        imu: ImuSample {
+            gyro_rad_s: Vector3::zeros(),
+            specific_force_m_s2: Vector3::new(GRAVITY_M_S2, 0.0, 0.0),
+        },
+        pressure_altitude_m: frame.is_multiple_of(4).then_some(5.0),
+        gnss: frame.is_multiple_of(40).then(|| GnssFix {
+            position_m: Vector3::new(0.0, 0.0, 5.0),
+            velocity_m_s: Vector3::zeros(),
+            valid_at_s: frame as f64 * 0.005 - 0.12,
+        }),
+        lidar_range_m: frame.is_multiple_of(2).then_some(4.6),
+    }
+}
+
+#[test]
+fn the_estimate_of_a_hover_does_not_drift() {
+    let mut estimator = at(5.0);
+    let mut estimate = estimator.estimate();
+    for frame in 1..=2000 {
+        estimate = estimator.step(&hovering(frame), &VEHICLE);
+    }
+    assert!((estimate.time_s - 10.0).abs() < 1e-9);
+    assert!((estimate.state.position_m - Vector3::new(0.0, 0.0, 5.0)).norm() < 1e-6, "{estimate:?}");
+    assert!(estimate.state.velocity_m_s.norm() < 1e-6);
+    assert!(estimate.health.is_good());
+    let gates = estimator.gates();
+    assert_eq!((gates.imu.accepted, gates.barometer.accepted, gates.lidar.accepted), (2000, 500, 1000));
+    assert_eq!((gates.gnss_velocity.accepted, gates.gnss_position.rejected), (150, 0));
+}
+
+#[test]
+fn a_turn_on_gyro_bias_found_on_the_pad_does_not_turn_the_attitude() {
+    let bias_rad_s = Vector3::new(0.004, -0.003, 0.005);
+    let on_pad = |frame| {
+        let mut measurements = hovering(frame);
+        measurements.imu.gyro_rad_s += bias_rad_s;
+        measurements
+    };
+    let mut alignment = alignment::PadAlignment::default();
+    for frame in 1..=400 {
+        alignment.take(&on_pad(frame).imu);
+    }
+    let pad = alignment.finish(0.0).unwrap();
+    let state = RigidState { world_from_body: pad.world_from_body, ..RigidState::upright(5.0) };
+    let mut estimator = Estimator::new(&EstimatorConfig::default(), &StartUncertainty::on_pad(), 0.0, &state)
+        .with_gyro_bias(pad.gyro_bias_rad_s);
+    for frame in 1..=2000 {
+        estimator.step(&on_pad(frame), &VEHICLE);
+    }
+    let estimate = estimator.estimate();
+    assert!(estimate.health.is_good());
+    assert!(estimate.state.tilt_rad() < 1e-6, "{estimate:?}");
+    assert!((estimate.gyro_bias_rad_s - bias_rad_s).norm() < 1e-6, "{estimate:?}");
+}
+
+#[test]
+fn a_silent_inertial_unit_is_bridged_and_then_makes_the_estimate_unhealthy() {
+    let mut estimator = at(5.0);
+    let mut health = Vec::new();
+    for frame in 1..=20 {
+        let mut measurements = hovering(frame);
+        if frame > 10 {
+            measurements.imu.gyro_rad_s.x = f64::NAN;
+        }
+        health.push(estimator.step(&measurements, &VEHICLE).health);
+    }
+    assert!(health[..14].iter().all(|health| health.is_good()));
+    assert!(health[14..].iter().all(|health| *health == Health::Doubtful(Doubt::Imu)));
+    assert_eq!(health[19].to_string(), "no usable inertial samples");
+    assert!(estimator.estimate().state.is_finite());
+}
+
+#[test]
+fn an_outlier_is_rejected_and_counted() {
+    let mut estimator = at(5.0);
+    for frame in 1..=400 {
+        estimator.step(&hovering(frame), &VEHICLE);
+    }
+    let before = estimator.estimate().state.position_m.z;
+    let mut wild = hovering(400);
+    wild.pressure_altitude_m = Some(80.0);
+    wild.lidar_range_m = Some(0.2);
+    wild.gnss = Some(GnssFix {
+        position_m: Vector3::new(500.0, 0.0, 0.0),
+        velocity_m_s: Vector3::new(30.0, f64::NAN, f64::INFINITY),
+        valid_at_s: 1.9,
+    });
+    let after = estimator.step(&wild, &VEHICLE);
+    assert!((after.state.position_m.z - before).abs() < 1e-3, "{after:?}");
+    assert!(after.state.velocity_m_s.norm() < 1e-3, "{after:?}");
+    let gates = estimator.gates();
+    assert_eq!((gates.barometer.rejected, gates.lidar.rejected, gates.gnss_velocity.rejected), (1, 1, 3));
+}
+
+#[test]
+fn fixes_from_the_future_or_long_ago_are_rejected() {
+    let mut estimator = at(5.0);
+    for (frame, valid_at_s) in [(1, 1.0), (2, -3.0), (3, f64::NAN)] {
+        let mut measurements = hovering(1);
+        measurements.gnss = Some(GnssFix {
+            position_m: Vector3::new(0.0, 0.0, 5.0),
+            velocity_m_s: Vector3::zeros(),
+            valid_at_s,
+        });
+        estimator.step(&measurements, &VEHICLE);
+        assert_eq!(estimator.gates().gnss_velocity.rejected, 3 * frame);
+        assert_eq!(estimator.gates().gnss_velocity.accepted, 0);
+    }
+}
+
+#[test]
+fn a_state_that_is_not_a_number_restarts_from_the_last_good_one() {
+    let mut estimator = at(5.0);
+    for frame in 1..=100 {
+        estimator.step(&hovering(frame), &VEHICLE);
+    }
+    // Bad input does not get this far; a bug in the filter itself would.
+    estimator.nominal.velocity_m_s.x = f64::NAN;
+    let after = estimator.step(&hovering(101), &VEHICLE);
+    assert!(after.state.is_finite());
+    assert_eq!(after.health, Health::Doubtful(Doubt::Restarted));
+    assert_eq!(estimator.restarts(), 1);
+    let mut health = after.health;
+    for frame in 102..=600 {
+        health = estimator.step(&hovering(frame), &VEHICLE).health;
+    }
+    assert_eq!(health, Health::Good);
+    assert!((estimator.estimate().state.position_m.z - 5.0).abs() < 0.1);
+}
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        5 => -50.0..50.0,
+        1 => prop::num::f64::ANY,
+    ]
+}
+
+fn any_vector() -> impl Strategy<Value = Vector3<f64>> {
+    (any_number(), any_number(), any_number()).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+}
+
+fn any_measurements() -> impl Strategy<Value = Measurements> {
+    (
+        (any_vector(), any_vector()),
+        prop::option::of(any_number()),
+        prop::option::of((any_vector(), any_vector(), 0.0..0.5)),
+        prop::option::of(any_number()),
+    )
+        .prop_map(|((gyro_rad_s, specific_force_m_s2), pressure_altitude_m, gnss, lidar_range_m)| {
+            Measurements {
+                imu: ImuSample { gyro_rad_s, specific_force_m_s2 },
+                pressure_altitude_m,
+                gnss: gnss.map(|(position_m, velocity_m_s, valid_at_s)| GnssFix {
+                    position_m,
+                    velocity_m_s,
+                    valid_at_s,
+                }),
+                lidar_range_m,
+            }
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whatever_is_measured_the_estimate_is_a_number(
+        log in prop::collection::vec(any_measurements(), 1..80),
+        mass_kg in any_number(),
+        lidar_behind_cg_m in any_number(),
+        burning in any::<bool>(),
+    ) {
+        let vehicle = VehicleNow { mass_kg, lidar_behind_cg_m, motor_burning: burning, ..VEHICLE };
+        let mut estimator = at(20.0);
+        for measurements in &log {
+            let estimate = estimator.step(measurements, &vehicle);
+            prop_assert!(estimate.state.is_finite(), "{:?}", estimate);
+            prop_assert!(estimate.wind_m_s.iter().all(|wind| wind.is_finite()));
+            prop_assert!(estimate.sigmas.velocity_m_s.iter().all(|sigma| sigma.is_finite()));
+            prop_assert!((estimate.state.world_from_body.norm() - 1.0).abs() < 1e-6);
+        }
+    }
+}

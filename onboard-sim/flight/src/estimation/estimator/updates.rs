@@ -1,0 +1,199 @@
+//! Corrections by barometer, satellites and lidar, one scalar after the other.
+
+use super::covariance::{
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GYRO_BIAS, POSITION,
+    VELOCITY, WIND,
+};
+use super::{Estimator, GnssFix};
+
+/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height.
+const LIDAR_COS_TILT: f64 = 0.65;
+/// Standard deviations that the filter adds when satellite velocities do not fit on average.
+const DOUBT_VELOCITY_M_S: f64 = 0.5;
+const DOUBT_ATTITUDE_RAD: f64 = 0.04;
+const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
+const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
+/// After this many rejections in a row the filter assumes that the barometer has a new offset, with this standard
+/// deviation, m.
+const BAROMETER_REJECTIONS: u32 = 25;
+const DOUBT_BAROMETER_M: f64 = 3.0;
+/// After this many rejected numbers in a row (three for each fix) the filter assumes that the estimated position is
+/// wrong, and adds this standard deviation, m.
+const POSITION_REJECTIONS: u32 = 9;
+const DOUBT_POSITION_M: f64 = 3.0;
+/// After this many rejected ranges in a row the filter assumes that the estimated height is wrong.
+const LIDAR_REJECTIONS: u32 = 10;
+
+/// The result of a scalar correction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Correction {
+    /// Innovation squared divided by its variance; its expected value is 1.
+    pub(super) normalised_squared: f64,
+    pub(super) accepted: bool,
+}
+
+impl Estimator {
+    /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count in the variance but
+    /// are not changed.
+    pub(super) fn correct(
+        &mut self,
+        sensitivity: &[(usize, f64)],
+        innovation: f64,
+        noise_variance: f64,
+        moved: impl Fn(usize) -> bool,
+    ) -> Correction {
+        self.catch_up();
+        let (seen, with) = self.covariance.project(sensitivity);
+        let variance = seen + noise_variance;
+        let normalised_squared = innovation * innovation / variance;
+        let gate = self.config.gate_sigmas * self.config.gate_sigmas;
+        // The comparison is false for NaN, so NaN is rejected.
+        let accepted = normalised_squared <= gate && variance > 0.0 && variance.is_finite();
+        if accepted {
+            let mut gain = with;
+            for (index, value) in gain.iter_mut().enumerate() {
+                *value = if moved(index) { *value / variance } else { 0.0 };
+            }
+            self.nominal.inject(&gain.map(|share| share * innovation));
+            self.covariance.update(&gain, &with, variance);
+        }
+        Correction { normalised_squared, accepted }
+    }
+
+    /// The barometer measures height plus its own offset plus the ram error `-k V^2 / 2 g`.
+    pub(super) fn take_barometer(&mut self, altitude_m: f64) {
+        let gravity = self.config.gravity_m_s2;
+        let through_air = self.velocity_through_air_m_s();
+        let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
+        let state = &self.nominal;
+        let by_velocity = through_air * (-state.barometer_ram / gravity);
+        let predicted_m =
+            state.position_m.z + state.barometer_offset_m - state.barometer_ram * speed_height_m;
+        let sensitivity = [
+            (POSITION + 2, 1.0),
+            (VELOCITY, by_velocity.x),
+            (VELOCITY + 1, by_velocity.y),
+            (VELOCITY + 2, by_velocity.z),
+            (WIND, -by_velocity.x),
+            (WIND + 1, -by_velocity.y),
+            (BAROMETER_OFFSET, 1.0),
+            (BAROMETER_RAM, -speed_height_m),
+        ];
+        let noise = self.config.barometer_m * self.config.barometer_m;
+        let correction = self.correct(&sensitivity, altitude_m - predicted_m, noise, |_| true);
+        self.gates.barometer.count(correction.accepted);
+        if altitude_m.is_finite() {
+            let state = &self.nominal;
+            self.heights
+                .take_barometer(altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m);
+        }
+        if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
+            self.gates.barometer.rejected_in_a_row = 0;
+            self.covariance.widen(BAROMETER_OFFSET, DOUBT_BAROMETER_M * DOUBT_BAROMETER_M);
+        }
+    }
+
+    /// A fix measures the past position and velocity, and the slow offset of the position.
+    pub(super) fn take_gnss(&mut self, fix: &GnssFix) {
+        self.catch_up();
+        for axis in 0..3 {
+            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+                self.gates.gnss_velocity.count(false);
+                continue;
+            };
+            // The past velocity is the present one minus the gain since. The gain depends on the attitude and the
+            // accelerometer bias, which have errors of their own.
+            let felt = since.gained_m_s + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
+            let by_attitude = felt.cross_matrix();
+            let by_bias = self.nominal.world_from_body.to_rotation_matrix().into_inner() * since.age_s;
+            let sensitivity = [
+                (VELOCITY + axis, 1.0),
+                (ATTITUDE, by_attitude[(axis, 0)]),
+                (ATTITUDE + 1, by_attitude[(axis, 1)]),
+                (ATTITUDE + 2, by_attitude[(axis, 2)]),
+                (ACCELEROMETER_BIAS, by_bias[(axis, 0)]),
+                (ACCELEROMETER_BIAS + 1, by_bias[(axis, 1)]),
+                (ACCELEROMETER_BIAS + 2, by_bias[(axis, 2)]),
+            ];
+            let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
+            let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s;
+            let correction = self.correct(&sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
+            self.gates.gnss_velocity.count(correction.accepted);
+            if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
+            {
+                self.doubt_motion();
+            }
+        }
+        for axis in 0..3 {
+            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+                self.gates.gnss_position.count(false);
+                continue;
+            };
+            let sensitivity =
+                [(POSITION + axis, 1.0), (VELOCITY + axis, -since.age_s), (GNSS_OFFSET + axis, 1.0)];
+            let predicted =
+                self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
+            let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
+            let correction =
+                self.correct(&sensitivity, fix.position_m[axis] - predicted, sigma * sigma, |_| true);
+            self.gates.gnss_position.count(correction.accepted);
+            if axis == 2 && fix.position_m.z.is_finite() {
+                self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z);
+            }
+        }
+        if self.gates.gnss_position.rejected_in_a_row >= POSITION_REJECTIONS {
+            self.gates.gnss_position.rejected_in_a_row = 0;
+            for axis in 0..3 {
+                self.covariance.widen(POSITION + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
+                self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
+            }
+        }
+    }
+
+    /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
+    /// height divided by the cosine of the tilt.
+    pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
+        let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
+        if nose.z < LIDAR_COS_TILT {
+            self.gates.lidar.count(false);
+            return;
+        }
+        let slant_m = self.nominal.position_m.z / nose.z;
+        let sensitivity = [
+            (POSITION + 2, 1.0 / nose.z),
+            (ATTITUDE, -slant_m / nose.z * nose.y),
+            (ATTITUDE + 1, slant_m / nose.z * nose.x),
+        ];
+        let measured_m = range_m + behind_cg_m;
+        let noise = self.config.lidar_m * self.config.lidar_m;
+        // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
+        let correction = self.correct(&sensitivity, measured_m - slant_m, noise, |index| {
+            !(ATTITUDE..ATTITUDE + 3).contains(&index)
+        });
+        self.gates.lidar.count(correction.accepted);
+        if measured_m.is_finite() {
+            self.heights.take_lidar(&self.config, measured_m * nose.z, nose.z);
+        }
+        if self.gates.lidar.rejected_in_a_row >= LIDAR_REJECTIONS {
+            self.gates.lidar.rejected_in_a_row = 0;
+            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
+        }
+    }
+
+    /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on average, so an error
+    /// of the inertial unit must have changed.
+    fn doubt_motion(&mut self) {
+        self.surprised_at_s = self.time_s();
+        for axis in 0..3 {
+            let widen = [
+                (VELOCITY, DOUBT_VELOCITY_M_S),
+                (ATTITUDE, DOUBT_ATTITUDE_RAD),
+                (GYRO_BIAS, DOUBT_GYRO_BIAS_RAD_S),
+                (ACCELEROMETER_BIAS, DOUBT_ACCELEROMETER_BIAS_M_S2),
+            ];
+            for (first, sigma) in widen {
+                self.covariance.widen(first + axis, sigma * sigma);
+            }
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! Estimates the impulse, the burn time and the instant of ignition of the motor from the specific force along the
+//! nose.
+//!
+//! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4 %. With the nominal
+//! curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the instant of ignition `t0`, the thrust is
+//! `T(t) = s / b T0((t - t0) / b)`. The specific force along the nose contains the thrust and the air force:
+//! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
+//! extended Kalman filter over `(s, b, t0, d)` finds all four; it finds `d` before ignition, while the vehicle falls.
+
+mod digest;
+mod ignition;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{Matrix4, Vector2, Vector4};
+use serde::Deserialize;
+
+use self::ignition::Detector;
+use crate::vehicle::thrust_curve::ThrustCurve;
+
+/// The data sheet's thrust by time since ignition, s to N; zero before 0 and after the burn.
+pub trait NominalThrust {
+    /// Thrust at a time since ignition, N.
+    fn thrust_n(&self, time_s: f64) -> f64;
+    /// Largest thrust, N.
+    fn peak_n(&self) -> f64;
+}
+
+impl NominalThrust for ThrustCurve {
+    fn thrust_n(&self, time_s: f64) -> f64 {
+        self.thrust_at_n(time_s)
+    }
+
+    fn peak_n(&self) -> f64 {
+        self.peak_thrust_n()
+    }
+}
+
+/// The input of one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorSample {
+    /// End of the frame, s.
+    pub time_s: f64,
+    /// Specific force along the nose without its bias, mean over the frame, m/s^2.
+    pub axial_specific_force_m_s2: f64,
+    pub mass_kg: f64,
+    /// Modelled air force along the nose at this speed, N; positive in a tail-first fall.
+    pub axial_air_force_n: f64,
+    /// Gimbal angles, pitch and yaw, rad.
+    pub gimbal_rad: [f64; 2],
+    /// The igniter has been fired; ignition is only searched for after that.
+    pub may_burn: bool,
+}
+
+/// The prior of the motor before ignition, and the noise, as standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotorPrior {
+    /// Length of a frame, s.
+    pub frame_s: f64,
+    /// Impulse scale. It includes the mass error, because the accelerometer cannot tell the two apart.
+    pub impulse_sigma: f64,
+    /// Burn-time stretch.
+    pub burn_time_sigma: f64,
+    /// Scale of the air force.
+    pub air_sigma: f64,
+    /// Accelerometer noise of one frame, m/s^2.
+    pub accelerometer_m_s2: f64,
+    /// Roughness of the burn around its curve, as a fraction of the thrust.
+    pub roughness_share: f64,
+}
+
+impl Default for MotorPrior {
+    /// The scatter of certified motors, 1 % of mass, and a hobby accelerometer at 200 Hz.
+    fn default() -> Self {
+        Self {
+            frame_s: 0.005,
+            impulse_sigma: 0.027,
+            burn_time_sigma: 0.04,
+            air_sigma: 0.1,
+            accelerometer_m_s2: 0.09,
+            roughness_share: 0.02,
+        }
+    }
+}
+
+/// State of the motor, as far as the accelerometer shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MotorStage {
+    /// Not lit.
+    Waiting,
+    Burning,
+    /// The thrust fell far below the curve at this time, s: the motor burnt out early.
+    EndedEarly {
+        at_s: f64,
+    },
+}
+
+/// Thrust with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PredictedThrust {
+    pub thrust_n: f64,
+    /// Standard deviation, N.
+    pub sigma_n: f64,
+}
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorEstimate {
+    prior: MotorPrior,
+    detector: Detector,
+    stage: MotorStage,
+    /// Impulse scale, burn-time stretch, ignition, s, air scale.
+    mean: Vector4<f64>,
+    covariance: Matrix4<f64>,
+    /// Frames in a row with far too little thrust.
+    starved_frames: u32,
+}
+
+const IMPULSE: usize = 0;
+const STRETCH: usize = 1;
+const IGNITION: usize = 2;
+const AIR: usize = 3;
+
+/// The igniter and the first pressure peak are not in the curve, so samples within this time after ignition are not
+/// used, s.
+const SPIKE_S: f64 = 0.06;
+/// Correlation time of roughness and shape errors, s: samples within it are not independent.
+const ROUGHNESS_LASTS_S: f64 = 0.1;
+/// Gusts along the nose and a lean against the wind change the air force by this fraction, with this correlation time,
+/// s.
+const GUST_SHARE: f64 = 0.03;
+const GUST_LASTS_S: f64 = 0.5;
+/// Wander of the air scale in one second: the flow changes with speed, lean and exhaust.
+const AIR_WALK_SQRT_S: f64 = 0.01;
+/// Below this air force the air scale is not estimated, N.
+const SMALLEST_AIR_N: f64 = 2.0;
+/// Below this fraction of the peak, in the tail-off, samples are not used.
+const TAIL_SHARE: f64 = 0.08;
+/// A sample that differs from its prediction by more than this many standard deviations is rejected.
+const GATE_SIGMAS: f64 = 5.0;
+/// Below this fraction of the predicted thrust, for this many frames in a row, the motor has burnt out.
+const STARVED_SHARE: f64 = 0.3;
+const STARVED_FRAMES: u32 = 16;
+/// Half the span over which the curve's slope is taken, s.
+const SLOPE_SPAN_S: f64 = 0.02;
+/// Limits of the scales.
+const IMPULSE_RANGE: [f64; 2] = [0.7, 1.3];
+const STRETCH_RANGE: [f64; 2] = [0.8, 1.25];
+
+impl MotorEstimate {
+    /// The filter before ignition, with the prior only.
+    pub fn new(prior: &MotorPrior) -> Self {
+        let sigmas =
+            Vector4::new(prior.impulse_sigma, prior.burn_time_sigma, ignition::SIGMA_S, prior.air_sigma);
+        Self {
+            prior: *prior,
+            detector: Detector::default(),
+            stage: MotorStage::Waiting,
+            mean: Vector4::new(1.0, 1.0, 0.0, 1.0),
+            covariance: Matrix4::from_diagonal(&sigmas.component_mul(&sigmas)),
+            starved_frames: 0,
+        }
+    }
+
+    /// State of the motor.
+    pub fn stage(&self) -> MotorStage {
+        self.stage
+    }
+
+    /// True impulse over nominal impulse.
+    pub fn impulse_scale(&self) -> f64 {
+        self.mean[IMPULSE]
+    }
+
+    /// True burn time over nominal burn time.
+    pub fn burn_time_stretch(&self) -> f64 {
+        self.mean[STRETCH]
+    }
+
+    /// Instant of ignition, s; `None` before it.
+    pub fn ignition_s(&self) -> Option<f64> {
+        (self.stage != MotorStage::Waiting).then_some(self.mean[IGNITION])
+    }
+
+    /// True air force divided by the modelled one.
+    pub fn air_scale(&self) -> f64 {
+        self.mean[AIR]
+    }
+
+    /// Standard deviations of impulse scale, burn-time stretch, ignition, s, and air scale.
+    pub fn sigmas(&self) -> [f64; 4] {
+        core::array::from_fn(|index| libm::sqrt(self.covariance[(index, index)].max(0.0)))
+    }
+
+    /// Impulse scale and burn-time stretch of the worst motor at this many standard deviations: the one that changes a
+    /// quantity most, given the quantity's derivatives by the two. A positive deviation raises the quantity.
+    pub fn doubted(&self, derivatives: [f64; 2], sigmas: f64) -> [f64; 2] {
+        let with = self.covariance.fixed_view::<2, 2>(0, 0) * Vector2::from(derivatives);
+        let variance = with.dot(&Vector2::from(derivatives));
+        let moved = if variance > 0.0 { with * (sigmas / libm::sqrt(variance)) } else { Vector2::zeros() };
+        [
+            (self.mean[IMPULSE] + moved.x).clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]),
+            (self.mean[STRETCH] + moved.y).clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]),
+        ]
+    }
+
+    /// Takes one frame. A sample that is not finite is ignored.
+    pub fn update(&mut self, curve: &impl NominalThrust, sample: &MotorSample) {
+        let force_n = sample.mass_kg * sample.axial_specific_force_m_s2;
+        let cosine = libm::cos(sample.gimbal_rad[0]) * libm::cos(sample.gimbal_rad[1]);
+        let finite = [sample.time_s, force_n, sample.axial_air_force_n, cosine];
+        if !finite.iter().all(|value| value.is_finite()) {
+            return;
+        }
+        self.covariance[(AIR, AIR)] += AIR_WALK_SQRT_S * AIR_WALK_SQRT_S * self.prior.frame_s;
+        match self.stage {
+            MotorStage::Waiting => self.wait(curve, sample, force_n),
+            MotorStage::Burning => self.follow(curve, sample, force_n, cosine),
+            MotorStage::EndedEarly { .. } => {}
+        }
+    }
+
+    /// Before ignition: estimates the air scale, and searches for thrust once the igniter is fired.
+    fn wait(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64) {
+        let air_n = sample.axial_air_force_n;
+        let thrust_n = force_n - self.air_scale() * air_n;
+        if sample.may_burn {
+            let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
+            if let Some(ignition_s) = self.detector.take(curve, middle_s, thrust_n) {
+                self.stage = MotorStage::Burning;
+                self.mean[IGNITION] = ignition_s;
+            }
+        }
+        // Rising thrust must not be mistaken for air force.
+        if !self.detector.suspects() && air_n.abs() > SMALLEST_AIR_N {
+            self.learn(sample, Vector4::new(0.0, 0.0, 0.0, air_n), thrust_n, 0.0);
+        }
+    }
+
+    /// Thrust at a time on the sample's clock. Before ignition the motor is assumed to light at `lights_at_s`.
+    pub fn predict(&self, curve: &impl NominalThrust, time_s: f64, lights_at_s: f64) -> PredictedThrust {
+        let ignition_s = match self.stage {
+            MotorStage::Waiting => lights_at_s,
+            MotorStage::EndedEarly { at_s } if time_s >= at_s => {
+                return PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 };
+            }
+            MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
+        };
+        let (thrust_n, sensitivity) = self.thrust(curve, time_s - ignition_s);
+        let variance = sensitivity.dot(&(self.covariance * sensitivity));
+        PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
+    }
+
+    /// Thrust and its derivatives by the four, at a time since ignition.
+    fn thrust(&self, curve: &impl NominalThrust, since_s: f64) -> (f64, Vector4<f64>) {
+        let (scale, stretch) = (self.mean[IMPULSE], self.mean[STRETCH]);
+        let nominal_s = since_s / stretch;
+        let nominal_n = curve.thrust_n(nominal_s);
+        let thrust_n = scale / stretch * nominal_n;
+        // Only points inside the burn are used, because the curve has steps at its ends.
+        let (from_s, to_s) = ((nominal_s - SLOPE_SPAN_S).max(0.0), nominal_s + SLOPE_SPAN_S);
+        let slope_n_s = if nominal_n > 0.0 {
+            (curve.thrust_n(to_s) - curve.thrust_n(from_s)) / (to_s - from_s)
+        } else {
+            0.0
+        };
+        let by_time = scale / (stretch * stretch) * slope_n_s;
+        let sensitivity =
+            Vector4::new(nominal_n / stretch, -thrust_n / stretch - by_time * nominal_s, -by_time, 0.0);
+        (thrust_n, sensitivity)
+    }
+
+    fn follow(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64, cosine: f64) {
+        let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
+        let (thrust_n, by_motor) = self.thrust(curve, since_s);
+        if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_n() {
+            self.starved_frames = 0;
+            return;
+        }
+        let air_n = sample.axial_air_force_n;
+        let starved = force_n - self.air_scale() * air_n < STARVED_SHARE * thrust_n * cosine;
+        self.starved_frames = if starved { self.starved_frames + 1 } else { 0 };
+        if self.starved_frames >= STARVED_FRAMES {
+            let lasted_s = f64::from(STARVED_FRAMES) * self.prior.frame_s;
+            self.stage = MotorStage::EndedEarly { at_s: sample.time_s - lasted_s };
+            return;
+        }
+        if starved {
+            return;
+        }
+        let mut sensitivity = by_motor * cosine;
+        sensitivity[AIR] = air_n;
+        let innovation_n = force_n - thrust_n * cosine - self.air_scale() * air_n;
+        self.learn(sample, sensitivity, innovation_n, thrust_n);
+    }
+
+    fn learn(&mut self, sample: &MotorSample, sensitivity: Vector4<f64>, innovation_n: f64, thrust_n: f64) {
+        let white_n = sample.mass_kg * self.prior.accelerometer_m_s2;
+        let frames = |lasts_s: f64| (lasts_s / self.prior.frame_s).max(1.0);
+        let rough_n = self.prior.roughness_share * thrust_n;
+        let gust_n = GUST_SHARE * sample.axial_air_force_n;
+        let noise = white_n * white_n
+            + rough_n * rough_n * frames(ROUGHNESS_LASTS_S)
+            + gust_n * gust_n * frames(GUST_LASTS_S);
+        let with = self.covariance * sensitivity;
+        let variance = sensitivity.dot(&with) + noise;
+        if innovation_n * innovation_n > GATE_SIGMAS * GATE_SIGMAS * variance {
+            return;
+        }
+        let gain = with / variance;
+        self.mean += gain * innovation_n;
+        // P h' h P / s is exactly symmetric, so the difference stays symmetric.
+        self.covariance -= with * with.transpose() / variance;
+        for index in 0..4 {
+            self.covariance[(index, index)] = self.covariance[(index, index)].max(1e-12);
+        }
+        self.mean[IMPULSE] = self.mean[IMPULSE].clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]);
+        self.mean[STRETCH] = self.mean[STRETCH].clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]);
+    }
+}

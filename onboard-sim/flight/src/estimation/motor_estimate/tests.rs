@@ -1,0 +1,202 @@
+//! The filter finds the parameters of simulated motors that are drawn from the prior.
+
+use super::*;
+
+/// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls for a long time.
+#[derive(Debug, Clone, Copy)]
+struct Curve;
+
+const POINTS: [(f64, f64); 7] =
+    [(0.0, 0.0), (0.14, 62.0), (1.3, 69.0), (2.5, 61.0), (4.1, 34.0), (5.5, 14.0), (7.2, 0.0)];
+
+impl NominalThrust for Curve {
+    fn thrust_n(&self, time_s: f64) -> f64 {
+        POINTS.windows(2).find(|pair| (pair[0].0..pair[1].0).contains(&time_s)).map_or(0.0, |pair| {
+            let share = (time_s - pair[0].0) / (pair[1].0 - pair[0].0);
+            pair[0].1 + share * (pair[1].1 - pair[0].1)
+        })
+    }
+
+    fn peak_n(&self) -> f64 {
+        69.0
+    }
+}
+
+/// Approximately standard normal numbers from a small generator: a sum of twelve uniform numbers.
+struct Normal(u64);
+
+impl Normal {
+    fn next(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Motor {
+    impulse: f64,
+    stretch: f64,
+    ignition_s: f64,
+    air: f64,
+    /// Thrust divided by the curve's in the first 50 ms.
+    spike: f64,
+    /// The motor goes out, s after ignition.
+    out_s: f64,
+}
+
+const GOOD: Motor =
+    Motor { impulse: 1.0, stretch: 1.0, ignition_s: 4.0, air: 1.0, spike: 1.0, out_s: f64::INFINITY };
+
+impl Motor {
+    fn drawn(normal: &mut Normal) -> Self {
+        let prior = MotorPrior::default();
+        Self {
+            impulse: 1.0 + prior.impulse_sigma * normal.next(),
+            stretch: 1.0 + prior.burn_time_sigma * normal.next(),
+            ignition_s: 4.0 + 0.01 * normal.next(),
+            air: 1.0 + prior.air_sigma * normal.next(),
+            ..GOOD
+        }
+    }
+
+    fn thrust_n(&self, time_s: f64) -> f64 {
+        let since_s = time_s - self.ignition_s;
+        if since_s > self.out_s {
+            return 0.0;
+        }
+        let spike = if since_s < 0.05 { self.spike } else { 1.0 };
+        spike * self.impulse / self.stretch * Curve.thrust_n(since_s / self.stretch)
+    }
+
+    /// Falls for four seconds, and burns until `end_s` after ignition.
+    fn found_after(&self, end_s: f64, normal: &mut Normal) -> MotorEstimate {
+        let prior = MotorPrior::default();
+        let mut estimate = MotorEstimate::new(&prior);
+        let frames = ((self.ignition_s + end_s) / prior.frame_s) as u32;
+        for frame in 1..=frames {
+            let time_s = f64::from(frame) * prior.frame_s;
+            let mass_kg = 3.1;
+            // The fall slows down as the motor burns.
+            let speed = (1.0 - (time_s - 4.0).max(0.0) / 4.0).max(0.0);
+            let axial_air_force_n = 28.0 * speed * speed;
+            let gimbal_rad = [0.05 * libm::sin(3.0 * time_s), 0.03];
+            let cosine = libm::cos(gimbal_rad[0]) * libm::cos(gimbal_rad[1]);
+            let mean_n = (0..5)
+                .map(|ms| self.thrust_n(time_s - prior.frame_s + 0.001 * (f64::from(ms) + 0.5)))
+                .sum::<f64>()
+                / 5.0;
+            let force_n = mean_n * cosine + self.air * axial_air_force_n;
+            let felt = force_n / mass_kg + prior.accelerometer_m_s2 * normal.next();
+            estimate.update(
+                &Curve,
+                &MotorSample {
+                    time_s,
+                    axial_specific_force_m_s2: felt,
+                    mass_kg,
+                    axial_air_force_n,
+                    gimbal_rad,
+                    may_burn: time_s > 3.8,
+                },
+            );
+        }
+        estimate
+    }
+}
+
+#[test]
+fn ignition_is_timed_within_a_frame_and_the_air_scale_is_known_before_it() {
+    let mut normal = Normal(1);
+    let (n, mut squares_s2) = (50, 0.0);
+    for _ in 0..n {
+        let motor = Motor::drawn(&mut normal);
+        let estimate = motor.found_after(0.05, &mut normal);
+        let late_s = estimate.ignition_s().unwrap() - motor.ignition_s;
+        assert!(late_s.abs() < MotorPrior::default().frame_s, "{late_s} {motor:?}");
+        squares_s2 += late_s * late_s;
+        assert!((estimate.air_scale() - motor.air).abs() < 0.05, "{} {motor:?}", estimate.air_scale());
+    }
+    let rms_s = (squares_s2 / f64::from(n)).sqrt();
+    println!("ignition timed to {:.2} ms rms", 1e3 * rms_s);
+    assert!(rms_s < 0.0025, "{rms_s}");
+}
+
+#[test]
+fn future_thrust_is_predicted_within_its_stated_uncertainty() {
+    let mut normal = Normal(2);
+    let n = 100;
+    for (end_s, ahead_s, before_share) in [(0.5, 1.0, 0.35), (1.5, 1.0, 0.5), (3.0, 1.0, 0.5)] {
+        let (mut squares, mut worst_n, mut informed, mut ignorant) = (0.0, 0.0_f64, 0.0, 0.0);
+        for _ in 0..n {
+            let motor = Motor::drawn(&mut normal);
+            let estimate = motor.found_after(end_s, &mut normal);
+            let time_s = motor.ignition_s + end_s + ahead_s;
+            let predicted = estimate.predict(&Curve, time_s, f64::NAN);
+            let error_n = predicted.thrust_n - motor.thrust_n(time_s);
+            squares += (error_n / predicted.sigma_n).powi(2);
+            worst_n = worst_n.max(error_n.abs());
+            informed += error_n * error_n;
+            ignorant += (Curve.thrust_n(end_s + ahead_s) - motor.thrust_n(time_s)).powi(2);
+        }
+        let mean = squares / f64::from(n);
+        println!(
+            "after {end_s} s: normalised {mean:.2}, worst {worst_n:.2} N, rms {:.2} of {:.2} N",
+            (informed / f64::from(n)).sqrt(),
+            (ignorant / f64::from(n)).sqrt()
+        );
+        // These motors do not have the roughness that the filter allows for, so the filter may state too large an
+        // uncertainty, but not too small a one.
+        assert!(mean < 1.0 + 4.0 * (2.0 / f64::from(n)).sqrt(), "after {end_s} s: {mean}");
+        assert!(informed < before_share * before_share * ignorant, "after {end_s} s");
+    }
+}
+
+#[test]
+fn an_ignition_spike_does_not_change_the_estimate() {
+    let spiked = Motor { spike: 2.5, ..GOOD }.found_after(0.5, &mut Normal(3));
+    let predicted_n = spiked.predict(&Curve, 5.5, f64::NAN).thrust_n;
+    assert!((predicted_n / Curve.thrust_n(1.5) - 1.0).abs() < 0.015, "{predicted_n} {spiked:?}");
+}
+
+#[test]
+fn an_early_burnout_is_detected_and_a_weak_motor_is_not_mistaken_for_one() {
+    let out = Motor { out_s: 1.2, ..GOOD }.found_after(1.4, &mut Normal(4));
+    let MotorStage::EndedEarly { at_s } = out.stage() else { panic!("{out:?}") };
+    assert!((at_s - 5.2).abs() < 0.01, "{at_s}");
+    assert_eq!(out.predict(&Curve, 5.3, 0.0), PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 });
+    let weak = Motor { impulse: 0.8, ..GOOD }.found_after(2.0, &mut Normal(5));
+    assert_eq!(weak.stage(), MotorStage::Burning);
+    assert!(
+        (weak.predict(&Curve, 6.5, 0.0).thrust_n / (0.8 * Curve.thrust_n(2.5)) - 1.0).abs() < 0.03,
+        "{weak:?}"
+    );
+}
+
+#[test]
+fn no_ignition_is_found_before_the_igniter_fires_and_bad_samples_change_nothing() {
+    let mut estimate = MotorEstimate::new(&MotorPrior::default());
+    let sample = MotorSample {
+        time_s: 0.0,
+        axial_specific_force_m_s2: 30.0,
+        mass_kg: 3.0,
+        axial_air_force_n: 0.0,
+        gimbal_rad: [0.0; 2],
+        may_burn: false,
+    };
+    for frame in 0..100 {
+        estimate.update(&Curve, &MotorSample { time_s: 0.005 * f64::from(frame), ..sample });
+    }
+    assert_eq!(estimate.stage(), MotorStage::Waiting);
+    let before = estimate;
+    for bad in [
+        MotorSample { axial_specific_force_m_s2: f64::NAN, ..sample },
+        MotorSample { axial_air_force_n: f64::INFINITY, ..sample },
+        MotorSample { time_s: f64::NAN, ..sample },
+        MotorSample { gimbal_rad: [f64::NAN, 0.0], ..sample },
+    ] {
+        estimate.update(&Curve, &bad);
+        assert_eq!(estimate, before, "{bad:?}");
+    }
+}

@@ -1,0 +1,258 @@
+//! Phase 1: falling tail-first on four fins, steered back to the pad.
+//!
+//! The fins' drag acts along the wind and gives no lift, but the body gives lift: when its nose leans away from the
+//! wind by an angle of attack, the air on its side pushes it the other way, by `1/2 rho V^2 S_n sin^2`. The law
+//! computes the horizontal acceleration that brings the vehicle to rest over the pad at ignition (the least-effort law
+//! `a = -(6 p / t^2 + 4 v / t)`). It turns the acceleration into a lean and the lean into a moment, and the
+//! [allocation](crate::control::fins) finds four openings. The lean is limited, because the body's own moment grows
+//! with it and the fins' moment does not.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use crate::control::aim::turn_to_aim_rad;
+use crate::vehicle::rigid::RigidState;
+
+/// Below this airspeed the fins are too weak for steering, m/s.
+const LEAST_AIRSPEED_M_S: f64 = 12.0;
+/// Below this airspeed they are too weak even to control the roll, m/s.
+const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
+
+/// Settings of the steering.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DescentGains {
+    /// Largest commanded angle of attack, degrees.
+    pub lean_max_deg: f64,
+    /// Largest commanded angle of attack at ignition, because the gate needs the vehicle nearly upright, degrees.
+    pub lean_at_ignition_deg: f64,
+    /// Time before the ignition from which the lean is reduced, s.
+    pub lean_fades_s: f64,
+    /// Natural frequency of the attitude loop, rad/s.
+    pub natural_frequency_rad_s: f64,
+    /// Its damping ratio.
+    pub damping: f64,
+    /// Decay rate of the roll rate, 1/s.
+    pub roll_decay_per_s: f64,
+    /// Lower limit of the time to go in the steering law, s.
+    pub time_to_go_min_s: f64,
+}
+
+/// The law's data of the vehicle and the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DescentSituation {
+    pub mass_kg: f64,
+    /// Moments of inertia about the roll axis and across it, kg m^2.
+    pub inertia_kg_m2: [f64; 2],
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    pub wind_m_s: Vector3<f64>,
+    /// Drag area of body and fins along the wind, m^2.
+    pub drag_area_m2: f64,
+    /// Drag area of the body across its axis, m^2.
+    pub crossflow_area_m2: f64,
+    /// Drag area of the fins, m^2, times their distance ahead of the centre of gravity, m: this turns the nose back
+    /// into the wind, m^3.
+    pub fin_restoring_m3: f64,
+    /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and turns the nose away
+    /// from the wind.
+    pub body_behind_cg_m: f64,
+    /// Time until the vehicle should be at rest over the pad, s; `None` while it is not known.
+    pub time_to_go_s: Option<f64>,
+}
+
+/// The demand on the fins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DescentDemand {
+    /// Moments about body x, y, z, N m.
+    pub moment_n_m: Vector3<f64>,
+    pub dynamic_pressure_pa: f64,
+    /// The nose's wanted direction in the world.
+    pub nose_in_world: Vector3<f64>,
+}
+
+impl DescentGains {
+    /// The horizontal acceleration wanted, m/s^2, in the world.
+    fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
+        let time_s = situation.time_to_go_s.unwrap_or(0.0).max(self.time_to_go_min_s);
+        let wanted = state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
+        Vector3::new(wanted.x, wanted.y, 0.0)
+    }
+
+    /// The demand on the fins. `steered` is false in passive descent, when the nose only follows the wind.
+    pub fn demand(&self, state: &RigidState, situation: &DescentSituation, steered: bool) -> DescentDemand {
+        let through_air_m_s = state.velocity_m_s - situation.wind_m_s;
+        let airspeed_m_s = through_air_m_s.norm();
+        let dynamic_pressure_pa = 0.5 * situation.air_density_kg_m3 * airspeed_m_s * airspeed_m_s;
+        let [roll_inertia, inertia] = situation.inertia_kg_m2;
+        let rate = state.rate_rad_s;
+        let roll_n_m = -roll_inertia * self.roll_decay_per_s * rate.x;
+        if airspeed_m_s < LEAST_AIRSPEED_M_S {
+            let rolling = airspeed_m_s > LEAST_ROLLING_AIRSPEED_M_S;
+            return DescentDemand {
+                moment_n_m: Vector3::x() * if rolling { roll_n_m } else { 0.0 },
+                dynamic_pressure_pa,
+                nose_in_world: Vector3::z(),
+            };
+        }
+        let upstream = -through_air_m_s / airspeed_m_s;
+        let lean = if steered {
+            self.lean(state, situation, &upstream, dynamic_pressure_pa)
+        } else {
+            Vector3::zeros()
+        };
+        let nose_in_world = (upstream - lean).normalize();
+
+        let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
+        // The moment that holds the wanted lean against the air: the attitude loop alone is much softer than the
+        // weathercock effect.
+        let wanted_lean = error - turn_to_aim_rad(&state.world_from_body, &upstream);
+        let held_n_m = dynamic_pressure_pa
+            * (situation.fin_restoring_m3
+                - situation.crossflow_area_m2 * situation.body_behind_cg_m * libm::sin(wanted_lean.norm()));
+        let frequency = self.natural_frequency_rad_s;
+        let turn = |error: f64, rate: f64| {
+            inertia * (frequency * frequency * error - 2.0 * self.damping * frequency * rate)
+        };
+        let moment_n_m = Vector3::new(roll_n_m, turn(error.y, rate.y), turn(error.z, rate.z))
+            + Vector3::new(0.0, wanted_lean.y, wanted_lean.z) * held_n_m;
+        DescentDemand { moment_n_m, dynamic_pressure_pa, nose_in_world }
+    }
+
+    /// The lean of the nose out of the wind: the tangent of the angle of attack, along the wanted push.
+    fn lean(
+        &self,
+        state: &RigidState,
+        situation: &DescentSituation,
+        upstream: &Vector3<f64>,
+        dynamic_pressure_pa: f64,
+    ) -> Vector3<f64> {
+        let per_mass = dynamic_pressure_pa / situation.mass_kg;
+        // The drag along the wind acts in any case.
+        let carried_m_s2 = upstream * (per_mass * situation.drag_area_m2);
+        let carried_m_s2 = Vector3::new(carried_m_s2.x, carried_m_s2.y, 0.0);
+        let wanted_m_s2 = self.steering_m_s2(state, situation) - carried_m_s2;
+        let across = wanted_m_s2 - upstream * wanted_m_s2.dot(upstream);
+        let (sine, cosine) = libm::sincos(self.lean_max_deg.to_radians());
+        let most = sine / cosine;
+        // Linear in the lean and exact at its limit: the square root would have an infinite slope at zero.
+        let per_lean_m_s2 = per_mass * situation.crossflow_area_m2 * sine * sine / most;
+        let lean = across / per_lean_m_s2.max(1e-6);
+        let most = libm::tan(self.lean_allowed_rad(situation.time_to_go_s));
+        let length = lean.norm();
+        if length > most { lean * (most / length) } else { lean }
+    }
+
+    /// The largest lean at a time before the ignition, rad; the full lean while that time is unknown.
+    fn lean_allowed_rad(&self, time_to_go_s: Option<f64>) -> f64 {
+        let share = time_to_go_s.map_or(1.0, |time_s| (time_s / self.lean_fades_s - 0.5).clamp(0.0, 1.0));
+        (self.lean_at_ignition_deg + share * (self.lean_max_deg - self.lean_at_ignition_deg)).to_radians()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::vehicle::rigid::upright;
+
+    fn gains() -> DescentGains {
+        DescentGains {
+            lean_max_deg: 14.0,
+            lean_at_ignition_deg: 6.0,
+            lean_fades_s: 1.5,
+            natural_frequency_rad_s: 3.0,
+            damping: 0.8,
+            roll_decay_per_s: 3.0,
+            time_to_go_min_s: 2.5,
+        }
+    }
+
+    fn situation() -> DescentSituation {
+        DescentSituation {
+            mass_kg: 3.13,
+            inertia_kg_m2: [0.003, 0.12],
+            air_density_kg_m3: 1.2,
+            wind_m_s: Vector3::zeros(),
+            drag_area_m2: 0.031,
+            crossflow_area_m2: 0.0622,
+            fin_restoring_m3: 0.0061,
+            body_behind_cg_m: 0.05,
+            time_to_go_s: Some(5.0),
+        }
+    }
+
+    fn falling() -> RigidState {
+        let mut state = RigidState::upright(150.0);
+        state.velocity_m_s = Vector3::new(0.0, 0.0, -38.0);
+        state
+    }
+
+    #[test]
+    fn over_the_pad_in_still_air_the_demand_is_zero() {
+        let demand = gains().demand(&falling(), &situation(), true);
+        assert!(demand.moment_n_m.norm() < 1e-12 && (demand.nose_in_world - Vector3::z()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_nose_leans_away_from_the_pad() {
+        // The air then pushes it back.
+        let mut state = falling();
+        state.position_m.x = 10.0;
+        let demand = gains().demand(&state, &situation(), true);
+        assert!(demand.nose_in_world.x > 0.05, "{}", demand.nose_in_world);
+        assert!(demand.moment_n_m.y < 0.0, "the nose goes down towards +x");
+        let lean = libm::acos(demand.nose_in_world.z).to_degrees();
+        assert!(lean <= 14.0 + 1e-9, "{lean}");
+    }
+
+    #[test]
+    fn a_vehicle_carried_by_the_wind_leans_with_the_wind_to_glide_against_it() {
+        let mut situation = situation();
+        situation.wind_m_s.y = 5.0;
+        let passive = gains().demand(&falling(), &situation, false);
+        let steered = gains().demand(&falling(), &situation, true);
+        assert!(passive.nose_in_world.y > 0.1, "weathercocked: {}", passive.nose_in_world);
+        assert!(
+            steered.nose_in_world.y > passive.nose_in_world.y,
+            "leaning further: {}",
+            steered.nose_in_world
+        );
+    }
+
+    #[test]
+    fn at_apogee_the_demand_on_the_fins_is_zero() {
+        let demand = gains().demand(&RigidState::upright(300.0), &situation(), true);
+        assert_eq!(demand.moment_n_m, Vector3::zeros());
+    }
+
+    #[test]
+    fn the_lean_is_reduced_before_the_ignition() {
+        let lean_deg = |time_to_go_s| {
+            let mut state = falling();
+            state.position_m.x = 60.0;
+            let situation = DescentSituation { time_to_go_s, ..situation() };
+            libm::acos(gains().demand(&state, &situation, true).nose_in_world.z).to_degrees()
+        };
+        assert!((lean_deg(None) - 14.0).abs() < 1e-9, "the full lean while the ignition is far away");
+        assert!((lean_deg(Some(4.0)) - 14.0).abs() < 1e-9);
+        assert!((lean_deg(Some(0.5)) - 6.0).abs() < 1e-9, "the small lean that the gate needs");
+    }
+
+    #[test]
+    fn the_wanted_lean_is_held_against_the_weathercock_effect() {
+        // At the wanted lean and at rest, the demand only balances the moment of the air.
+        let mut state = falling();
+        state.position_m.x = 60.0;
+        let nose = gains().demand(&state, &situation(), true).nose_in_world;
+        state.world_from_body =
+            UnitQuaternion::rotation_between(&Vector3::z(), &nose).expect("not opposite") * upright();
+        let demand = gains().demand(&state, &situation(), true);
+        let lean_rad = 14.0_f64.to_radians();
+        let weathercock_m3 = (0.0061 - 0.0622 * 0.05 * libm::sin(lean_rad)) * lean_rad;
+        let held_n_m = demand.dynamic_pressure_pa * weathercock_m3;
+        assert!((demand.moment_n_m.norm() - held_n_m).abs() < 1e-9, "{} for {held_n_m}", demand.moment_n_m);
+        assert!(demand.moment_n_m.y < 0.0, "the nose is kept down towards +x");
+    }
+}

@@ -1,0 +1,92 @@
+//! When to light the landing motor.
+//!
+//! The motor lights only once, and its strength is known only afterwards. Every tick computes the heights from which a
+//! landing exists ([`crate::guidance::vertical`]) for the certified motor, a weak motor and a strong motor. The chosen
+//! height lies at a set place in the band that all three have in common, so the landing exists for any of them. The
+//! command is sent early by the delay of the igniter.
+
+use serde::Deserialize;
+
+use crate::guidance::vertical::{Band, Column};
+use crate::vehicle::burn::Burn;
+use crate::vehicle::thrust_curve::ThrustCurve;
+
+/// Settings of the choice.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IgnitionSettings {
+    /// Impulse of the weakest and the strongest motor to be landed, divided by the certified impulse.
+    pub impulse_scales: [f64; 2],
+    /// Burn times of the shortest and the longest burn to be landed, divided by the certified burn time.
+    pub burn_time_scales: [f64; 2],
+    /// Chosen place in the common band: 0 at its low end, 1 at its high end.
+    pub place: f64,
+    /// Expected time from command to thrust, s.
+    pub delay_s: f64,
+    /// How long before the expected ignition the landing controller takes over, s.
+    pub arm_before_s: f64,
+    /// Fixed height at which thrust begins, m, for flights that are timed beforehand.
+    #[serde(default)]
+    pub fixed_height_m: Option<f64>,
+}
+
+/// What a tick computes for the choice of the ignition.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct IgnitionOutlook {
+    /// Heights from which the certified motor lands if its thrust begins there at the expected speed, m.
+    pub band: Option<Band>,
+    /// Heights from which all considered motors land, m.
+    pub common: Option<Band>,
+    /// The chosen height at which thrust should begin, m.
+    pub chosen_m: Option<f64>,
+    /// Height at which thrust would begin if commanded now, m.
+    pub onset_height_m: f64,
+    /// Vertical velocity there, m/s, up positive.
+    pub onset_vertical_m_s: f64,
+    /// Time until the command should go out, s; negative when late.
+    pub command_in_s: Option<f64>,
+}
+
+impl IgnitionSettings {
+    /// The outlook from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
+    pub fn outlook(
+        &self,
+        column: &Column,
+        curve: &ThrustCurve,
+        height_m: f64,
+        vertical_m_s: f64,
+        fin_drag_area_m2: f64,
+    ) -> IgnitionOutlook {
+        let (onset_height_m, onset_vertical_m_s) =
+            column.fallen(height_m, vertical_m_s, fin_drag_area_m2, self.delay_s);
+        let band = |impulse_scale, time_scale| {
+            column.band(&Burn { curve, impulse_scale, time_scale }, 0.0, onset_vertical_m_s)
+        };
+        let certified = band(1.0, 1.0);
+        let [weak, strong] = self.impulse_scales;
+        let [short, long] = self.burn_time_scales;
+        let extremes = [(weak, 1.0), (strong, 1.0), (1.0, short), (1.0, long)];
+        let bands = extremes.map(|(impulse, time)| band(impulse, time));
+        let common = certified
+            .and_then(|certified| bands.iter().try_fold(certified, |common, band| common.and(&(*band)?)));
+        // If no height suits all motors, the middle between the highest low end and the lowest high end is closest to
+        // all of them.
+        let chosen_m = self.fixed_height_m.or_else(|| {
+            let nearest = bands.iter().flatten().fold(certified?, |nearest, band| Band {
+                low_m: nearest.low_m.max(band.low_m),
+                high_m: nearest.high_m.min(band.high_m),
+            });
+            Some(nearest.low_m + self.place * (nearest.high_m - nearest.low_m))
+        });
+        let command_in_s =
+            chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
+        IgnitionOutlook {
+            band: certified,
+            common,
+            chosen_m,
+            onset_height_m,
+            onset_vertical_m_s,
+            command_in_s,
+        }
+    }
+}

@@ -1,0 +1,329 @@
+//! Phase 2 in space: from ignition to touchdown on a motor that cannot be throttled.
+//!
+//! A tick plans the landing in one vertical plane with the [NMPC](nmpc), in the frame that moves with the wind. The
+//! plan contains the thrust curve as estimated by [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of
+//! body and fins, a floor above the ground, and a free final time that is not before the thrust falls through the
+//! weight. Between ticks [`PoweredGuidance::aim`] reads the wanted direction of the nose from that plan, and leans it
+//! across the plane for the velocity there and the wind. The fins open and close with the place in the
+//! [band of feasible heights](crate::guidance::vertical): high in the band too much impulse is left, so they close.
+//!
+//! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s of the planar controller.
+
+mod digest;
+mod flown;
+mod homing;
+mod inspect;
+mod plane;
+mod report;
+mod settings;
+mod situation;
+
+use alloc::vec::Vec;
+
+use flown::{Flown, largest_tilt_rad};
+pub use homing::Homing;
+pub(crate) use homing::here_m;
+pub use inspect::LandingSolved;
+pub use plane::Plane;
+pub use report::PoweredReport;
+pub use settings::PoweredSettings;
+use situation::Ahead;
+pub use situation::PoweredSituation;
+
+use nalgebra::Vector3;
+
+use crate::control::aim::Aim;
+use crate::guidance::controller::ControlLevel;
+use crate::vehicle::dynamics::PlanarState;
+use crate::vehicle::profile::FinalBox;
+use crate::vehicle::rigid::RigidState;
+use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
+use nmpc::{Problem, SolveStatus};
+
+/// Longest and shortest horizons, intervals.
+const MOST_INTERVALS: usize = 60;
+const LEAST_INTERVALS: usize = 6;
+
+/// Homing across the plane ends this long before touchdown, s, and its distance is limited to this, m.
+const HOMING_ENDS_S: f64 = 1.5;
+const HOMING_MOST_M: f64 = 6.0;
+/// Largest lean that corrects the velocity when a plan is flown to its end, rad.
+const END_LEAN_MAX_RAD: f64 = 0.05;
+
+/// Factor on the cost of tilt when a plan tilts too far.
+const UPRIGHT_DEARER: f64 = 8.0;
+
+/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one.
+const SOFT_M_S: f64 = -0.7;
+
+/// A plan that touches down faster than this is not flown, m/s, because the upright law brakes just as well.
+const HARD_M_S: f64 = -1.2;
+
+/// A plan that still tilts further than this is not flown, rad.
+const TILT_BELIEVED_RAD: f64 = 1.6;
+
+/// Velocity along the nose at the plan's touchdown, m/s; minus infinity without a plan.
+fn ended_m_s(plan: &FreeTimeSolution) -> f64 {
+    let finite = plan.solution.states.iter().all(PlanarState::is_finite);
+    plan.solution.states.last().filter(|_| finite).map_or(f64::NEG_INFINITY, |last| last.u_m_s)
+}
+
+/// The guidance and its memory.
+#[derive(Debug, Clone)]
+pub struct PoweredGuidance {
+    settings: PoweredSettings,
+    plane: Option<Plane>,
+    flown: Option<Flown>,
+    report: PoweredReport,
+    workspace: FreeTimeWorkspace,
+    trial: FreeTimeSolution,
+    set_aside: FreeTimeSolution,
+}
+
+impl PoweredGuidance {
+    /// Guidance without a plan.
+    pub fn new(settings: PoweredSettings) -> Self {
+        Self {
+            settings,
+            plane: None,
+            flown: None,
+            report: PoweredReport::idle(),
+            workspace: FreeTimeWorkspace::default(),
+            trial: FreeTimeSolution::default(),
+            set_aside: FreeTimeSolution::default(),
+        }
+    }
+
+    /// The report of the last tick.
+    pub fn report(&self) -> &PoweredReport {
+        &self.report
+    }
+
+    /// Time until the flown plan ends, s.
+    pub fn left_s(&self, time_s: f64) -> Option<f64> {
+        self.flown.as_ref().map(|flown| flown.left_s(time_s))
+    }
+
+    /// Plans the landing from a state at a time. If the preferred problem ends in a hard landing, it tries the
+    /// fallback.
+    pub fn plan(
+        &mut self,
+        time_s: f64,
+        state: &RigidState,
+        preferred: &PoweredSituation<'_>,
+        fallback: Option<&PoweredSituation<'_>>,
+    ) {
+        let plane = *self.plane.get_or_insert_with(|| {
+            Plane::choose(&state.position_m, &state.velocity_m_s, &preferred.wind_m_s)
+        });
+        if self.is_flown_out(time_s) {
+            return;
+        }
+        let Some((problem, situation)) = self.solve_either(time_s, &plane, state, preferred, fallback) else {
+            self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+            return;
+        };
+        self.take(time_s, &problem, situation);
+    }
+
+    /// Solves the landing into the trial: the preferred problem, unless it ends hard and the fallback ends softer.
+    fn solve_either<'s, 'a>(
+        &mut self,
+        time_s: f64,
+        plane: &Plane,
+        state: &RigidState,
+        preferred: &'s PoweredSituation<'a>,
+        fallback: Option<&'s PoweredSituation<'a>>,
+    ) -> Option<(FreeTimeProblem, &'s PoweredSituation<'a>)> {
+        let mut problem = self.pose(plane, state, preferred)?;
+        self.solve(time_s, &mut problem, preferred);
+        let ended_m_s = ended_m_s(&self.trial);
+        let posed = fallback
+            .filter(|_| ended_m_s < SOFT_M_S)
+            .and_then(|fallback| Some((self.pose(plane, state, fallback)?, fallback)));
+        let Some((mut other, fallback)) = posed else { return Some((problem, preferred)) };
+        core::mem::swap(&mut self.trial, &mut self.set_aside);
+        self.solve(time_s, &mut other, fallback);
+        if ended_m_s < self::ended_m_s(&self.trial) {
+            return Some((other, fallback));
+        }
+        core::mem::swap(&mut self.trial, &mut self.set_aside);
+        Some((problem, preferred))
+    }
+
+    /// Whether the plan ends so soon that it is flown to its end without a new plan.
+    fn is_flown_out(&self, time_s: f64) -> bool {
+        self.left_s(time_s).is_some_and(|left_s| left_s < self.settings.flown_out_s)
+    }
+
+    /// Solves a problem into the trial, from the flown plan.
+    fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
+        let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
+        solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+        if largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians() {
+            // A loop satisfies the equations, but no vehicle can fly it in air. Solve again with a higher cost of tilt.
+            problem.landing.state_weights[2] *= UPRIGHT_DEARER;
+            solve_free_time_into(problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
+        }
+    }
+
+    fn pose(
+        &self,
+        plane: &Plane,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+    ) -> Option<FreeTimeProblem> {
+        let wind_m_s = situation.wind_m_s.dot(&plane.along);
+        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
+        let along_m_s = state.velocity_m_s.dot(&plane.along);
+        let settings = &self.settings;
+        let carried_until_s =
+            situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
+        // Late in the burn the end waits only for the ground, not for the thrust to fall.
+        let to_ground_s = initial.z_m.max(0.0) / 2.0;
+        let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
+        let latest_s = (carried_until_s + settings.latest_after_s - situation.burning_s)
+            .max(earliest_s + to_ground_s.min(0.4));
+        let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
+        let intervals =
+            (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+        let step_s = horizon_s / intervals as f64;
+        let target_x_m = if situation.lands_here {
+            here_m(initial.x_m, along_m_s, horizon_s)
+        } else {
+            settings.homing.target_m(initial.x_m, along_m_s, horizon_s)
+        };
+        let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
+        let landing = Problem {
+            model: situation.model(),
+            initial,
+            step_s: settings.interval_s,
+            thrust_n: Vec::new(),
+            mass_kg: Vec::new(),
+            target: PlanarState { x_m: target_x_m, ..Plane::rest(wind_m_s) },
+            state_weights: settings.weights.state_diagonal(),
+            input_weight: settings.weights.delta,
+            gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
+            x_final_m: settings.x_final_m,
+            final_box: Some(FinalBox { settled_nodes, ..settings.final_box }),
+            altitude_min_m: Some(0.0),
+            floor_rise_m_s: settings.floor_rise_m_s,
+            // The plan itself shows how soft the landing can be; a bound from vertical thrust would only hide it.
+            touchdown_speed_max_m_s: f64::MAX,
+            solver: settings.solver,
+        };
+        Some(FreeTimeProblem {
+            landing,
+            intervals,
+            earliest_s,
+            latest_s,
+            target_drift_m_s: -wind_m_s,
+            max_solves: settings.max_solves,
+        })
+    }
+
+    /// Keeps the trial as the flown plan if it is good enough.
+    fn take(&mut self, time_s: f64, problem: &FreeTimeProblem, situation: &PoweredSituation<'_>) {
+        let solution = &self.trial.solution;
+        let largest_tilt_rad = largest_tilt_rad(&self.trial);
+        let usable = !solution.inputs_rad.is_empty()
+            && solution.states.iter().all(PlanarState::is_finite)
+            && largest_tilt_rad < TILT_BELIEVED_RAD
+            && solution.inputs_rad.iter().all(|input| input.is_finite());
+        let level = match () {
+            () if !usable => match &self.flown {
+                Some(flown) if flown.left_s(time_s) > 0.0 => ControlLevel::ShiftedPlan,
+                _ => ControlLevel::Stabiliser,
+            },
+            // Too low for any landing: a plan would turn the body across the air to brake, and gain the same speed
+            // sideways.
+            () if solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S) => {
+                ControlLevel::Stabiliser
+            }
+            () if solution.status == SolveStatus::Converged
+                && solution.condition_miss <= self.settings.landing_miss =>
+            {
+                ControlLevel::Converged
+            }
+            () => ControlLevel::BestFeasible,
+        };
+        let touchdown = solution.states.last().copied().unwrap_or_default();
+        self.report = PoweredReport {
+            level,
+            status: solution.status,
+            iterations: solution.iterations,
+            kkt_stationarity: solution.kkt_stationarity,
+            kkt_feasibility: solution.kkt_feasibility,
+            cost: solution.cost,
+            condition_miss: solution.condition_miss,
+            touchdown_in_s: self.trial.final_time_s,
+            touchdown,
+            largest_tilt_rad,
+        };
+        if !usable {
+            return;
+        }
+        let step_s = self.trial.final_time_s / problem.intervals as f64;
+        let per_newton = situation.arm_m / situation.inertia_kg_m2;
+        let ahead = Ahead(situation);
+        let flown = self.flown.get_or_insert_with(|| Flown {
+            begins_s: time_s,
+            turning_rad_s2: Vec::with_capacity(MOST_INTERVALS),
+            plan: FreeTimeSolution::default(),
+        });
+        flown.begins_s = time_s;
+        flown.turning_rad_s2.clear();
+        flown.turning_rad_s2.extend(
+            (0..problem.intervals)
+                .map(|k| per_newton * ahead.mean_thrust_n(k as f64 * step_s, (k + 1) as f64 * step_s)),
+        );
+        core::mem::swap(&mut flown.plan, &mut self.trial);
+    }
+
+    /// The wanted direction of the nose at a time.
+    pub fn aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
+        let thrust_n = situation.burn.thrust_n(situation.burning_s);
+        let level_m_s2 = |push_m_s2: f64| {
+            let most = self.settings.across_lean_max_deg.to_radians();
+            libm::atan(push_m_s2 * situation.mass_kg() / thrust_n.max(1.0)).clamp(-most, most)
+        };
+        let air_m_s2 = situation.air_m_s2(state);
+        let decay = self.settings.across_decay_per_s;
+        let lean = |direction: &Vector3<f64>| {
+            libm::tan(level_m_s2(-decay * state.velocity_m_s.dot(direction) - air_m_s2.dot(direction)))
+        };
+        let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
+        let Some((flown, plane)) = flown.zip(self.plane.as_ref()) else {
+            // Upright, with a lean against the sideways velocity.
+            let nose = Vector3::z() + Vector3::x() * lean(&Vector3::x()) + Vector3::y() * lean(&Vector3::y());
+            return Aim::at(nose / nose.norm());
+        };
+        let (theta_rad, q_rad_s, turning_rad_s2) = flown.elevation(time_s);
+        let left_s = flown.left_s(time_s);
+        if left_s < self.settings.quiet_s {
+            return Aim::at(state.nose_in_world());
+        }
+        // Across the plane the vehicle homes to the pad while there is time, unless homing is off.
+        let homing_per_s2 = if situation.lands_here { 0.0 } else { self.settings.across_homing_per_s2 };
+        let homing = homing_per_s2
+            * ((left_s - HOMING_ENDS_S) / HOMING_ENDS_S).clamp(0.0, 1.0)
+            * state.position_m.dot(&plane.across).clamp(-HOMING_MOST_M, HOMING_MOST_M);
+        let along = &plane.along;
+        // A plan that is flown to its end needs a correction of the velocity.
+        let along_rad = if left_s < self.settings.flown_out_s {
+            let astray_m_s =
+                state.velocity_m_s.dot(along) - flown.along_m_s(time_s, situation.wind_m_s.dot(along));
+            level_m_s2(-decay * astray_m_s).clamp(-END_LEAN_MAX_RAD, END_LEAN_MAX_RAD)
+        } else {
+            0.0
+        };
+        let across = libm::tan(level_m_s2(
+            -decay * state.velocity_m_s.dot(&plane.across) - air_m_s2.dot(&plane.across) - homing,
+        ));
+        Aim {
+            nose_in_world: plane.nose(theta_rad - along_rad, across),
+            rate_in_world_rad_s: plane.turning(q_rad_s),
+            acceleration_in_world_rad_s2: plane.turning(turning_rad_s2),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The guidance's data of vehicle, motor and air.
+
+use nalgebra::Vector3;
+
+use crate::vehicle::burn::Burn;
+use crate::vehicle::dynamics::{ModelKind, PlanarModel, PlanarParams};
+use crate::vehicle::rigid::RigidState;
+use nmpc::free_time::Motor;
+
+/// The inputs of a tick except the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoweredSituation<'a> {
+    /// The motor.
+    pub burn: Burn<'a>,
+    /// Time since thrust began, s.
+    pub burning_s: f64,
+    /// Mass before ignition, kg.
+    pub mass_at_ignition_kg: f64,
+    /// Moment of inertia across the axis, kg m^2.
+    pub inertia_kg_m2: f64,
+    /// Arm of the thrust about the centre of gravity, m.
+    pub arm_m: f64,
+    /// Centre of gravity above the feet when upright, m.
+    pub feet_below_cg_m: f64,
+    pub gravity_m_s2: f64,
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    pub wind_m_s: Vector3<f64>,
+    /// Drag area of the body along its axis, m^2.
+    pub body_drag_area_m2: f64,
+    /// Drag area of the body across its axis, m^2.
+    pub crossflow_area_m2: f64,
+    /// Drag area of the fins at their present opening, m^2.
+    pub fin_drag_area_m2: f64,
+    /// Largest gimbal angle, rad.
+    pub gimbal_limit_rad: f64,
+    /// After an abort: the vehicle lands on the ground below, not on the pad.
+    pub lands_here: bool,
+}
+
+impl PoweredSituation<'_> {
+    pub(super) fn mass_kg(&self) -> f64 {
+        self.mass_at_ignition_kg - self.burn.burnt_kg(self.burning_s)
+    }
+
+    pub(super) fn model(&self) -> PlanarModel {
+        let mass_kg = self.mass_kg();
+        let per_m = |area_m2: f64| 0.5 * self.air_density_kg_m3 * area_m2 / mass_kg;
+        PlanarModel {
+            params: PlanarParams {
+                mass_kg,
+                pitch_inertia_kg_m2: self.inertia_kg_m2,
+                thrust_arm_m: self.arm_m,
+                drag_per_m: per_m(self.body_drag_area_m2 + self.fin_drag_area_m2),
+                lateral_drag_per_m: per_m(self.fin_drag_area_m2),
+                crossflow_per_m: per_m(self.crossflow_area_m2),
+                gravity_m_s2: self.gravity_m_s2,
+            },
+            kind: ModelKind::Consistent,
+        }
+    }
+
+    /// Horizontal acceleration from the air, m/s^2.
+    pub(super) fn air_m_s2(&self, state: &RigidState) -> Vector3<f64> {
+        let through_air = state.velocity_m_s - self.wind_m_s;
+        let nose = state.nose_in_world();
+        let across = through_air - nose * through_air.dot(&nose);
+        let per_mass = -0.5 * self.air_density_kg_m3 / self.mass_kg();
+        through_air * (per_mass * self.fin_drag_area_m2 * through_air.norm())
+            + across * (per_mass * self.crossflow_area_m2 * across.norm())
+    }
+}
+
+/// The rest of the burn from a moment on, in the form that the planner needs.
+pub(super) struct Ahead<'a, 'b>(pub(super) &'a PoweredSituation<'b>);
+
+impl Motor for Ahead<'_, '_> {
+    fn mean_thrust_n(&self, from_s: f64, to_s: f64) -> f64 {
+        self.0.burn.mean_thrust_n(self.0.burning_s + from_s, to_s - from_s)
+    }
+
+    fn mean_mass_kg(&self, from_s: f64, to_s: f64) -> f64 {
+        let middle_s = self.0.burning_s + 0.5 * (from_s + to_s);
+        self.0.mass_at_ignition_kg - self.0.burn.burnt_kg(middle_s)
+    }
+}

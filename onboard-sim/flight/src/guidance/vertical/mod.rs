@@ -1,0 +1,250 @@
+//! The landing burn in one dimension: the heights from which a landing can begin.
+//!
+//! The vehicle has no throttle, but its tilt reduces the vertical thrust and its fins add drag. Both are bounded, so at
+//! every instant the deceleration lies between a soft and a hard one. A landing must end with both height and sinking
+//! speed near zero. It must not end before the thrust falls through the weight, or the vehicle would lift off again.
+//! For a bounded double integrator the extremes are bang-bang: the highest start brakes softly first and hard later;
+//! the lowest start brakes hard first and softly later, but the vehicle never rises. Constant braking lies in between.
+//! The heights from which these landings begin span the band of feasible heights ([`Column::band`]). The vehicle's
+//! place in the band says how hard to brake ([`Band::place`]). The last moments are flown upright, so that the vehicle
+//! arrives settled.
+//!
+//! Tilt at high speed does not reduce the deceleration: the body lies across the air, and its own drag compensates the
+//! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
+//! burn and the tilt late in it.
+
+mod fall;
+
+use self::fall::Fall;
+use crate::vehicle::burn::Burn;
+
+/// Number of end times tried between the thrust's fall through the weight and the latest end.
+const END_TIMES: usize = 4;
+
+/// Gain of the fin opening: fraction of the fins' travel per fraction of the band.
+const FIN_GAIN: f64 = 1.5;
+
+/// Fin opening, 0 to 1, that moves a vehicle from its place in the band to the wanted place.
+pub fn share_for(wanted_place: f64, place: f64) -> f64 {
+    (0.5 + FIN_GAIN * (wanted_place - place)).clamp(0.0, 1.0)
+}
+
+/// The braking of the vehicle: its tilt and its fins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Braking {
+    /// Tilt from the vertical, rad.
+    pub tilt_rad: f64,
+    /// Drag area of the fins together, `C S`, m^2.
+    pub fin_drag_area_m2: f64,
+}
+
+/// The parameters of the vertical motion except the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Column {
+    /// Mass before ignition, kg.
+    pub mass_at_ignition_kg: f64,
+    pub gravity_m_s2: f64,
+    /// Air density, kg/m^3.
+    pub air_density_kg_m3: f64,
+    /// Drag area of the body along its axis, m^2.
+    pub body_drag_area_m2: f64,
+    /// Drag area of the body across its axis, m^2.
+    pub crossflow_area_m2: f64,
+    /// The softest braking that is still controllable.
+    pub soft: Braking,
+    /// The hardest braking.
+    pub hard: Braking,
+    /// Vertical velocity at touchdown, m/s, up positive (so below zero).
+    pub touchdown_m_s: f64,
+    /// Latest touchdown after the thrust has fallen through the weight, s.
+    pub latest_after_s: f64,
+    /// How long before touchdown the vehicle is upright, s.
+    pub settle_s: f64,
+}
+
+/// Heights from which a landing exists, m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Band {
+    /// Lowest start.
+    pub low_m: f64,
+    /// Highest start.
+    pub high_m: f64,
+}
+
+impl Band {
+    /// Place of a height in the band: 0 at its low end, 1 at its high end, other values outside.
+    pub fn place(&self, height_m: f64) -> f64 {
+        (height_m - self.low_m) / (self.high_m - self.low_m).max(1e-3)
+    }
+
+    /// The part that both bands have in common; `None` if there is none.
+    pub fn and(&self, other: &Self) -> Option<Self> {
+        let both = Self { low_m: self.low_m.max(other.low_m), high_m: self.high_m.min(other.high_m) };
+        (both.low_m <= both.high_m).then_some(both)
+    }
+
+    /// Whether a height lies inside.
+    pub fn contains(&self, height_m: f64) -> bool {
+        (self.low_m..=self.high_m).contains(&height_m)
+    }
+}
+
+impl Column {
+    /// Heights from which a landing exists for a motor that has burnt for `burning_s` (0 for an ignition now) and a
+    /// vertical velocity of `vertical_m_s` (up positive); `None` if there is no landing.
+    pub fn band(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> Option<Band> {
+        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2)?;
+        let soonest_s = carried_until_s.max(burning_s + 0.02);
+        let mut band: Option<Band> = None;
+        for i in 0..END_TIMES {
+            let end_s = soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64;
+            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
+            for height_m in fall.heights_m().into_iter().flatten() {
+                band = Some(band.map_or(Band { low_m: height_m, high_m: height_m }, |band| Band {
+                    low_m: band.low_m.min(height_m),
+                    high_m: band.high_m.max(height_m),
+                }));
+            }
+        }
+        band
+    }
+
+    /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
+    pub fn fallen(&self, height_m: f64, vertical_m_s: f64, fin_drag_area_m2: f64, time_s: f64) -> (f64, f64) {
+        /// Short enough for the midpoint rule at any speed of a fall.
+        const STEP_S: f64 = 0.05;
+        let steps = libm::ceil(time_s / STEP_S).max(1.0);
+        let step_s = time_s / steps;
+        let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;
+        let drag_per_v2 = 0.5 * self.air_density_kg_m3 * area_m2 / self.mass_at_ignition_kg;
+        let acceleration = |speed_m_s: f64| -self.gravity_m_s2 - drag_per_v2 * speed_m_s * speed_m_s.abs();
+        let (mut height_m, mut vertical_m_s) = (height_m, vertical_m_s);
+        for _ in 0..steps as u32 {
+            let midway_m_s = vertical_m_s + 0.5 * step_s * acceleration(vertical_m_s);
+            height_m += step_s * midway_m_s;
+            vertical_m_s += step_s * acceleration(midway_m_s);
+        }
+        (height_m, vertical_m_s)
+    }
+
+    /// Fin opening, 0 to 1, that holds the vehicle at a place between the lowest height that suits the weaker of two
+    /// motors and the highest height that suits the stronger.
+    ///
+    /// Without a band the vehicle is too fast or too slow for any landing, and the result is an end of the range.
+    pub fn fin_share(
+        &self,
+        burns: [&Burn<'_>; 2],
+        burning_s: f64,
+        vertical_m_s: f64,
+        height_m: f64,
+        place: f64,
+    ) -> f64 {
+        /// Smallest width that is assumed for a band, as time at the present speed, s. Above a narrow band there is
+        /// hardly a landing, but closed fins would only make the vehicle faster.
+        const NARROW_S: f64 = 0.25;
+        let [weak, strong] = burns.map(|burn| self.band(burn, burning_s, vertical_m_s));
+        let Some(weak) = weak else {
+            // The vehicle falls slower than a landing needs, so the fins close.
+            let close = vertical_m_s > -1.0 || self.stops_too_soon(burns[0], burning_s, vertical_m_s);
+            return if close { 0.0 } else { 1.0 };
+        };
+        let strong = strong.unwrap_or(weak);
+        let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
+        let width_m = (high_m - low_m).max(-NARROW_S * vertical_m_s).max(1e-3);
+        share_for(place, (height_m - low_m) / width_m)
+    }
+
+    /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.
+    fn stops_too_soon(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
+        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
+        carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
+            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
+            fall.softest_m_s() > self.touchdown_m_s
+        })
+    }
+
+    /// Terminal speed of the unpowered fall, m/s, positive downwards.
+    pub fn terminal_speed_m_s(&self, fin_drag_area_m2: f64) -> f64 {
+        let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;
+        libm::sqrt(2.0 * self.mass_at_ignition_kg * self.gravity_m_s2 / (self.air_density_kg_m3 * area_m2))
+    }
+}
+
+/// Speed at the ground, m/s, positive downwards, after a fall from a height with a vertical velocity (up positive)
+/// towards a terminal speed `V_t`: the difference of `v^2` from `V_t^2` falls by a factor of e in each `V_t^2 / (2 g)`
+/// of height. A vehicle that rises is assumed to fall from its present height.
+pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64, gravity_m_s2: f64) -> f64 {
+    let [begins, terminal] = [(-vertical_m_s).max(0.0), terminal_m_s].map(|speed_m_s| speed_m_s * speed_m_s);
+    let left = libm::exp(-2.0 * gravity_m_s2 * height_m.max(0.0) / terminal);
+    libm::sqrt(terminal + (begins - terminal) * left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicles::motors;
+
+    /// Compares with a fall integrated in small steps.
+    #[test]
+    fn val_a_fall_ends_at_the_speed_of_a_step_by_step_integration() {
+        let column = column();
+        let fins_m2 = column.hard.fin_drag_area_m2;
+        let terminal_m_s = column.terminal_speed_m_s(fins_m2);
+        for vertical_m_s in [0.0, -20.0, -60.0] {
+            let (mut height_m, mut speed_m_s) = (70.0, vertical_m_s);
+            while height_m > 0.0 {
+                (height_m, speed_m_s) = column.fallen(height_m, speed_m_s, fins_m2, 1e-3);
+            }
+            let found_m_s = fall_ends_m_s(70.0, vertical_m_s, terminal_m_s, column.gravity_m_s2);
+            assert!((found_m_s + speed_m_s).abs() < 0.02, "{found_m_s} for {speed_m_s}");
+        }
+        assert!((fall_ends_m_s(-0.1, -3.0, terminal_m_s, 9.81) - 3.0).abs() < 1e-12, "on the ground already");
+    }
+
+    fn column() -> Column {
+        Column {
+            mass_at_ignition_kg: 3.13,
+            gravity_m_s2: 9.80665,
+            air_density_kg_m3: 1.2,
+            body_drag_area_m2: 0.0043,
+            crossflow_area_m2: 0.0622,
+            soft: Braking { tilt_rad: 40_f64.to_radians(), fin_drag_area_m2: 0.0 },
+            hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: 0.0267 },
+            touchdown_m_s: -0.15,
+            latest_after_s: 0.5,
+            settle_s: 0.3,
+        }
+    }
+
+    #[test]
+    fn a_weak_motor_narrows_the_band_and_a_very_weak_one_leaves_none() {
+        let curve = motors::builtin("H45W").expect("built in");
+        let column = column();
+        let speed_m_s = -column.terminal_speed_m_s(0.0267);
+        let band = |impulse_scale| {
+            column.band(&Burn { curve: &curve, impulse_scale, time_scale: 1.0 }, 0.0, speed_m_s)
+        };
+        let (nominal, weak) = (band(1.0).expect("lands"), band(0.92).expect("lands"));
+        assert!(nominal.low_m < 58.0 && nominal.high_m > 72.0, "{nominal:?}");
+        assert!(weak.high_m - weak.low_m < 0.5 * (nominal.high_m - nominal.low_m), "{weak:?}");
+        assert_eq!(nominal.and(&weak), Some(weak), "a start that suits the weak motor suits the nominal one");
+        assert_eq!(band(0.8), None);
+    }
+
+    #[test]
+    fn every_way_of_braking_begins_inside_the_band_and_arrives_at_the_touchdown_speed() {
+        let curve = motors::builtin("H45W").expect("built in");
+        let column = column();
+        let burn = Burn::nominal(&curve);
+        let band = column.band(&burn, 1.0, -25.0).expect("lands");
+        let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("carried");
+        let fall = Fall::new(&column, &burn, 1.0, end_s, -25.0);
+        let mut found = 0;
+        for height_m in fall.heights_m().into_iter().flatten() {
+            assert!(band.contains(height_m), "{height_m} in {band:?}");
+            found += 1;
+        }
+        assert!(found >= 2, "{found}");
+        assert!((band.place(band.low_m), band.place(band.high_m)) == (0.0, 1.0));
+    }
+}

@@ -1,0 +1,246 @@
+//! The checks before arming on the pad.
+
+use alloc::borrow::ToOwned as _;
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+
+pub use crate::rules::check::{Check, all_passed, first_refusal};
+use crate::rules::phase::UPLINK_SILENT_S;
+use crate::rules::verdict::LandingVerdict;
+use crate::vehicle::profile::ArmingLimits;
+
+/// The radio link to the station that asks for arming.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Uplink {
+    /// The vehicle starts by itself: there is no station.
+    NotNeeded,
+    /// No heartbeat of the station was ever accepted.
+    NeverHeard,
+    /// Time since its last accepted heartbeat.
+    Heard { age_s: f64 },
+}
+
+/// Where a rehearsed landing ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictedLanding {
+    /// Inside every touchdown limit.
+    pub lands: bool,
+    /// The broken limits with their values, in words.
+    pub found: String,
+}
+
+impl From<&LandingVerdict> for PredictedLanding {
+    fn from(verdict: &LandingVerdict) -> Self {
+        Self { lands: verdict.landed(), found: verdict.summary() }
+    }
+}
+
+/// The inputs of the arming checks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmingInput {
+    /// The physical pin has been pulled.
+    pub pin_out: bool,
+    pub abort_latched: bool,
+    /// Tilt from the vertical, rad.
+    pub tilt_rad: f64,
+    /// Rotation rate, rad/s.
+    pub rotation_rad_s: f64,
+    pub speed_m_s: f64,
+    pub self_test_passed: bool,
+    /// The estimator has settled.
+    pub estimator_converged: bool,
+    /// Number of fins that reached their commanded angle.
+    pub fins_answering: [bool; 4],
+    /// The landing motor's igniter has continuity.
+    pub igniter_continuity: bool,
+    /// The log is being written.
+    pub log_running: bool,
+    /// Free space for the log, bytes.
+    pub log_space_bytes: u64,
+    /// The rehearsal of the landing converged
+    /// ([`SolverReport::converged`](crate::guidance::controller::SolverReport::converged)).
+    pub controller_warm: bool,
+    /// The rehearsal's summary of its outcome
+    /// ([`SolverReport::summary`](crate::guidance::controller::SolverReport::summary)).
+    pub controller_found: String,
+    /// The verdict on the rehearsal's end by the touchdown limits; `None` without a rehearsal.
+    pub predicted_landing: Option<PredictedLanding>,
+    /// The radio link to the station that asks.
+    pub uplink: Uplink,
+}
+
+/// Every arming check with the value found, in the order an operator fixes them.
+pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
+    let answering = input.fins_answering.iter().filter(|answers| **answers).count();
+    let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
+    vec![
+        Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
+        Check::condition("pin", input.pin_out, "out", "in"),
+        Check::condition("self-test", input.self_test_passed, "passed", "not passed"),
+        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
+        Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
+        Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
+        Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
+        Check {
+            name: "fins answering",
+            passed: answering == input.fins_answering.len(),
+            found: format!("{answering} of 4"),
+            required: "4 of 4".to_owned(),
+        },
+        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
+        Check::condition("log", input.log_running, "running", "not running"),
+        Check {
+            name: "log space",
+            passed: input.log_space_bytes >= limits.log_space_min_bytes,
+            found: mib(input.log_space_bytes),
+            required: format!("at least {}", mib(limits.log_space_min_bytes)),
+        },
+        Check {
+            name: "controller warm",
+            passed: input.controller_warm,
+            found: input.controller_found.clone(),
+            required: "a converged rehearsal".to_owned(),
+        },
+        predicted_landing(input.predicted_landing.as_ref()),
+        uplink(input.uplink),
+    ]
+}
+
+/// The name of the uplink check, the only check that depends on the ground.
+pub const UPLINK_CHECK: &str = "uplink";
+
+fn uplink(uplink: Uplink) -> Check {
+    let (passed, found) = match uplink {
+        Uplink::NotNeeded => (true, "not needed: the vehicle starts by itself".to_owned()),
+        Uplink::NeverHeard => (false, "no heartbeat of this station".to_owned()),
+        Uplink::Heard { age_s } => (age_s <= UPLINK_SILENT_S, format!("heartbeat {age_s:.1} s old")),
+    };
+    Check {
+        name: UPLINK_CHECK,
+        passed,
+        found,
+        required: format!("a heartbeat of the asking station in the last {UPLINK_SILENT_S} s"),
+    }
+}
+
+fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
+    Check {
+        name: "predicted touchdown",
+        passed: predicted.is_some_and(|landing| landing.lands),
+        found: predicted.map_or_else(|| "no prediction".to_owned(), |landing| landing.found.clone()),
+        required: "inside every touchdown limit".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rules::verdict::TouchdownLimits;
+    use crate::vehicle::dynamics::PlanarState;
+
+    fn ready() -> ArmingInput {
+        let profile = crate::vehicles::profile::builtin("paper-calibrated").unwrap();
+        let down = PlanarState { theta_rad: core::f64::consts::FRAC_PI_2, ..PlanarState::default() };
+        ArmingInput {
+            pin_out: true,
+            abort_latched: false,
+            tilt_rad: 0.01,
+            rotation_rad_s: 0.0,
+            speed_m_s: 0.0,
+            self_test_passed: true,
+            estimator_converged: true,
+            fins_answering: [true; 4],
+            igniter_continuity: true,
+            log_running: true,
+            log_space_bytes: 1 << 30,
+            controller_warm: true,
+            controller_found: "converged".to_owned(),
+            predicted_landing: Some(PredictedLanding::from(&LandingVerdict::judge(
+                &TouchdownLimits::from_profile(&profile),
+                &down,
+            ))),
+            uplink: Uplink::Heard { age_s: UPLINK_SILENT_S },
+        }
+    }
+
+    #[test]
+    fn a_ready_vehicle_passes_every_check() {
+        let checks = arming_checks(&ArmingLimits::default(), &ready());
+        assert!(all_passed(&checks));
+        assert_eq!(first_refusal(&checks), None);
+        // Without a crew no station is needed.
+        let alone = ArmingInput { uplink: Uplink::NotNeeded, ..ready() };
+        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone)));
+    }
+
+    /// A wrong input, and the check that must refuse it.
+    type Spoiling = (&'static str, fn(&mut ArmingInput));
+
+    #[test]
+    fn each_check_alone_refuses_and_reports_its_name_and_value() {
+        let spoilings: [Spoiling; 17] = [
+            ("abort latch: found latched", |input| {
+                input.abort_latched = true;
+            }),
+            ("pin: found in, required out", |input| {
+                input.pin_out = false;
+            }),
+            ("self-test: found not passed", |input| {
+                input.self_test_passed = false;
+            }),
+            ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
+                input.tilt_rad = 6.0_f64.to_radians();
+            }),
+            ("tilt from vertical: found NaN deg", |input| {
+                input.tilt_rad = f64::NAN;
+            }),
+            ("rotation: found", |input| {
+                input.rotation_rad_s = -0.5;
+            }),
+            ("speed: found 1.00 m/s", |input| {
+                input.speed_m_s = 1.0;
+            }),
+            ("estimator: found not converged", |input| {
+                input.estimator_converged = false;
+            }),
+            ("fins answering: found 3 of 4", |input| {
+                input.fins_answering[2] = false;
+            }),
+            ("igniter continuity: found open circuit", |input| {
+                input.igniter_continuity = false;
+            }),
+            ("log: found not running", |input| {
+                input.log_running = false;
+            }),
+            ("log space: found 1 MiB", |input| {
+                input.log_space_bytes = 1 << 20;
+            }),
+            ("controller warm: found", |input| {
+                input.controller_warm = false;
+            }),
+            ("predicted touchdown: found no prediction", |input| {
+                input.predicted_landing = None;
+            }),
+            ("uplink: found no heartbeat", |input| {
+                input.uplink = Uplink::NeverHeard;
+            }),
+            ("uplink: found heartbeat 2.1 s old", |input| {
+                input.uplink = Uplink::Heard { age_s: 2.1 };
+            }),
+            ("uplink: found heartbeat NaN s old", |input| {
+                input.uplink = Uplink::Heard { age_s: f64::NAN };
+            }),
+        ];
+        for (expected, spoil) in spoilings {
+            let mut input = ready();
+            spoil(&mut input);
+            let checks = arming_checks(&ArmingLimits::default(), &input);
+            assert_eq!(checks.iter().filter(|check| !check.passed).count(), 1, "{expected}");
+            let refusal = first_refusal(&checks).unwrap();
+            assert!(refusal.starts_with(expected), "{refusal}");
+        }
+    }
+}

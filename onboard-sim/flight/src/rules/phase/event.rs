@@ -1,0 +1,251 @@
+//! The events of a flight, their effects, and the reasons for a refusal.
+
+use alloc::borrow::ToOwned as _;
+
+use alloc::format;
+use alloc::string::String;
+
+use super::{HoldCause, Phase, StartPoint};
+
+/// Something that happened or was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// The self-test passed.
+    SelfTestPassed,
+    /// The physical pin was pulled.
+    PinPulled,
+    /// The physical pin was put back.
+    PinInserted,
+    /// Radio command: arm. `checks_passed` is the result of the [arming checks](crate::rules::arming).
+    ArmRequested {
+        /// Every arming check passed.
+        checks_passed: bool,
+    },
+    /// Radio command: disarm; during a countdown it cancels it.
+    DisarmRequested,
+    /// Radio command: start the countdown.
+    StartRequested {
+        /// Length of the countdown, s.
+        countdown_s: f64,
+    },
+    /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a hold.
+    Hold {
+        /// Why.
+        cause: HoldCause,
+    },
+    /// A hold has lasted for [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).
+    HoldElapsed,
+    /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the air sends
+    /// [`Event::ReleasedAt`] instead.
+    CountdownElapsed,
+    /// The countdown of a simulation that starts in the air ended, and the vehicle was released there.
+    ReleasedAt(StartPoint),
+    /// The vehicle left the pad.
+    LiftOff,
+    /// The burning motor burnt out; the landing motor may do so on the ground.
+    Burnout,
+    /// Vertical speed changed sign.
+    Apogee,
+    /// All fins have reached their deployed angle.
+    FinsConfirmed,
+    /// The vehicle is close enough to the ground for the landing controller.
+    LandArm,
+    /// The ignition gate was evaluated.
+    IgnitionGate {
+        /// Every [gate check](crate::rules::gate) passed.
+        open: bool,
+    },
+    /// The accelerometer shows landing-motor thrust.
+    ThrustConfirmed,
+    /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition command.
+    NoThrustTimeout,
+    /// Abort: by radio, or by the vehicle itself when its ignition gate cannot open any more.
+    AbortRequested {
+        /// The height is still sufficient for the parachute.
+        above_commit_height: bool,
+        /// The ignition gate is open at this moment.
+        gate_open: bool,
+    },
+    /// Contact with the ground was sensed.
+    Contact {
+        /// Thrust is below the weight, so the vehicle will stay down.
+        thrust_below_weight: bool,
+    },
+    /// On the ground, every actuator and igniter line is shut down. The event is accepted only if the motor is safe,
+    /// too.
+    SafingDone,
+}
+
+impl Event {
+    /// The name in messages and logs.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::SelfTestPassed => "self-test passed",
+            Self::PinPulled => "pin pulled",
+            Self::PinInserted => "pin inserted",
+            Self::ArmRequested { .. } => "arm",
+            Self::DisarmRequested => "disarm",
+            Self::StartRequested { .. } => "start",
+            Self::Hold { .. } => "hold",
+            Self::HoldElapsed => "hold elapsed",
+            Self::CountdownElapsed => "countdown elapsed",
+            Self::ReleasedAt(_) => "release",
+            Self::LiftOff => "lift-off",
+            Self::Burnout => "burn-out",
+            Self::Apogee => "apogee",
+            Self::FinsConfirmed => "fins confirmed",
+            Self::LandArm => "land arm",
+            Self::IgnitionGate { .. } => "ignition gate",
+            Self::ThrustConfirmed => "thrust confirmed",
+            Self::NoThrustTimeout => "no thrust",
+            Self::AbortRequested { .. } => "abort",
+            Self::Contact { .. } => "contact",
+            Self::SafingDone => "safing done",
+        }
+    }
+}
+
+/// An action that must follow now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Effect {
+    /// Light the ascent motor.
+    IgniteAscentMotor = 0,
+    /// Light the landing motor. This is emitted at most once until a restart.
+    IgniteLandingMotor = 1,
+    /// Cut the landing motor's igniter line.
+    InhibitLandingMotor = 2,
+    /// Disarm both igniter lines.
+    Disarm = 3,
+    /// Deploy the parachute.
+    DeployChute = 4,
+    /// Open the fins fully.
+    FinsOpen = 5,
+    /// The countdown began.
+    StartCountdown = 6,
+    CancelCountdown = 7,
+    /// Show the 60 s wait before the pad may be approached.
+    ShowPadWait = 8,
+    /// Record the loss of the vehicle.
+    RecordLoss = 9,
+    /// The countdown was held: it is cancelled, but the vehicle is still armed.
+    HoldCountdown = 10,
+}
+
+impl Effect {
+    /// Every effect, in index order.
+    pub const ALL: [Self; 11] = [
+        Self::IgniteAscentMotor,
+        Self::IgniteLandingMotor,
+        Self::InhibitLandingMotor,
+        Self::Disarm,
+        Self::DeployChute,
+        Self::FinsOpen,
+        Self::StartCountdown,
+        Self::CancelCountdown,
+        Self::ShowPadWait,
+        Self::RecordLoss,
+        Self::HoldCountdown,
+    ];
+}
+
+/// A small set of [`Effect`]s.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Effects(u16);
+
+impl Effects {
+    /// No effect.
+    pub const NONE: Self = Self(0);
+
+    /// The set of these effects.
+    pub fn of(effects: &[Effect]) -> Self {
+        Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
+    }
+
+    /// Whether the effect is in the set.
+    pub fn contains(self, effect: Effect) -> bool {
+        self.0 & (1 << (effect as u16)) != 0
+    }
+
+    /// Whether the set is empty.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The effects in the set, in index order.
+    pub fn iter(self) -> impl Iterator<Item = Effect> {
+        Effect::ALL.into_iter().filter(move |effect| self.contains(*effect))
+    }
+}
+
+/// Why an event changed nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// The event belongs to other phases.
+    WrongPhase {
+        /// The requested action, as a verb.
+        action: &'static str,
+        /// The phase at the request.
+        phase: Phase,
+        /// Where the action would be accepted.
+        only: &'static str,
+    },
+    AbortLatched,
+    PinIn,
+    /// An arming check failed.
+    ChecksFailed,
+    NotArmed,
+    LandingMotorInhibited,
+    /// A countdown is already running.
+    CountdownRunning,
+    /// There is no countdown to hold.
+    NoCountdown,
+    /// The countdown is already held.
+    AlreadyHeld,
+    /// No hold has reached its time limit.
+    HoldNotOver,
+    /// The countdown has not ended, or was never started.
+    CountdownNotElapsed,
+    /// The countdown's length is not a number of seconds.
+    BadCountdown,
+    /// The abort is already latched.
+    AlreadyAborted,
+    /// Contact with thrust above the weight: the vehicle will not stay down yet.
+    ThrustAboveWeight,
+    /// The landing motor was not lit, and its pin is out.
+    MotorLive,
+    /// The landing motor burns.
+    MotorBurning,
+    /// The landing motor has burnt out and is still hot.
+    MotorHot,
+    /// The landing motor did not light, and may still light late.
+    MisfireWait,
+}
+
+impl Refusal {
+    /// The reason in words for an operator.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::WrongPhase { action, phase, only } => {
+                format!("cannot {action} in {}: {only}", phase.name())
+            }
+            Self::AbortLatched => "an abort is latched: restart the vehicle to clear it".to_owned(),
+            Self::PinIn => "the pin is in: pull it before arming".to_owned(),
+            Self::ChecksFailed => "an arming check failed".to_owned(),
+            Self::NotArmed => "not armed".to_owned(),
+            Self::LandingMotorInhibited => "the landing motor is inhibited".to_owned(),
+            Self::CountdownRunning => "a countdown is running: disarm to cancel it".to_owned(),
+            Self::NoCountdown => "no countdown is running".to_owned(),
+            Self::AlreadyHeld => "already held".to_owned(),
+            Self::HoldNotOver => "no hold has lasted its time".to_owned(),
+            Self::CountdownNotElapsed => "the countdown has not ended".to_owned(),
+            Self::BadCountdown => "the countdown must be a number of seconds, 0 or more".to_owned(),
+            Self::AlreadyAborted => "already aborted".to_owned(),
+            Self::ThrustAboveWeight => "contact with thrust above weight: not down yet".to_owned(),
+            Self::MotorLive => "the landing motor is live: put the pin in".to_owned(),
+            Self::MotorBurning => "the landing motor burns".to_owned(),
+            Self::MotorHot => "the landing motor is hot".to_owned(),
+            Self::MisfireWait => "the landing motor may still light late".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! The hold of a countdown.
+
+use super::{Mode, Phase};
+
+/// The station that armed the vehicle counts as silent when no frame of it was accepted for this long, s.
+pub const UPLINK_SILENT_S: f64 = 2.0;
+
+/// A held vehicle disarms after this long without a new start, s.
+pub const HOLD_LIMIT_S: f64 = 60.0;
+
+/// Why a countdown was held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum HoldCause {
+    /// No frame of the station that armed the vehicle was accepted for [`UPLINK_SILENT_S`].
+    UplinkSilent = 1,
+    /// A station asked for it.
+    Commanded = 2,
+}
+
+/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start leads on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// Why.
+    pub cause: HoldCause,
+    /// When the countdown was held, vehicle time, s.
+    pub at_s: f64,
+}
+
+impl Mode {
+    /// Why the last countdown was held, and the time left until the vehicle disarms, s; `None` unless it is held.
+    pub fn held(&self, time_s: f64) -> Option<(HoldCause, f64)> {
+        let hold = self.hold.filter(|_| self.phase == Phase::PadArmed)?;
+        Some((hold.cause, (hold.at_s + HOLD_LIMIT_S - time_s).max(0.0)))
+    }
+}

@@ -1,0 +1,148 @@
+//! On the ground after the flight: the status of the motor, and when the vehicle becomes SAFED.
+
+use super::*;
+
+/// On the ground since 100 s, with this motor.
+fn landed(motor: Motor, pin_out: bool) -> Mode {
+    let mode = in_order(Phase::Touchdown);
+    let interlocks = Interlocks { pin_out, landing_motor_inhibited: true, ..mode.interlocks };
+    Mode { motor, interlocks, entered_at_s: 100.0, ..mode }
+}
+
+#[test]
+fn during_a_flight_the_motor_is_live_then_burning_then_hot_then_burnt() {
+    let mut mode = after(&ARM[..2]);
+    let mut status = |events: &[Event], time_s: f64| {
+        for event in events {
+            let answer = transition(&mode, *event, time_s);
+            assert_eq!(answer.refusal, None, "{event:?}");
+            mode = answer.mode;
+        }
+        (mode.motor_status(time_s), mode.approach_wait_s(time_s))
+    };
+    let start = [ARM[2], Event::StartRequested { countdown_s: 0.0 }];
+    assert_eq!(status(&[], 2.0), (MotorStatus::Live, Some(0.0)));
+    assert_eq!(status(&start, 3.0), (MotorStatus::Live, None));
+    assert_eq!(status(&[Event::ReleasedAt(StartPoint::Ignition)], 4.0), (MotorStatus::Live, None));
+    assert_eq!(status(&[Event::IgnitionGate { open: true }], 5.0), (MotorStatus::Burning, None));
+    assert_eq!(status(&[Event::ThrustConfirmed], 5.1), (MotorStatus::Burning, None));
+    let contact = Event::Contact { thrust_below_weight: true };
+    assert_eq!(status(&[contact], 10.0), (MotorStatus::Burning, None), "it may burn out on the ground");
+    assert_eq!(status(&[Event::Burnout], 11.0), (MotorStatus::Hot, Some(MOTOR_HOT_S)));
+    assert_eq!(status(&[], 70.0), (MotorStatus::Hot, Some(1.0)));
+    assert_eq!(status(&[], 71.0), (MotorStatus::Burnt, Some(0.0)));
+    assert_eq!(status(&[Event::SafingDone], 71.0), (MotorStatus::Burnt, Some(0.0)));
+    assert_eq!(mode.phase, Phase::Safed);
+}
+
+#[test]
+fn with_the_pin_in_the_motor_is_safe() {
+    let idle = after(&ARM[..1]);
+    assert_eq!((idle.motor_status(1.0), idle.approach_wait_s(1.0)), (MotorStatus::PinIn, Some(0.0)));
+}
+
+#[test]
+fn after_a_pad_abort_the_wait_runs() {
+    let aborted = after(&with_arm(&[ABORT]));
+    assert_eq!(aborted.motor_status(13.0), MotorStatus::Live);
+    assert_eq!(aborted.approach_wait_s(13.0), Some(50.0));
+}
+
+#[test]
+fn after_no_light_the_motor_is_live_and_after_a_late_light_it_burns() {
+    let dark = transition(&in_order(Phase::Ignition), Event::NoThrustTimeout, 1.0).mode;
+    assert_eq!(dark.motor_status(1.0), MotorStatus::Live);
+    let late = transition(&dark, Event::ThrustConfirmed, 1.2).mode;
+    assert_eq!(late.motor_status(1.2), MotorStatus::Burning);
+}
+
+#[test]
+fn a_live_motor_on_the_ground_is_safed_only_by_the_pin_and_the_wait() {
+    for motor in [Motor::Unlit, Motor::Commanded] {
+        let live = landed(motor, true);
+        assert_eq!(live.motor_status(101.0), MotorStatus::Live);
+        assert_eq!(live.approach_wait_s(110.0), Some(MISFIRE_WAIT_S - 10.0));
+        // No matter how long the vehicle lies there.
+        assert_eq!(transition(&live, Event::SafingDone, 1e6).refusal, Some(Refusal::MotorLive));
+        let pinned = transition(&live, Event::PinInserted, 120.0).mode;
+        assert_eq!(pinned.motor_status(120.0), MotorStatus::PinIn);
+        let early = transition(&pinned, Event::SafingDone, 159.9);
+        assert_eq!(early.refusal, Some(Refusal::MisfireWait));
+        let safed = transition(&pinned, Event::SafingDone, 160.0);
+        assert_eq!(safed.mode.phase, Phase::Safed);
+        assert_eq!(safed.effects, Effects::of(&[Effect::Disarm]));
+        // When the pin is pulled again, the motor is live again, so the vehicle must not be SAFED.
+        let pulled = transition(&safed.mode, Event::PinPulled, 200.0).mode;
+        assert_eq!((pulled.phase, pulled.motor_status(200.0)), (Phase::Touchdown, MotorStatus::Live));
+        assert_eq!(pulled.approach_wait_s(200.0), Some(MISFIRE_WAIT_S));
+    }
+}
+
+#[test]
+fn a_pin_does_not_cool_a_motor() {
+    let hot = landed(Motor::BurntOut { at_s: 99.0 }, false);
+    assert_eq!(transition(&hot, Event::SafingDone, 158.9).refusal, Some(Refusal::MotorHot));
+    let burning = landed(Motor::Burning, false);
+    assert_eq!(transition(&burning, Event::SafingDone, 1e6).refusal, Some(Refusal::MotorBurning));
+    let safed = transition(&hot, Event::SafingDone, 159.0).mode;
+    assert_eq!(
+        transition(&safed, Event::PinPulled, 160.0).mode.phase,
+        Phase::Safed,
+        "a burnt motor stays burnt"
+    );
+}
+
+#[test]
+fn in_the_air_pin_events_are_refused() {
+    for phase in Phase::ALL.into_iter().filter(|phase| !phase.on_pad()) {
+        let on_ground = matches!(phase, Phase::Touchdown | Phase::Safed);
+        for event in [Event::PinPulled, Event::PinInserted] {
+            assert_eq!(transition(&in_order(phase), event, 1.0).refusal.is_none(), on_ground, "{phase:?}");
+        }
+    }
+}
+
+/// Every state of motor and pin, at several times.
+#[test]
+fn on_the_ground_no_event_leads_to_safed_with_a_dangerous_motor() {
+    let motors = [Motor::Unlit, Motor::Commanded, Motor::Burning, Motor::BurntOut { at_s: 100.0 }];
+    for motor in motors {
+        for pin_out in [false, true] {
+            for time_s in [101.0, 159.9, 160.0, 1e6] {
+                for event in every_event() {
+                    let mode = landed(motor, pin_out);
+                    let next = transition(&mode, event, time_s).mode;
+                    let burnt = matches!(motor, Motor::BurntOut { .. });
+                    let unlit = matches!(motor, Motor::Unlit | Motor::Commanded);
+                    let safe = time_s >= 160.0 && (burnt || (unlit && !pin_out));
+                    let safed = safe && event == Event::SafingDone;
+                    let context = format!("{motor:?}, pin out {pin_out}, {time_s} s, {event:?}");
+                    assert_eq!(next.phase == Phase::Safed, safed, "{context}");
+                    assert!(safed || next.phase == Phase::Touchdown, "{context}");
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_arrives_safed_is_claimed_only_of_a_motor_that_is_safe(
+        events in prop::collection::vec((likely_event(), 0.0_f64..40.0), 0..60),
+    ) {
+        let (mut mode, mut time_s) = (Mode::power_up(0.0), 0.0);
+        for (event, later_s) in events {
+            time_s += later_s;
+            mode = transition(&mode, event, time_s).mode;
+            if mode.phase == Phase::Safed {
+                prop_assert!(matches!(mode.motor_status(time_s), MotorStatus::Burnt | MotorStatus::PinIn));
+            }
+            if mode.approach_wait_s(time_s) == Some(0.0) {
+                prop_assert!(!mode.interlocks.armed || mode.phase == Phase::Touchdown);
+                prop_assert!(!matches!(mode.motor_status(time_s), MotorStatus::Burning | MotorStatus::Hot));
+            }
+        }
+    }
+}

@@ -1,0 +1,375 @@
+use proptest::prelude::*;
+
+use super::*;
+
+/// Every event, with every combination of its flags.
+fn every_event() -> Vec<Event> {
+    let flags = [false, true];
+    let mut events = vec![
+        Event::SelfTestPassed,
+        Event::PinPulled,
+        Event::PinInserted,
+        Event::DisarmRequested,
+        Event::StartRequested { countdown_s: 5.0 },
+        Event::CountdownElapsed,
+        Event::ReleasedAt(StartPoint::Pad),
+        Event::ReleasedAt(StartPoint::Apogee),
+        Event::ReleasedAt(StartPoint::Ignition),
+        Event::LiftOff,
+        Event::Burnout,
+        Event::Apogee,
+        Event::FinsConfirmed,
+        Event::LandArm,
+        Event::ThrustConfirmed,
+        Event::NoThrustTimeout,
+        Event::SafingDone,
+        Event::Hold { cause: HoldCause::UplinkSilent },
+        Event::Hold { cause: HoldCause::Commanded },
+        Event::HoldElapsed,
+    ];
+    for flag in flags {
+        events.push(Event::ArmRequested { checks_passed: flag });
+        events.push(Event::IgnitionGate { open: flag });
+        events.push(Event::Contact { thrust_below_weight: flag });
+        for gate_open in flags {
+            events.push(Event::AbortRequested { above_commit_height: flag, gate_open });
+        }
+    }
+    events
+}
+
+/// A vehicle in the phase, with everything in order for the next phase.
+fn in_order(phase: Phase) -> Mode {
+    let armed = !matches!(phase, Phase::Safe | Phase::PadIdle | Phase::Safed);
+    Mode {
+        phase,
+        interlocks: Interlocks { pin_out: true, armed, ..Interlocks::default() },
+        motor: match phase {
+            Phase::Ignition => Motor::Commanded,
+            Phase::Powered => Motor::Burning,
+            // The motor has cooled at `LATER_S`.
+            Phase::Touchdown | Phase::Safed => Motor::BurntOut { at_s: LATER_S - MOTOR_HOT_S },
+            _ => Motor::Unlit,
+        },
+        ..Mode::power_up(0.0)
+    }
+}
+
+const LATER_S: f64 = 10.0;
+
+#[expect(
+    clippy::match_same_arms,
+    reason = "rows of different phases stay apart even where they say the same"
+)]
+/// The next phase and the effects of an event for a vehicle with everything in order; `None` is a refusal.
+fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
+    use Effect::{
+        DeployChute, Disarm, FinsOpen, IgniteLandingMotor, InhibitLandingMotor, RecordLoss, ShowPadWait,
+        StartCountdown,
+    };
+    use Event as E;
+    use Phase as P;
+    let next: (Phase, &'static [Effect]) = match (phase, event) {
+        (P::Safe, E::SelfTestPassed) => (P::PadIdle, &[]),
+        (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::PinPulled)
+        | (P::Safe | P::PadIdle | P::Touchdown | P::Safed, E::PinInserted) => (phase, &[]),
+        (P::PadArmed, E::PinInserted | E::DisarmRequested) => (P::PadIdle, &[Disarm]),
+        (P::PadIdle, E::ArmRequested { checks_passed: true }) => (P::PadArmed, &[]),
+        (P::PadArmed, E::StartRequested { .. }) => (P::PadArmed, &[StartCountdown]),
+        (P::PadArmed | P::Boost, E::LiftOff) => (P::Boost, &[]),
+        (P::Boost, E::Burnout) => (P::Coast, &[]),
+        (P::Powered, E::Burnout) => (P::Powered, &[]),
+        (P::Boost | P::Coast, E::Apogee) => (P::Deploy, &[FinsOpen]),
+        (P::Deploy, E::FinsConfirmed) => (P::AeroDescent, &[]),
+        (P::AeroDescent, E::LandArm) | (P::LandArmed, E::IgnitionGate { open: false }) => (P::LandArmed, &[]),
+        (P::LandArmed, E::IgnitionGate { open: true }) => (P::Ignition, &[IgniteLandingMotor]),
+        (P::Ignition, E::ThrustConfirmed) => (P::Powered, &[]),
+        (P::Ignition, E::NoThrustTimeout) => (P::Ignition, &[InhibitLandingMotor, FinsOpen, RecordLoss]),
+        (P::Safe | P::PadIdle, E::AbortRequested { .. }) => {
+            (phase, &[InhibitLandingMotor, Disarm, ShowPadWait])
+        }
+        (P::PadArmed, E::AbortRequested { .. }) => (P::PadIdle, &[InhibitLandingMotor, Disarm, ShowPadWait]),
+        (P::Boost | P::Coast, E::AbortRequested { .. }) => (phase, &[InhibitLandingMotor]),
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { above_commit_height: true, .. }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
+        }
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { gate_open: true, .. }) => {
+            (P::Ignition, &[IgniteLandingMotor])
+        }
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { .. }) => {
+            (phase, &[InhibitLandingMotor, FinsOpen, RecordLoss])
+        }
+        (P::Ignition | P::Powered, E::AbortRequested { .. }) => (phase, &[]),
+        (
+            P::Boost
+            | P::Coast
+            | P::Deploy
+            | P::AeroDescent
+            | P::LandArmed
+            | P::Ignition
+            | P::Powered
+            | P::Chute,
+            E::Contact { thrust_below_weight: true },
+        ) => (P::Touchdown, &[InhibitLandingMotor]),
+        (P::Touchdown, E::DisarmRequested) => (phase, &[Disarm]),
+        (P::Touchdown, E::SafingDone) => (P::Safed, &[Disarm]),
+        _ => return None,
+    };
+    Some(next)
+}
+
+#[test]
+fn every_event_in_every_phase_has_the_result_of_the_table() {
+    for phase in Phase::ALL {
+        for event in every_event() {
+            let mode = in_order(phase);
+            let answer = transition(&mode, event, LATER_S);
+            let context = format!("{} + {event:?}", phase.name());
+            if let Some((to, effects)) = expected(phase, event) {
+                assert_eq!(answer.refusal, None, "{context}");
+                assert_eq!(answer.mode.phase, to, "{context}");
+                assert_eq!(answer.effects, Effects::of(effects), "{context}");
+            } else {
+                let refusal = answer.refusal.unwrap_or_else(|| panic!("{context}: accepted"));
+                assert!(!refusal.reason().is_empty(), "{context}");
+                assert_eq!((answer.mode, answer.effects), (mode, Effects::NONE), "{context}");
+            }
+        }
+    }
+}
+
+/// Applies events in order, one second apart, from power-up, and expects each to be accepted.
+fn after(events: &[Event]) -> Mode {
+    events.iter().enumerate().fold(Mode::power_up(0.0), |mode, (second, event)| {
+        let answer = transition(&mode, *event, second as f64);
+        assert_eq!(answer.refusal, None, "{event:?} in {}", mode.phase.name());
+        answer.mode
+    })
+}
+
+const ARM: [Event; 3] =
+    [Event::SelfTestPassed, Event::PinPulled, Event::ArmRequested { checks_passed: true }];
+
+fn with_arm(rest: &[Event]) -> Vec<Event> {
+    ARM.iter().chain(rest).copied().collect()
+}
+
+const ABORT: Event = Event::AbortRequested { above_commit_height: false, gate_open: false };
+
+#[test]
+fn a_simulation_released_at_ignition_flies_to_safed() {
+    let mode = after(&with_arm(&[
+        Event::StartRequested { countdown_s: 1.0 },
+        Event::ReleasedAt(StartPoint::Ignition),
+        Event::IgnitionGate { open: true },
+        Event::ThrustConfirmed,
+        Event::Burnout,
+        Event::Contact { thrust_below_weight: true },
+    ]));
+    let burnt_out_at_s = 7.0;
+    assert_eq!(mode.motor, Motor::BurntOut { at_s: burnt_out_at_s });
+    let hot = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S - 0.1);
+    assert_eq!(hot.refusal, Some(Refusal::MotorHot));
+    let mode = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S).mode;
+    assert_eq!(mode.phase, Phase::Safed);
+    assert!(!mode.interlocks.armed && mode.interlocks.landing_motor_inhibited);
+}
+
+#[test]
+fn a_pad_start_flies_the_whole_sequence() {
+    let mode = after(&with_arm(&[
+        Event::StartRequested { countdown_s: 1.0 },
+        Event::CountdownElapsed,
+        Event::LiftOff,
+        Event::Burnout,
+        Event::Apogee,
+        Event::FinsConfirmed,
+        Event::LandArm,
+        Event::IgnitionGate { open: false },
+        Event::IgnitionGate { open: true },
+        Event::ThrustConfirmed,
+        Event::Contact { thrust_below_weight: true },
+    ]));
+    assert_eq!(mode.phase, Phase::Touchdown);
+}
+
+#[test]
+fn the_countdown_must_run_out_before_a_release() {
+    let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    let release = Event::ReleasedAt(StartPoint::Ignition);
+    assert_eq!(transition(&mode, release, 7.9).refusal, Some(Refusal::CountdownNotElapsed));
+    assert_eq!(transition(&mode, release, 8.0).mode.phase, Phase::LandArmed);
+    assert_eq!(mode.countdown_remaining_s(6.0), Some(2.0));
+    assert_eq!(
+        transition(&mode, Event::StartRequested { countdown_s: 5.0 }, 4.0).refusal,
+        Some(Refusal::CountdownRunning)
+    );
+}
+
+#[test]
+fn a_countdown_must_be_a_number_of_seconds() {
+    for countdown_s in [f64::NAN, f64::INFINITY, -1.0] {
+        let answer = transition(&after(&ARM), Event::StartRequested { countdown_s }, 3.0);
+        assert_eq!(answer.refusal, Some(Refusal::BadCountdown));
+    }
+}
+
+#[test]
+fn disarming_cancels_the_countdown_and_latches_nothing() {
+    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    let answer = transition(&counting, Event::DisarmRequested, 4.0);
+    assert_eq!(answer.mode.phase, Phase::PadIdle);
+    assert_eq!(answer.effects, Effects::of(&[Effect::Disarm, Effect::CancelCountdown]));
+    assert_eq!(answer.mode.countdown_end_s, None);
+    assert!(!answer.mode.interlocks.abort_latched);
+    assert_eq!(transition(&answer.mode, ARM[2], 5.0).mode.phase, Phase::PadArmed);
+}
+
+#[test]
+fn a_pad_abort_latches_and_shows_the_wait() {
+    let mode = after(&with_arm(&[ABORT]));
+    assert_eq!(mode.phase, Phase::PadIdle);
+    assert!(
+        !mode.interlocks.armed && mode.interlocks.landing_motor_inhibited && mode.interlocks.abort_latched
+    );
+    assert_eq!(mode.pad_wait_remaining_s(13.0), Some(50.0));
+    assert_eq!(mode.pad_wait_remaining_s(63.0), None);
+    let refusal = transition(&mode, ARM[2], 100.0).refusal;
+    assert_eq!(refusal, Some(Refusal::AbortLatched));
+}
+
+#[test]
+fn refused_arming_says_why() {
+    let reason = |mode: &Mode, checks_passed| {
+        transition(mode, Event::ArmRequested { checks_passed }, 9.0).refusal.map(|refusal| refusal.reason())
+    };
+    let idle = after(&ARM[..1]);
+    assert_eq!(reason(&idle, true).unwrap(), "the pin is in: pull it before arming");
+    assert_eq!(reason(&after(&ARM[..2]), false).unwrap(), "an arming check failed");
+    assert_eq!(reason(&in_order(Phase::Powered), true).unwrap(), "cannot arm in POWERED: only PAD_IDLE arms");
+}
+
+#[test]
+fn an_abort_while_rising_ends_under_the_parachute_at_apogee() {
+    for phase in [Phase::Boost, Phase::Coast] {
+        let aborted = transition(&in_order(phase), ABORT, 1.0).mode;
+        assert!(aborted.interlocks.landing_motor_inhibited && aborted.interlocks.abort_latched);
+        let answer = transition(&aborted, Event::Apogee, 2.0);
+        assert_eq!(answer.mode.phase, Phase::Chute);
+        assert!(answer.effects.contains(Effect::DeployChute));
+    }
+}
+
+#[test]
+fn after_an_abort_under_thrust_the_vehicle_lands_here_and_the_phase_stays() {
+    let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
+    assert_eq!(aborted.mode.phase, Phase::Powered);
+    assert!(aborted.mode.interlocks.lands_here && aborted.effects.is_empty());
+    assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
+    let burns = Event::AbortRequested { above_commit_height: false, gate_open: true };
+    let lit = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
+    assert!(
+        lit.phase == Phase::Ignition && lit.interlocks.lands_here,
+        "a motor lit by an abort also lands the vehicle here"
+    );
+}
+
+#[test]
+fn no_light_is_latched_once_and_a_late_light_still_counts() {
+    let dark = transition(&in_order(Phase::Ignition), Event::NoThrustTimeout, 1.0).mode;
+    assert!(dark.interlocks.no_light_latched && dark.interlocks.landing_motor_inhibited);
+    let again = transition(&dark, Event::NoThrustTimeout, 1.1);
+    assert!(again.effects.is_empty() && again.mode == dark);
+    assert_eq!(transition(&dark, Event::ThrustConfirmed, 1.2).mode.phase, Phase::Powered);
+}
+
+#[test]
+fn contact_under_thrust_is_not_a_touchdown() {
+    let answer = transition(&in_order(Phase::Powered), Event::Contact { thrust_below_weight: false }, 1.0);
+    assert_eq!(answer.refusal, Some(Refusal::ThrustAboveWeight));
+}
+
+#[test]
+fn names_and_numbers_of_phases_are_one_to_one() {
+    for (index, phase) in Phase::ALL.into_iter().enumerate() {
+        assert_eq!(usize::from(phase.index()), index);
+        assert_eq!(Phase::from_index(phase.index()), Some(phase));
+    }
+    assert_eq!(Phase::from_index(13), None);
+}
+
+#[test]
+fn a_set_of_effects_lists_exactly_its_members() {
+    let effects = Effects::of(&[Effect::RecordLoss, Effect::IgniteAscentMotor]);
+    assert_eq!(effects.iter().collect::<Vec<_>>(), [Effect::IgniteAscentMotor, Effect::RecordLoss]);
+}
+
+mod ground;
+mod holds;
+
+fn any_event() -> impl Strategy<Value = Event> {
+    prop::sample::select(every_event())
+}
+
+/// Events that lead on, so that random sequences reach the late phases too.
+fn likely_event() -> impl Strategy<Value = Event> {
+    let leading = with_arm(&[
+        Event::StartRequested { countdown_s: 1.0 },
+        Event::ReleasedAt(StartPoint::Ignition),
+        Event::ReleasedAt(StartPoint::Apogee),
+        Event::FinsConfirmed,
+        Event::LandArm,
+        Event::IgnitionGate { open: true },
+        Event::LiftOff,
+        Event::Apogee,
+        Event::Hold { cause: HoldCause::UplinkSilent },
+        Event::ThrustConfirmed,
+        Event::Contact { thrust_below_weight: true },
+    ]);
+    prop_oneof![prop::sample::select(leading), any_event()]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_arrives_the_landing_motor_is_lit_at_most_once_and_behind_every_gate(
+        events in prop::collection::vec(likely_event(), 0..60),
+    ) {
+        let mut mode = Mode::power_up(0.0);
+        let (mut lit, mut ascents) = (0, 0);
+        for (second, event) in events.into_iter().enumerate() {
+            let answer = transition(&mode, event, second as f64);
+            if answer.effects.contains(Effect::IgniteAscentMotor) {
+                ascents += 1;
+                prop_assert!(ascents == 1 && mode.interlocks.armed && answer.mode.phase == Phase::Boost);
+            }
+            if answer.effects.contains(Effect::IgniteLandingMotor) {
+                lit += 1;
+                let locks = mode.interlocks;
+                prop_assert!(locks.armed && locks.pin_out);
+                prop_assert!(!locks.landing_motor_inhibited && !locks.abort_latched);
+                prop_assert!(mode.phase.in_descent());
+                let gate_open = matches!(
+                    event,
+                    Event::IgnitionGate { open: true }
+                        | Event::AbortRequested { above_commit_height: false, gate_open: true }
+                );
+                prop_assert!(gate_open, "{event:?}");
+                prop_assert_eq!(answer.mode.phase, Phase::Ignition);
+            }
+            if answer.effects.contains(Effect::DeployChute) {
+                prop_assert!(!mode.phase.in_landing_burn(), "parachute under thrust");
+            }
+            let (before, after) = (mode.interlocks, answer.mode.interlocks);
+            prop_assert!(!before.abort_latched || after.abort_latched, "an abort latch was cleared");
+            prop_assert!(!before.landing_motor_inhibited || after.landing_motor_inhibited, "an inhibit was cleared");
+            if answer.refusal.is_some() {
+                prop_assert_eq!(answer.mode, mode);
+                prop_assert!(answer.effects.is_empty());
+            }
+            mode = answer.mode;
+        }
+        prop_assert!(lit <= 1);
+    }
+}

@@ -1,0 +1,299 @@
+//! The transition table.
+
+use super::{Effect, Effects, Event, Hold, Interlocks, Mode, Motor, Phase, Refusal, StartPoint};
+
+/// The result of an event.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    /// The mode afterwards; unchanged if refused.
+    pub mode: Mode,
+    /// The effects.
+    pub effects: Effects,
+    /// The reason, if refused.
+    pub refusal: Option<Refusal>,
+}
+
+/// One row of the table.
+enum Row {
+    /// Accepted: the mode with edited latches and countdown, the next phase, and the effects.
+    Go(Mode, Phase, Effects),
+    Refuse(Refusal),
+}
+
+/// The mode after `event` at vehicle time `time_s`.
+///
+/// The function is total and pure: it has a result for every event in every phase.
+pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
+    match row(mode, event, time_s) {
+        Row::Go(mut next, phase, effects) => {
+            // This holds for every row that lights the motor.
+            if effects.contains(Effect::IgniteLandingMotor) {
+                next.motor = Motor::Commanded;
+            }
+            // A hold exists only in PAD_ARMED, so it ends with that phase.
+            if phase != Phase::PadArmed {
+                next.hold = None;
+            }
+            if phase != mode.phase {
+                next.phase = phase;
+                next.entered_at_s = time_s;
+            }
+            Transition { mode: next, effects, refusal: None }
+        }
+        Row::Refuse(refusal) => Transition { mode: *mode, effects: Effects::NONE, refusal: Some(refusal) },
+    }
+}
+
+#[expect(
+    clippy::match_same_arms,
+    reason = "rows of different phases stay apart even where they say the same"
+)]
+#[expect(clippy::too_many_lines, reason = "one table, read as one")]
+fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
+    use Event as E;
+    use Phase as P;
+    let phase = mode.phase;
+    let locks = mode.interlocks;
+    let go = |to: Phase| Row::Go(*mode, to, Effects::NONE);
+    let go_with = |to: Phase, effects: &[Effect]| Row::Go(*mode, to, Effects::of(effects));
+    let wrong = |action, only| Row::Refuse(Refusal::WrongPhase { action, phase, only });
+    let latch = |interlocks: Interlocks| Mode { interlocks, ..*mode };
+
+    match (phase, event) {
+        // On the pad.
+        (P::Safe, E::SelfTestPassed) => go(P::PadIdle),
+        (_, E::SelfTestPassed) => wrong("pass the self-test", "only SAFE waits for it"),
+
+        (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) => {
+            Row::Go(latch(Interlocks { pin_out: true, ..locks }), phase, Effects::NONE)
+        }
+        (P::Safe | P::PadIdle, E::PinInserted) => {
+            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        }
+        (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
+        // After the flight a person may put the pin back and pull it again. Without it a motor that was not lit is
+        // live.
+        (P::Touchdown | P::Safed, E::PinInserted) => {
+            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        }
+        (P::Touchdown | P::Safed, E::PinPulled) => {
+            let burnt = matches!(mode.motor, Motor::BurntOut { .. });
+            let to = if burnt { phase } else { P::Touchdown };
+            Row::Go(latch(Interlocks { pin_out: true, ..locks }), to, Effects::NONE)
+        }
+        (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the ground only"),
+
+        (P::PadIdle, E::ArmRequested { checks_passed }) => match () {
+            () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
+            () if !locks.pin_out => Row::Refuse(Refusal::PinIn),
+            () if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
+            () => Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE),
+        },
+        (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
+
+        (P::PadArmed, E::DisarmRequested) => disarmed(mode),
+        // On the ground nothing is lit any more, but that does not make the motor safe.
+        (P::Touchdown, E::DisarmRequested) => {
+            Row::Go(latch(Interlocks { armed: false, ..locks }), phase, Effects::of(&[Effect::Disarm]))
+        }
+        (_, E::DisarmRequested) => wrong("disarm", "only PAD_ARMED and TOUCHDOWN disarm"),
+
+        (P::PadArmed, E::StartRequested { countdown_s }) => match mode.countdown_end_s {
+            Some(_) => Row::Refuse(Refusal::CountdownRunning),
+            None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
+            None => Row::Go(
+                Mode { countdown_end_s: Some(time_s + countdown_s), hold: None, ..*mode },
+                phase,
+                Effects::of(&[Effect::StartCountdown]),
+            ),
+        },
+        (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
+
+        // A hold cancels the countdown: only a new start counts down again.
+        (P::PadArmed, E::Hold { cause }) => match (mode.countdown_end_s, mode.hold) {
+            (Some(_), _) => Row::Go(
+                Mode { countdown_end_s: None, hold: Some(Hold { cause, at_s: time_s }), ..*mode },
+                phase,
+                Effects::of(&[Effect::HoldCountdown]),
+            ),
+            (None, Some(_)) => Row::Refuse(Refusal::AlreadyHeld),
+            (None, None) => Row::Refuse(Refusal::NoCountdown),
+        },
+        (_, E::Hold { .. }) => wrong("hold", "only a countdown in PAD_ARMED is held"),
+        (P::PadArmed, E::HoldElapsed) => match mode.held(time_s) {
+            Some((_, left_s)) if left_s <= 0.0 => disarmed(mode),
+            _ => Row::Refuse(Refusal::HoldNotOver),
+        },
+        (_, E::HoldElapsed) => wrong("end a hold", "only PAD_ARMED is held"),
+
+        // From here on nobody may approach or disarm the vehicle, because the motor may light late.
+        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
+            Mode { countdown_end_s: None, ..*mode },
+            P::Boost,
+            Effects::of(&[Effect::IgniteAscentMotor]),
+        ),
+        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
+        }
+        (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::LandArmed, Effects::of(&[Effect::FinsOpen]))
+        }
+        (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Ignition)) => {
+            Row::Refuse(Refusal::CountdownNotElapsed)
+        }
+        (_, E::CountdownElapsed) => wrong("end a countdown", "only PAD_ARMED counts down"),
+        (_, E::ReleasedAt(StartPoint::Pad)) => wrong("release at the pad", "a pad start lifts off by itself"),
+        (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),
+
+        // Ascent.
+        // Also without a countdown: a rising vehicle must be controlled.
+        (P::PadArmed, E::LiftOff) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Boost, Effects::NONE)
+        }
+        (P::Boost, E::LiftOff) => go(phase),
+        (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED and BOOST lift off"),
+        (P::Boost, E::Burnout) => go(P::Coast),
+        // The landing motor burnt out, which happens once; the contact with the ground decides what follows.
+        (P::Powered | P::Touchdown, E::Burnout) if mode.motor == Motor::Burning => {
+            Row::Go(Mode { motor: Motor::BurntOut { at_s: time_s }, ..*mode }, phase, Effects::NONE)
+        }
+        (P::Powered, E::Burnout) => go(phase),
+        (_, E::Burnout) => wrong("burn out", "only BOOST, POWERED and a motor still burning in TOUCHDOWN do"),
+        (P::Boost | P::Coast, E::Apogee) if locks.abort_latched => go_with(P::Chute, &[Effect::DeployChute]),
+        (P::Boost | P::Coast, E::Apogee) => go_with(P::Deploy, &[Effect::FinsOpen]),
+        (_, E::Apogee) => wrong("pass apogee", "only BOOST and COAST rise"),
+
+        // Descent.
+        (P::Deploy, E::FinsConfirmed) => go(P::AeroDescent),
+        (_, E::FinsConfirmed) => wrong("confirm the fins", "only DEPLOY waits for them"),
+        (P::AeroDescent, E::LandArm) => may_light(locks, || go(P::LandArmed)),
+        (_, E::LandArm) => wrong("arm for landing", "only AERO_DESCENT does"),
+        (P::LandArmed, E::IgnitionGate { open: false }) => go(phase),
+        (P::LandArmed, E::IgnitionGate { open: true }) if locks.abort_latched => {
+            Row::Refuse(Refusal::AbortLatched)
+        }
+        (P::LandArmed, E::IgnitionGate { open: true }) => {
+            may_light(locks, || go_with(P::Ignition, &[Effect::IgniteLandingMotor]))
+        }
+        (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
+
+        // Landing burn. A late light after "no light" counts as thrust, too.
+        (P::Ignition, E::ThrustConfirmed) => {
+            Row::Go(Mode { motor: Motor::Burning, ..*mode }, P::Powered, Effects::NONE)
+        }
+        (_, E::ThrustConfirmed) => wrong("confirm thrust", "only IGNITION waits for it"),
+        (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => Row::Go(
+            latch(Interlocks { no_light_latched: true, landing_motor_inhibited: true, ..locks }),
+            phase,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
+        ),
+        (P::Ignition, E::NoThrustTimeout) => go(phase),
+        (_, E::NoThrustTimeout) => wrong("miss thrust", "only IGNITION waits for it"),
+
+        (_, E::AbortRequested { above_commit_height, gate_open }) => {
+            abort(mode, above_commit_height, gate_open, time_s)
+        }
+
+        // Ground.
+        (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::Contact { .. }) => {
+            wrong("touch down", "only a vehicle in the air touches down")
+        }
+        (_, E::Contact { thrust_below_weight: false }) => Row::Refuse(Refusal::ThrustAboveWeight),
+        (_, E::Contact { thrust_below_weight: true }) => Row::Go(
+            latch(Interlocks { landing_motor_inhibited: true, ..locks }),
+            P::Touchdown,
+            Effects::of(&[Effect::InhibitLandingMotor]),
+        ),
+        (P::Touchdown, E::SafingDone) => {
+            if let Err(refusal) = mode.may_be_safed(time_s) {
+                return Row::Refuse(refusal);
+            }
+            let effects = if locks.armed { Effects::of(&[Effect::Disarm]) } else { Effects::NONE };
+            Row::Go(latch(Interlocks { armed: false, ..locks }), P::Safed, effects)
+        }
+        (_, E::SafingDone) => wrong("safe", "only TOUCHDOWN is made safe"),
+    }
+}
+
+/// The abort column: the effect of an abort in each phase.
+#[expect(
+    clippy::match_same_arms,
+    reason = "rows of different phases stay apart even where they say the same"
+)]
+fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -> Row {
+    use Phase as P;
+    let phase = mode.phase;
+    let locks = mode.interlocks;
+    let may_burn = gate_open && locks.armed && !locks.landing_motor_inhibited && !locks.abort_latched;
+    let inhibited = Mode {
+        interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..locks },
+        countdown_end_s: None,
+        ..*mode
+    };
+    match phase {
+        P::Touchdown | P::Safed => {
+            Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the vehicle is on the ground" })
+        }
+        P::Chute => {
+            Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
+        }
+        // The lit motor cannot be stopped, and a parachute under thrust would burn or tangle. So the vehicle lands.
+        P::Ignition | P::Powered if locks.lands_here => Row::Refuse(Refusal::AlreadyAborted),
+        P::Ignition | P::Powered => {
+            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
+            Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
+        }
+        P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        P::Safe | P::PadIdle | P::PadArmed => {
+            let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
+            let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
+            let to = if phase == P::PadArmed { P::PadIdle } else { phase };
+            // The wait runs from the abort, even if the phase stays.
+            Row::Go(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, Effects::of(&effects))
+        }
+        P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
+        // A repeated abort on the way down may still have enough height for the parachute.
+        P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => Row::Go(
+            inhibited,
+            P::Chute,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute]),
+        ),
+        P::Deploy | P::AeroDescent | P::LandArmed if locks.abort_latched => {
+            Row::Refuse(Refusal::AlreadyAborted)
+        }
+        // Too low for the parachute: a landing on the motor is the safest way down.
+        P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
+            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
+            Row::Go(Mode { interlocks, ..*mode }, P::Ignition, Effects::of(&[Effect::IgniteLandingMotor]))
+        }
+        P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(
+            inhibited,
+            phase,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
+        ),
+    }
+}
+
+fn disarmed(mode: &Mode) -> Row {
+    let interlocks = Interlocks { armed: false, ..mode.interlocks };
+    let effects = match mode.countdown_end_s {
+        Some(_) => Effects::of(&[Effect::Disarm, Effect::CancelCountdown]),
+        None => Effects::of(&[Effect::Disarm]),
+    };
+    Row::Go(Mode { interlocks, countdown_end_s: None, ..*mode }, Phase::PadIdle, effects)
+}
+
+fn countdown_over(mode: &Mode, time_s: f64) -> bool {
+    mode.countdown_end_s.is_some_and(|end_s| time_s >= end_s)
+}
+
+/// The interlocks of the landing motor that hold in every phase.
+fn may_light(locks: Interlocks, row: impl FnOnce() -> Row) -> Row {
+    match () {
+        () if !locks.armed => Row::Refuse(Refusal::NotArmed),
+        () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
+        () if locks.landing_motor_inhibited => Row::Refuse(Refusal::LandingMotorInhibited),
+        () => row(),
+    }
+}

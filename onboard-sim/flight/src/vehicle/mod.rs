@@ -1,0 +1,21 @@
+//! Describes the rocket, its motor, the air and a mission as data.
+//!
+//! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the limits.
+//! * [`airframe`] holds masses, shape and actuators.
+//! * [`thrust_curve`] is the certified motor, and [`burn`] the expected burn of this motor.
+//! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
+//! * [`dynamics`] has the state and the equations of motion in the plane, [`rigid`] the state in space.
+//! * [`site`] is the place of the pad on the Earth.
+//! * [`profile`] holds the planar landing of the paper.
+
+pub mod airframe;
+pub mod atmosphere;
+pub mod burn;
+pub mod fins;
+pub mod mission;
+pub mod profile;
+pub mod rigid;
+pub mod site;
+pub mod thrust_curve;
+
+pub use nmpc::dynamics;

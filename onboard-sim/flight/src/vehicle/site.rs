@@ -1,0 +1,91 @@
+//! The position of the pad on the Earth. It is used for maps only, never for a decision.
+
+use serde::Deserialize;
+
+/// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
+const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
+const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
+
+/// The position of a pad on the Earth.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Site {
+    /// Latitude, degrees, north positive, -85 to 85, because close to a pole a path to the east circles the pole.
+    pub latitude_deg: f64,
+    /// Longitude, degrees, east positive, -180 to 180.
+    pub longitude_deg: f64,
+}
+
+impl Default for Site {
+    /// The field of the Friends of Amateur Rocketry in the Mojave desert.
+    fn default() -> Self {
+        Self { latitude_deg: 35.347, longitude_deg: -117.809 }
+    }
+}
+
+impl Site {
+    /// The keys with a value outside their range, with the range and the value.
+    pub fn bad_value(&self) -> Option<(&'static str, f64, &'static str)> {
+        let Self { latitude_deg, longitude_deg } = *self;
+        [
+            ("site.latitude_deg", latitude_deg, 85.0, "-85 to 85"),
+            ("site.longitude_deg", longitude_deg, 180.0, "-180 to 180"),
+        ]
+        .into_iter()
+        // NaN is outside every range.
+        .find(|(_, found, most, _)| !(-most..=*most).contains(found))
+        .map(|(key, found, _, required)| (key, found, required))
+    }
+
+    /// Latitude and longitude, degrees, of a place at a distance north and east of the pad, m. It uses the ellipsoid's
+    /// curvature at the pad, which is accurate to a millimetre within a kilometre.
+    pub fn at_deg(&self, north_m: f64, east_m: f64) -> (f64, f64) {
+        let latitude_rad = self.latitude_deg.to_radians();
+        let flattened = 1.0 - ECCENTRICITY_SQUARED * libm::pow(libm::sin(latitude_rad), 2.0);
+        let across_m = EQUATORIAL_RADIUS_M / libm::sqrt(flattened);
+        let along_m = across_m * (1.0 - ECCENTRICITY_SQUARED) / flattened;
+        let north_deg = (north_m / along_m).to_degrees();
+        let east_deg = (east_m / (across_m * libm::cos(latitude_rad))).to_degrees();
+        let longitude_deg = self.longitude_deg + east_deg;
+        let around_deg = match longitude_deg {
+            east if east > 180.0 => -360.0,
+            west if west < -180.0 => 360.0,
+            _ => 0.0,
+        };
+        (self.latitude_deg + north_deg, longitude_deg + around_deg)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Length of a degree of latitude and of longitude at 45 degrees north on WGS 84, m: 111,131.75 and 78,846.81.
+    #[test]
+    fn val_wgs84_the_length_of_a_degree_matches_the_tables() {
+        let site = Site { latitude_deg: 45.0, longitude_deg: 10.0 };
+        let (latitude_deg, longitude_deg) = site.at_deg(1_111.317_5, 788.468_1);
+        assert!((latitude_deg - 45.01).abs() < 1e-8, "{latitude_deg}");
+        assert!((longitude_deg - 10.01).abs() < 1e-8, "{longitude_deg}");
+        assert_eq!(site.at_deg(0.0, 0.0), (45.0, 10.0));
+    }
+
+    #[test]
+    fn a_place_east_of_the_date_line_has_a_western_longitude() {
+        let (_, longitude_deg) = Site { latitude_deg: 0.0, longitude_deg: 180.0 }.at_deg(0.0, 111_319.5);
+        assert!((longitude_deg + 179.0).abs() < 1e-4, "{longitude_deg}");
+    }
+
+    #[test]
+    fn a_coordinate_out_of_range_is_named() {
+        assert_eq!(Site::default().bad_value(), None);
+        for (latitude_deg, longitude_deg, key) in [
+            (90.0, 0.0, "site.latitude_deg"),
+            (f64::NAN, 0.0, "site.latitude_deg"),
+            (0.0, 181.0, "site.longitude_deg"),
+        ] {
+            let bad = Site { latitude_deg, longitude_deg }.bad_value();
+            assert!(bad.is_some_and(|(found, ..)| found == key), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! A solid motor's thrust over time.
+//!
+//! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact. Propellant burns in
+//! proportion to the delivered impulse (a constant exhaust velocity).
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// One point of a thrust curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThrustPoint {
+    /// Time since the thrust began, s.
+    pub time_s: f64,
+    pub thrust_n: f64,
+}
+
+/// A motor: its thrust curve, masses and size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ThrustCurve {
+    name: String,
+    manufacturer: String,
+    diameter_m: f64,
+    length_m: f64,
+    propellant_mass_kg: f64,
+    total_mass_kg: f64,
+    points: Vec<ThrustPoint>,
+    /// Impulse up to each point, N s.
+    impulse_n_s: Vec<f64>,
+}
+
+/// The data of a motor file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotorData {
+    /// Its name ("H45W").
+    pub name: String,
+    pub manufacturer: String,
+    /// Diameter of the casing, m.
+    pub diameter_m: f64,
+    /// Length of the casing, m.
+    pub length_m: f64,
+    /// Mass of the propellant before ignition, kg.
+    pub propellant_mass_kg: f64,
+    /// Mass of the motor before ignition, kg.
+    pub total_mass_kg: f64,
+    /// Thrust over time. Times are finite and increase; thrusts are finite and not negative.
+    pub points: Vec<ThrustPoint>,
+}
+
+impl ThrustCurve {
+    /// The motor from this data; `None` if it has no thrust after its first point.
+    pub fn new(data: MotorData) -> Option<Self> {
+        let MotorData { name, manufacturer, diameter_m, length_m, propellant_mass_kg, total_mass_kg, points } =
+            data;
+        let mut impulse_n_s = Vec::with_capacity(points.len());
+        let mut sum_n_s = 0.0;
+        impulse_n_s.push(sum_n_s);
+        for pair in points.windows(2) {
+            if let [from, to] = pair {
+                sum_n_s += 0.5 * (from.thrust_n + to.thrust_n) * (to.time_s - from.time_s);
+                impulse_n_s.push(sum_n_s);
+            }
+        }
+        if points.len() < 2 || !(sum_n_s.is_finite() && sum_n_s > 0.0) {
+            return None;
+        }
+        Some(Self {
+            name,
+            manufacturer,
+            diameter_m,
+            length_m,
+            propellant_mass_kg,
+            total_mass_kg,
+            points,
+            impulse_n_s,
+        })
+    }
+
+    /// No motor: no thrust at any time, and no mass.
+    pub(crate) fn none() -> Self {
+        Self {
+            name: String::new(),
+            manufacturer: String::new(),
+            diameter_m: 0.0,
+            length_m: 0.0,
+            propellant_mass_kg: 0.0,
+            total_mass_kg: 0.0,
+            points: Vec::new(),
+            impulse_n_s: Vec::new(),
+        }
+    }
+
+    /// The motor's name as its file has it ("H45W").
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The manufacturer as the file has it ("AT").
+    pub fn manufacturer(&self) -> &str {
+        &self.manufacturer
+    }
+
+    /// Diameter of the casing, m.
+    pub fn diameter_m(&self) -> f64 {
+        self.diameter_m
+    }
+
+    /// Length of the casing, m.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
+    /// Mass of the propellant before ignition, kg.
+    pub fn propellant_mass_kg(&self) -> f64 {
+        self.propellant_mass_kg
+    }
+
+    /// Mass of the motor before ignition, kg.
+    pub fn total_mass_kg(&self) -> f64 {
+        self.total_mass_kg
+    }
+
+    /// The points, in order of time; at least two.
+    pub fn points(&self) -> &[ThrustPoint] {
+        &self.points
+    }
+
+    /// Time of the last point, s.
+    pub fn burn_time_s(&self) -> f64 {
+        self.points.last().map_or(0.0, |point| point.time_s)
+    }
+
+    /// Impulse of the whole burn, N s.
+    pub fn total_impulse_n_s(&self) -> f64 {
+        self.impulse_n_s.last().copied().unwrap_or(0.0)
+    }
+
+    /// Highest thrust, N.
+    pub fn peak_thrust_n(&self) -> f64 {
+        self.points.iter().fold(0.0, |peak: f64, point| peak.max(point.thrust_n))
+    }
+
+    /// The segment that contains a time: its ends and the impulse before it. `None` outside the burn.
+    fn segment(&self, time_s: f64) -> Option<(ThrustPoint, ThrustPoint, f64)> {
+        let after = self.points.partition_point(|point| point.time_s <= time_s);
+        let from = *self.points.get(after.checked_sub(1)?)?;
+        Some((from, *self.points.get(after)?, *self.impulse_n_s.get(after - 1)?))
+    }
+
+    /// Thrust at a time since it began, N; zero before and after the burn.
+    pub fn thrust_at_n(&self, time_s: f64) -> f64 {
+        self.segment(time_s).map_or(0.0, |(from, to, _)| interpolate_n(from, to, time_s))
+    }
+
+    /// Impulse delivered up to a time since the thrust began, N s.
+    pub fn impulse_to_n_s(&self, time_s: f64) -> f64 {
+        match self.segment(time_s) {
+            Some((from, to, before_n_s)) => {
+                let now_n = interpolate_n(from, to, time_s);
+                before_n_s + 0.5 * (from.thrust_n + now_n) * (time_s - from.time_s)
+            }
+            None if time_s >= self.burn_time_s() => self.total_impulse_n_s(),
+            None => 0.0,
+        }
+    }
+
+    /// Mean thrust over `[from_s, from_s + duration_s]`, N; the thrust itself for a duration that is not positive.
+    pub fn mean_thrust_n(&self, from_s: f64, duration_s: f64) -> f64 {
+        if duration_s > 0.0 {
+            (self.impulse_to_n_s(from_s + duration_s) - self.impulse_to_n_s(from_s)) / duration_s
+        } else {
+            self.thrust_at_n(from_s)
+        }
+    }
+
+    /// Propellant burnt up to a time since the thrust began, kg.
+    pub fn propellant_burnt_kg(&self, time_s: f64) -> f64 {
+        self.propellant_mass_kg * self.impulse_to_n_s(time_s) / self.total_impulse_n_s()
+    }
+
+    /// Propellant left at a time since the thrust began, kg.
+    pub fn propellant_left_kg(&self, time_s: f64) -> f64 {
+        self.propellant_mass_kg - self.propellant_burnt_kg(time_s)
+    }
+
+    /// When the thrust falls through a value for the last time, s; `None` if it never exceeds the value.
+    pub fn falls_through_s(&self, thrust_n: f64) -> Option<f64> {
+        let last_above = self.points.iter().rposition(|point| point.thrust_n > thrust_n)?;
+        let from = self.points.get(last_above)?;
+        let Some(to) = self.points.get(last_above + 1) else { return Some(from.time_s) };
+        let share = (from.thrust_n - thrust_n) / (from.thrust_n - to.thrust_n);
+        Some(from.time_s + share.min(1.0) * (to.time_s - from.time_s))
+    }
+}
+
+fn interpolate_n(from: ThrustPoint, to: ThrustPoint, time_s: f64) -> f64 {
+    let share = (time_s - from.time_s) / (to.time_s - from.time_s);
+    from.thrust_n + share * (to.thrust_n - from.thrust_n)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,79 @@
+use nalgebra::DVector;
+use proptest::prelude::*;
+
+use super::condense::Linearised;
+use super::*;
+use flight::guidance::landing::landing_problem;
+use nmpc::dynamics::PlanarState;
+use nmpc::rollout::Trajectory;
+
+fn start() -> PlanarState {
+    vehicles::profile::builtin("paper-calibrated").unwrap().start.planar_state()
+}
+
+/// The landing that a start with 5 deg/s does not converge to: the second cost in the solver study.
+#[test]
+fn val_solver_study_the_other_branch_from_a_turning_start() {
+    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
+    profile.nmpc.limits.final_box = None;
+    let turning = PlanarState { q_rad_s: 5.0_f64.to_radians(), ..start() };
+    let problem = landing_problem(&profile, turning, 0.0, 50, 1.0);
+    let inputs_rad = guess::bent(&problem, 0.3);
+    let solution = sqp::solve_from(&problem, &WarmStart { inputs_rad, ..WarmStart::default() });
+    assert!((solution.cost - 8467.22).abs() < 0.006, "{}", solution.cost);
+}
+
+/// Cost minus conditions times multipliers, rolled out.
+fn lagrangian(problem: &Problem, inputs_rad: &[f64], multipliers: &[f64]) -> f64 {
+    let trajectory = Trajectory::of(problem, inputs_rad);
+    let conditions = problem.conditions();
+    let priced: f64 =
+        conditions.iter().zip(multipliers).map(|(row, y)| y * row.value(&trajectory.states)).sum();
+    trajectory.cost - priced
+}
+
+fn lagrangian_gradient(problem: &Problem, inputs_rad: &[f64], multipliers: &[f64]) -> DVector<f64> {
+    let trajectory = Trajectory::of(problem, inputs_rad);
+    Linearised::about(problem, &problem.conditions(), &trajectory, inputs_rad)
+        .lagrangian_gradient(multipliers)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+    #[test]
+    fn val_finite_differences_condensed_gradient_and_hessian(
+        inputs_rad in prop::collection::vec(-0.3..0.3_f64, 6),
+        multipliers in prop::collection::vec(-100.0..100.0_f64, 26),
+        theta_deg in 60.0..120.0_f64,
+    ) {
+        let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
+        profile.nmpc.limits.altitude_min_m = Some(0.0);
+        let problem = landing_problem(&profile, PlanarState { theta_rad: theta_deg.to_radians(), ..start() }, 4.4, 6, 1.0);
+        let conditions = problem.conditions();
+        prop_assert!(conditions.len() <= multipliers.len() + 5);
+        let trajectory = Trajectory::of(&problem, &inputs_rad);
+        let linear = Linearised::about(&problem, &conditions, &trajectory, &inputs_rad);
+        let gradient = linear.lagrangian_gradient(&multipliers);
+        let hessian = linear.lagrangian_hessian(&problem, &conditions, &multipliers);
+        let step = 1e-5;
+        for j in 0..inputs_rad.len() {
+            let moved = |by: f64| {
+                let mut inputs_rad = inputs_rad.clone();
+                inputs_rad[j] += by;
+                inputs_rad
+            };
+            let (ahead, behind) = (moved(step), moved(-step));
+            let expected =
+                (lagrangian(&problem, &ahead, &multipliers) - lagrangian(&problem, &behind, &multipliers))
+                    / (2.0 * step);
+            prop_assert!((gradient[j] - expected).abs() < 1e-4 * (1.0 + expected.abs()), "{} {expected}", gradient[j]);
+            let column = (lagrangian_gradient(&problem, &ahead, &multipliers)
+                - lagrangian_gradient(&problem, &behind, &multipliers)) / (2.0 * step);
+            for i in 0..inputs_rad.len() {
+                let error = (hessian[(i, j)] - column[i]).abs();
+                prop_assert!(error < 1e-5 * (1.0 + column.amax()), "[{i}][{j}] {} {}", hessian[(i, j)], column[i]);
+            }
+        }
+    }
+}

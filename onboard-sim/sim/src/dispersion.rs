@@ -1,0 +1,105 @@
+//! What is uncertain about a flight, as data.
+
+use serde::Deserialize;
+use world::sensors::SensorParams;
+
+/// A set of dispersions. Each value is the standard deviation of a normal distribution unless its name says otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Dispersion {
+    /// The controller sees sensors; otherwise it knows the true state.
+    pub sensors: bool,
+    /// Errors of the sensors.
+    pub sensor_params: SensorParams,
+    /// Impulse, as a fraction.
+    pub impulse_share: f64,
+    /// Impulse, as a fraction: uniform between minus and plus this value.
+    pub impulse_even_share: f64,
+    /// Burn time, as a fraction.
+    pub burn_time_share: f64,
+    /// Ignition delay, s. The drawn delay is never below 20 ms.
+    pub ignition_delay_s: f64,
+    /// Ignition delay, s: uniform between minus and plus this value.
+    pub ignition_delay_even_s: f64,
+    /// Thrust misalignment in each axis, degrees.
+    pub thrust_misalignment_deg: f64,
+    /// Mass, as a fraction.
+    pub mass_share: f64,
+    /// Drag, as a fraction.
+    pub drag_share: f64,
+    /// Centre of gravity off the axis, m, in each axis.
+    pub cg_off_axis_m: f64,
+    /// Lowest and highest mean wind 10 m above the ground, m/s; the draw is uniform between them.
+    pub wind_m_s: [f64; 2],
+    /// Gust intensity, as a multiple of the military standard's.
+    pub gust_scale: f64,
+    pub apogee_height_m: f64,
+    /// Horizontal position of apogee, m, in each axis.
+    pub apogee_place_m: f64,
+    /// Horizontal velocity at apogee, m/s, in each axis.
+    pub apogee_velocity_m_s: f64,
+    /// Tilt at apogee, degrees, in each axis.
+    pub apogee_tilt_deg: f64,
+    /// Rotation rate at apogee, degrees per second, in each axis.
+    pub apogee_rate_deg_s: f64,
+}
+
+/// The built-in sets: name and TOML text.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("none", include_str!("dispersions/none.toml")),
+    ("thrust-only", include_str!("dispersions/thrust-only.toml")),
+    ("field", include_str!("dispersions/field.toml")),
+    ("harsh", include_str!("dispersions/harsh.toml")),
+];
+
+/// Why a set cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DispersionError {
+    /// The text is not a set of dispersions.
+    #[error("{origin}: {message}")]
+    Parse {
+        /// Where the text came from.
+        origin: String,
+        /// The parser's words.
+        message: String,
+    },
+    /// No built-in set has this name.
+    #[error("no dispersion is named '{name}'; these are built in: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+}
+
+impl Dispersion {
+    /// Reads a set from TOML; `origin` names it in messages.
+    ///
+    /// # Errors
+    /// [`DispersionError::Parse`] names the key.
+    pub fn from_toml(text: &str, origin: &str) -> Result<Self, DispersionError> {
+        toml::from_str(text)
+            .map_err(|error| DispersionError::Parse { origin: origin.to_owned(), message: error.to_string() })
+    }
+
+    /// The built-in set of a name.
+    ///
+    /// # Errors
+    /// [`DispersionError::Unknown`] lists the names there are.
+    pub fn builtin(name: &str) -> Result<Self, DispersionError> {
+        Self::from_toml(Self::builtin_toml(name)?, name)
+    }
+
+    /// The text of the built-in set of a name.
+    ///
+    /// # Errors
+    /// [`DispersionError::Unknown`] lists the names there are.
+    pub fn builtin_toml(name: &str) -> Result<&'static str, DispersionError> {
+        let found = BUILTIN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+        found.ok_or_else(|| {
+            let known = BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+            DispersionError::Unknown { name: name.to_owned(), known }
+        })
+    }
+}

@@ -1,0 +1,123 @@
+//! One flight's truth from a seed and its number.
+
+use core::f64::consts::TAU;
+
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::{RigidState, upright};
+use nalgebra::{UnitQuaternion, Vector3};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha12Rng;
+use world::Truth;
+use world::wind::Wind;
+
+use crate::dispersion::Dispersion;
+
+/// What chance decided about one flight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Draw {
+    /// The vehicle and the day.
+    pub truth: Truth,
+    /// The state at apogee.
+    pub apogee: RigidState,
+    /// Seed of everything random during the flight: gusts and sensors.
+    pub flight_seed: u64,
+}
+
+/// Draws flight `number` of a seed.
+///
+/// Every value is drawn in a fixed order, even if its deviation is zero. So a changed deviation does not change the
+/// other draws, and two sets of dispersions can be compared flight by flight.
+pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
+    let mut random = ChaCha12Rng::seed_from_u64(seed);
+    random.set_stream(number);
+    let mut chance = Chance { random };
+    let sigma = dispersion;
+    let nominal = Truth::default();
+    let impulse_scale =
+        1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even();
+    let burn_time_scale = 1.0 + sigma.burn_time_share * chance.normal();
+    let ignition_delay_s = (nominal.ignition_delay_s
+        + sigma.ignition_delay_s * chance.normal()
+        + sigma.ignition_delay_even_s * chance.even())
+    .max(0.02);
+    let misalignment_rad = sigma.thrust_misalignment_deg.to_radians();
+    let thrust_misalignment_rad = [misalignment_rad * chance.normal(), misalignment_rad * chance.normal()];
+    let mass_scale = 1.0 + sigma.mass_share * chance.normal();
+    let drag_scale = 1.0 + sigma.drag_share * chance.normal();
+    let cg_offset_m = [0.0, sigma.cg_off_axis_m * chance.normal(), sigma.cg_off_axis_m * chance.normal()];
+    let [calmest, windiest] = sigma.wind_m_s;
+    let wind_m_s = calmest + (windiest - calmest) * chance.unit();
+    let wind_towards_rad = TAU * chance.unit();
+    let start = &mission.start;
+    let away_rad = TAU * chance.unit();
+    let (away_sin, away_cos) = libm::sincos(away_rad);
+    let away = Vector3::new(away_cos, away_sin, 0.0);
+    let place = Vector3::new(chance.normal(), chance.normal(), 0.0) * sigma.apogee_place_m;
+    let height_m = start.height_m + sigma.apogee_height_m * chance.normal();
+    let velocity = Vector3::new(chance.normal(), chance.normal(), 0.0) * sigma.apogee_velocity_m_s;
+    let tilt = Vector3::new(chance.normal(), chance.normal(), 0.0) * sigma.apogee_tilt_deg.to_radians();
+    let rate = Vector3::new(chance.normal(), chance.normal(), chance.normal())
+        * sigma.apogee_rate_deg_s.to_radians();
+    let roll_rad = TAU * chance.unit();
+    let flight_seed = chance.random.next_u64();
+
+    let wind = Wind::new(wind_m_s, wind_towards_rad, 0.0, 0);
+    let carried = wind.mean_m_s(height_m) * start.carried_share;
+    // It leans in the direction of its motion; the roll angle is arbitrary.
+    let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad);
+    let apogee = RigidState {
+        position_m: away * start.distance_m + place + Vector3::z() * height_m,
+        velocity_m_s: away * start.speed_m_s + velocity + carried,
+        world_from_body: UnitQuaternion::from_scaled_axis(leaning + tilt) * roll * upright(),
+        rate_rad_s: rate,
+    };
+    let truth = Truth {
+        impulse_scale: impulse_scale.max(0.1),
+        burn_time_scale: burn_time_scale.max(0.3),
+        ignition_delay_s,
+        thrust_misalignment_rad,
+        mass_scale: mass_scale.max(0.5),
+        drag_scale: drag_scale.max(0.2),
+        cg_offset_m,
+        wind_m_s,
+        wind_towards_rad,
+        gust_scale: sigma.gust_scale,
+        ..nominal
+    };
+    Draw { truth, apogee, flight_seed }
+}
+
+/// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a generator of their
+/// own, so that a fault changes no other draw of the flight.
+pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
+    /// Any number that no other draw uses.
+    const OF_FAULTS: u64 = 0xfa17_0000_0000_0001;
+    let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_FAULTS);
+    random.set_stream(number);
+    let mut chance = Chance { random };
+    (0..faults).map(|_| chance.unit()).collect()
+}
+
+/// Random numbers on `libm`, the same on every machine.
+struct Chance {
+    random: ChaCha12Rng,
+}
+
+impl Chance {
+    /// Uniform in [0, 1).
+    fn unit(&mut self) -> f64 {
+        (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Uniform in [-1, 1).
+    fn even(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// Standard normal, by Box and Muller.
+    fn normal(&mut self) -> f64 {
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
+        radius * libm::cos(TAU * self.unit())
+    }
+}

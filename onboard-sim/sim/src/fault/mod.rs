@@ -1,0 +1,273 @@
+//! What breaks in a flight, and when.
+//!
+//! On a command line and in a scenario a fault is written `NAME[:VALUE]@WHEN`, for example `gnss-out@5`,
+//! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since apogee in seconds, or a phase with an
+//! optional delay in seconds after the phase was entered. A delay `+0.5..4` is drawn uniformly for each flight.
+
+mod inject;
+
+pub use inject::Injector;
+
+use core::fmt;
+use core::str::FromStr;
+
+use flight::rules::phase::Phase;
+use world::Fault;
+
+/// What can break.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Breakage {
+    /// Motor, gimbal or fins.
+    Vehicle(Fault),
+    /// The satellite receiver sends no more fixes.
+    GnssOut,
+    /// The barometer sends no more samples.
+    BarometerOut,
+    /// The lidar sends no more ranges.
+    LidarOut,
+    /// Every gyro axis has this bias from now on, degrees per second.
+    GyroBiasStep(f64),
+    /// Every accelerometer axis has this bias from now on, thousandths of gravity.
+    AccelerometerBiasStep(f64),
+    /// The radio is silent. Nothing on board depends on it.
+    LinkLoss,
+    /// Messages in both directions arrive this much later, s.
+    LinkDelay(f64),
+    /// The flight computer is dead for this long, s, and then starts again with its stored memory.
+    Reboot(f64),
+    /// The operator asks for an abort.
+    Abort,
+}
+
+/// When it breaks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum When {
+    /// Seconds after apogee.
+    Time(f64),
+    /// Seconds after a phase was entered.
+    Phase(Phase, f64),
+    /// Seconds after a phase was entered, drawn uniformly between two delays for each flight.
+    PhaseBetween(Phase, [f64; 2]),
+}
+
+/// A fault of a flight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedFault {
+    /// What breaks.
+    pub breakage: Breakage,
+    pub when: When,
+}
+
+/// Why the text of a fault is wrong.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("fault `{given}`: {problem}; write NAME[:VALUE]@WHEN, NAME one of {known}, WHEN seconds or one of {phases} with +SECONDS or +FROM..TO", known = known(), phases = phases())]
+pub struct FaultError {
+    given: String,
+    problem: String,
+}
+
+/// Reads a value, or gives the default if there is none.
+type Build = fn(Option<f64>) -> Option<Breakage>;
+
+/// For each fault: its name, the meaning of its value (empty if it takes none), and its constructor.
+const NAMES: &[(&str, &str, Build)] = &[
+    ("link-loss", "", |value| value.is_none().then_some(Breakage::LinkLoss)),
+    ("link-delay", "s, 0 to 60", |value| {
+        value.filter(|delay_s| (0.0..=60.0).contains(delay_s)).map(Breakage::LinkDelay)
+    }),
+    ("gnss-out", "", |value| value.is_none().then_some(Breakage::GnssOut)),
+    ("barometer-out", "", |value| value.is_none().then_some(Breakage::BarometerOut)),
+    ("lidar-out", "", |value| value.is_none().then_some(Breakage::LidarOut)),
+    ("gyro-bias", "deg/s", |value| value.map(Breakage::GyroBiasStep)),
+    ("accelerometer-bias", "mg", |value| value.map(Breakage::AccelerometerBiasStep)),
+    ("fin-stuck", "0 to 3", |value| {
+        let fin =
+            value.filter(|fin| (0.0..=3.0).contains(fin) && libm::trunc(*fin).to_bits() == fin.to_bits())?;
+        Some(Breakage::Vehicle(Fault::FinStuck { fin: fin as usize }))
+    }),
+    ("gimbal-stuck", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::GimbalStuck))),
+    ("gimbal-slow", "rate over nominal, 0 to 1", |value| {
+        let scale = value.filter(|scale| (0.0..=1.0).contains(scale))?;
+        Some(Breakage::Vehicle(Fault::GimbalSlow { scale }))
+    }),
+    ("no-light", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::NoLight))),
+    ("late-light", "s", |value| {
+        let delay_s = value.filter(|delay_s| *delay_s >= 0.0)?;
+        Some(Breakage::Vehicle(Fault::LateLight { delay_s }))
+    }),
+    ("weak-motor", "thrust over nominal, 0.01 to 1", |value| {
+        let scale = value.filter(|scale| (0.01..=1.0).contains(scale))?;
+        Some(Breakage::Vehicle(Fault::WeakMotor { scale }))
+    }),
+    ("early-burnout", "s after the first thrust", |value| {
+        let after_s = value.filter(|after_s| *after_s >= 0.0)?;
+        Some(Breakage::Vehicle(Fault::EarlyBurnout { after_s }))
+    }),
+    ("reboot", "s", |value| value.filter(|down_s| (0.0..=10.0).contains(down_s)).map(Breakage::Reboot)),
+    ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
+];
+
+/// The phases, with their names in the text of a fault.
+const PHASES: &[(&str, Phase)] = &[
+    ("apogee", Phase::Deploy),
+    ("descent", Phase::AeroDescent),
+    ("armed", Phase::LandArmed),
+    ("ignition", Phase::Ignition),
+    ("powered", Phase::Powered),
+];
+
+fn known() -> String {
+    let with_value = |(name, value, _): &(&str, &str, Build)| {
+        if value.is_empty() { (*name).to_owned() } else { format!("{name}:VALUE ({value})") }
+    };
+    NAMES.iter().map(with_value).collect::<Vec<_>>().join(", ")
+}
+
+fn phases() -> String {
+    PHASES.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+}
+
+fn name_of(phase: Phase) -> &'static str {
+    PHASES.iter().find(|(_, known)| *known == phase).map_or("?", |(name, _)| name)
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+impl FromStr for When {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(time_s) = number(text) {
+            return if time_s >= 0.0 {
+                Ok(Self::Time(time_s))
+            } else {
+                Err(format!("{text} s is before apogee"))
+            };
+        }
+        let (name, delay) = text.split_once('+').unwrap_or((text, "0"));
+        let (_, phase) = PHASES
+            .iter()
+            .find(|(known, _)| *known == name)
+            .ok_or_else(|| format!("`{name}` is neither a time nor a phase"))?;
+        let seconds = |text: &str| number(text).filter(|delay_s| *delay_s >= 0.0);
+        let read = match delay.split_once("..") {
+            None => seconds(delay).map(|delay_s| Self::Phase(*phase, delay_s)),
+            Some((from, to)) => seconds(from)
+                .zip(seconds(to))
+                .filter(|(from_s, to_s)| from_s <= to_s)
+                .map(|(from_s, to_s)| Self::PhaseBetween(*phase, [from_s, to_s])),
+        };
+        read.ok_or_else(|| format!("`{delay}` is no delay in seconds"))
+    }
+}
+
+impl FromStr for TimedFault {
+    type Err = FaultError;
+
+    fn from_str(given: &str) -> Result<Self, FaultError> {
+        let refuse = |problem: String| FaultError { given: given.to_owned(), problem };
+        let (what, when) = given.split_once('@').ok_or_else(|| refuse("no `@`".to_owned()))?;
+        let when = when.parse().map_err(refuse)?;
+        let (name, value) = what.split_once(':').map_or((what, None), |(name, value)| (name, Some(value)));
+        let (_, unit, build) = NAMES
+            .iter()
+            .find(|(known, ..)| *known == name)
+            .ok_or_else(|| refuse(format!("no fault is named `{name}`")))?;
+        let value = match value {
+            Some(text) => Some(number(text).ok_or_else(|| refuse(format!("`{text}` is no number")))?),
+            None => None,
+        };
+        let breakage = build(value).ok_or_else(|| {
+            refuse(if unit.is_empty() {
+                format!("{name} takes no value")
+            } else {
+                format!("its value must be {unit}")
+            })
+        })?;
+        Ok(Self { breakage, when })
+    }
+}
+
+impl fmt::Display for When {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Time(time_s) => write!(f, "{time_s}"),
+            Self::Phase(phase, delay_s) if *delay_s > 0.0 => write!(f, "{}+{delay_s}", name_of(*phase)),
+            Self::Phase(phase, _) => f.write_str(name_of(*phase)),
+            Self::PhaseBetween(phase, [from_s, to_s]) => write!(f, "{}+{from_s}..{to_s}", name_of(*phase)),
+        }
+    }
+}
+
+impl fmt::Display for TimedFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.breakage {
+            Breakage::LinkLoss => write!(f, "link-loss"),
+            Breakage::LinkDelay(delay_s) => write!(f, "link-delay:{delay_s}"),
+            Breakage::GnssOut => write!(f, "gnss-out"),
+            Breakage::BarometerOut => write!(f, "barometer-out"),
+            Breakage::LidarOut => write!(f, "lidar-out"),
+            Breakage::GyroBiasStep(deg_s) => write!(f, "gyro-bias:{deg_s}"),
+            Breakage::AccelerometerBiasStep(mg) => write!(f, "accelerometer-bias:{mg}"),
+            Breakage::Reboot(down_s) => write!(f, "reboot:{down_s}"),
+            Breakage::Abort => write!(f, "abort"),
+            Breakage::Vehicle(Fault::NoLight) => write!(f, "no-light"),
+            Breakage::Vehicle(Fault::LateLight { delay_s }) => write!(f, "late-light:{delay_s}"),
+            Breakage::Vehicle(Fault::WeakMotor { scale }) => write!(f, "weak-motor:{scale}"),
+            Breakage::Vehicle(Fault::EarlyBurnout { after_s }) => write!(f, "early-burnout:{after_s}"),
+            Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
+            Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
+            Breakage::Vehicle(Fault::FinStuck { fin }) => write!(f, "fin-stuck:{fin}"),
+        }?;
+        write!(f, "@{}", self.when)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_of_a_fault_reads_back_to_the_same_fault() {
+        for text in [
+            "gnss-out@5",
+            "fin-stuck:2@apogee",
+            "gimbal-slow:0.3@ignition+0.3",
+            "gimbal-stuck@powered",
+            "late-light:0.2@0",
+            "reboot:0.5@descent+4",
+            "link-loss@0",
+            "link-delay:1.5@descent",
+            "accelerometer-bias:50@armed",
+            "abort@ignition+0..4.5",
+        ] {
+            assert_eq!(text.parse::<TimedFault>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn a_wrong_fault_is_refused_with_the_accepted_values() {
+        for (text, words) in [
+            ("gnss-out", "no `@`"),
+            ("gnss@5", "no fault is named `gnss`"),
+            ("gnss-out:1@5", "takes no value"),
+            ("link-delay@0", "must be s, 0 to 60"),
+            ("link-delay:-1@0", "must be s, 0 to 60"),
+            ("fin-stuck:4@5", "must be 0 to 3"),
+            ("fin-stuck:1.5@5", "must be 0 to 3"),
+            ("weak-motor@5", "must be thrust over nominal"),
+            ("weak-motor:x@5", "`x` is no number"),
+            ("no-light@-1", "before apogee"),
+            ("no-light@orbit", "neither a time nor a phase"),
+            ("no-light@powered+soon", "no delay"),
+            ("abort@powered+3..2", "no delay"),
+            ("abort@powered+-1..2", "no delay"),
+            ("abort@powered+1..", "no delay"),
+        ] {
+            let message = text.parse::<TimedFault>().unwrap_err().to_string();
+            assert!(message.contains(words) && message.contains("NAME[:VALUE]@WHEN"), "{message}");
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! This crate simulates one flight: a world, a flight computer, faults and random differences.
+//!
+//! It has no clock, no network and no statistics. The live vehicle, a campaign and a replay all use it, so all three
+//! fly the same flight.
+//!
+//! * [`recipe`]: everything that a flight is made from.
+//! * [`dispersion`]: which values of a flight are uncertain and by how much, as data.
+//! * [`draw`]: the random values of one flight, from a seed and the flight's number.
+//! * [`fault`]: what breaks in a flight, and when.
+//! * [`sortie`]: the flight itself.
+//! * [`outside`]: the input from the crew and the ground in one frame.
+//! * [`limits`]: what counts as a landing.
+//! * [`outcome`]: how the flight ended, judged by the limits of the legs and by the landing paper's Table 2.
+//! * [`plane`]: one flight of the landing paper's planar vehicle.
+
+pub mod dispersion;
+pub mod draw;
+pub mod fault;
+pub mod limits;
+pub mod outcome;
+pub mod outside;
+pub mod plane;
+pub mod recipe;
+pub mod sortie;

@@ -1,0 +1,131 @@
+//! How a flight ended, judged by the landing paper's Table 2 and by the limits of the legs.
+
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::Mission;
+use world::{RestOutcome, Touchdown};
+
+/// Why a flight did not land: the first thing that went wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Failure {
+    /// The ignition gate never opened.
+    NoIgnition,
+    /// The motor was commanded to light and did not light in time.
+    NoLight,
+    /// The vehicle came down under the parachute.
+    Parachute,
+    /// The vertical speed at contact was too high.
+    Vertical,
+    /// The horizontal speed at contact was too high.
+    Lateral,
+    /// The tilt at contact was too large.
+    Tilt,
+    /// The rotation rate at contact was too high.
+    Rate,
+    /// The vehicle was within the limits at contact but fell over.
+    TippedOver,
+    /// The vehicle had not come to rest when the time limit of a flight ended.
+    TimeOut,
+    /// The state was not a number.
+    NotANumber,
+}
+
+impl Failure {
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoIgnition => "no ignition",
+            Self::NoLight => "no light",
+            Self::Parachute => "parachute",
+            Self::Vertical => "vertical speed",
+            Self::Lateral => "lateral speed",
+            Self::Tilt => "tilt",
+            Self::Rate => "rotation rate",
+            Self::TippedOver => "tipped over",
+            Self::TimeOut => "time-out",
+            Self::NotANumber => "not a number",
+        }
+    }
+}
+
+/// How a flight ended, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The first contact.
+    pub touchdown: Option<Touchdown>,
+    /// How the vehicle came to rest.
+    pub rest: Option<RestOutcome>,
+    /// Last phase.
+    pub phase: Phase,
+    /// Inside Table 2 at contact and upright afterwards.
+    pub strict: bool,
+    /// Within the limits of the legs at contact and upright afterwards.
+    pub legs: bool,
+    /// Why it was not within the limits of the legs, or not upright.
+    pub failure: Option<Failure>,
+}
+
+/// How a flight ended before it is judged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ending {
+    /// The first contact.
+    pub touchdown: Option<Touchdown>,
+    /// How the vehicle came to rest.
+    pub rest: Option<RestOutcome>,
+    /// Last phase.
+    pub phase: Phase,
+    /// The motor was commanded to light.
+    pub ignited: bool,
+    /// The motor did light.
+    pub lit: bool,
+    /// The parachute was deployed.
+    pub parachute: bool,
+    /// Every state was finite.
+    pub finite: bool,
+}
+
+/// Judges how a flight ended.
+pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
+    let upright = ending.rest == Some(RestOutcome::Upright);
+    let (strict, failure) = match &ending.touchdown {
+        _ if !ending.finite => (false, Some(Failure::NotANumber)),
+        None => (false, Some(Failure::TimeOut)),
+        Some(_) if ending.parachute => (false, Some(Failure::Parachute)),
+        Some(_) if !ending.ignited => (false, Some(Failure::NoIgnition)),
+        Some(_) if !ending.lit => (false, Some(Failure::NoLight)),
+        Some(touchdown) => {
+            let legs = &mission.leg_limits;
+            let too_much = [
+                (touchdown.vertical_m_s.abs(), legs.vertical_m_s, Failure::Vertical),
+                (touchdown.lateral_m_s, legs.lateral_m_s, Failure::Lateral),
+                (touchdown.tilt_rad, legs.tilt_deg.to_radians(), Failure::Tilt),
+                (touchdown.rate_rad_s, legs.rate_deg_s.to_radians(), Failure::Rate),
+            ];
+            let first = too_much
+                .iter()
+                .find(|(found, most, _)| found.is_nan() || found > most)
+                .map(|(_, _, failure)| *failure);
+            let failure = first.or((!upright).then_some(Failure::TippedOver));
+            (upright && inside_table_2(mission, touchdown), failure)
+        }
+    };
+    Outcome {
+        touchdown: ending.touchdown,
+        rest: ending.rest,
+        phase: ending.phase,
+        strict: strict && failure.is_none(),
+        legs: failure.is_none(),
+        failure,
+    }
+}
+
+/// The landing paper's Table 2, in space: axial and lateral velocity in body axes, and the rate across the axis.
+fn inside_table_2(mission: &Mission, touchdown: &Touchdown) -> bool {
+    let limits = &mission.touchdown_limits;
+    let body = touchdown.state.velocity_in_body_m_s();
+    let place = touchdown.state.position_m;
+    libm::hypot(place.x, place.y) <= limits.x_m
+        && touchdown.tilt_rad <= limits.pitch_error_deg.to_radians()
+        && body.x.abs() <= limits.u_m_s
+        && libm::hypot(body.y, body.z) <= limits.w_m_s
+        && touchdown.cross_rate_rad_s <= limits.pitch_rate_deg_s.to_radians()
+}

@@ -1,0 +1,69 @@
+//! The input from the crew and the ground in one frame, and the result of that frame.
+
+use std::time::Duration;
+
+use flight::computer::crew::Request;
+use flight::computer::{Commander, Computer, Input, LogState, Output};
+use flight::rules::arming::Uplink;
+
+/// The input from the crew and the ground in one frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Outside<'a> {
+    /// The pin of the landing motor is out.
+    pub pin_out: bool,
+    pub log: LogState,
+    /// The link quality of the station with the best link.
+    pub uplink: Uplink,
+    /// The station that armed the vehicle, if one did.
+    pub commander: Option<Commander>,
+    /// The requests since the last frame.
+    pub requests: &'a [Request],
+}
+
+impl Outside<'_> {
+    /// A flight without a crew: the pin is out, and there are no requests.
+    pub const NOBODY: Self = Self {
+        pin_out: true,
+        log: LogState { running: true, space_bytes: u64::MAX },
+        uplink: Uplink::NotNeeded,
+        commander: None,
+        requests: &[],
+    };
+}
+
+/// Someone who watches the flight computer at work.
+pub trait Watch {
+    /// Any clock: only differences of it are used, to time the flight computer.
+    fn now(&mut self) -> Duration;
+
+    /// A frame that `computer` has just decided.
+    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer);
+}
+
+/// Nobody watches, and no clock runs.
+#[derive(Debug, Clone, Copy)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {
+    fn now(&mut self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn decided(&mut self, _: &Input<'_>, _: &Output, _: &Computer) {}
+}
+
+/// The result of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flown {
+    /// What the flight computer decided; `None` while it is dead.
+    pub output: Option<Output>,
+    /// How long that took, by the clock of whoever watches.
+    pub took: Duration,
+}
+
+impl Flown {
+    /// Whether the flight computer planned.
+    pub fn planned(&self) -> bool {
+        self.output.as_ref().is_some_and(|output| output.planned)
+    }
+}

@@ -1,0 +1,70 @@
+//! Everything that a flight is made from. The same recipe and flight number give the same flight, bit for bit.
+
+use flight::vehicle::mission::Mission;
+use vehicles::mission::MissionError;
+
+use crate::dispersion::{Dispersion, DispersionError};
+use crate::fault::TimedFault;
+use flight::guidance::baseline::Controller;
+
+/// Everything that a flight is made from. A log keeps the texts that the data were read from.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// The mission.
+    pub mission: Mission,
+    pub mission_toml: String,
+    /// The dispersions.
+    pub dispersion: Dispersion,
+    pub dispersion_name: String,
+    pub dispersion_toml: String,
+    /// Seed of everything random, for all flights of this recipe.
+    pub seed: u64,
+    /// Which law flies the landing burn.
+    pub controller: Controller,
+    /// What breaks in every flight.
+    pub faults: Vec<TimedFault>,
+}
+
+/// Why a recipe cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum RecipeError {
+    /// The mission is wrong.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The set of dispersions is wrong.
+    #[error(transparent)]
+    Dispersion(#[from] DispersionError),
+    /// No built-in mission has this name.
+    #[error("no mission is named '{0}'")]
+    UnknownMission(String),
+}
+
+impl Recipe {
+    /// A recipe from texts, each with its name: seed 1, no faults, flown by the NMPC.
+    ///
+    /// # Errors
+    /// A text does not parse; the message names it and the key.
+    pub fn from_texts(mission: (&str, &str), dispersion: (&str, &str)) -> Result<Self, RecipeError> {
+        let ((mission_name, mission_toml), (dispersion_name, dispersion_toml)) = (mission, dispersion);
+        Ok(Self {
+            mission: vehicles::mission::from_toml(mission_toml, mission_name)?,
+            mission_toml: mission_toml.to_owned(),
+            dispersion: Dispersion::from_toml(dispersion_toml, dispersion_name)?,
+            dispersion_name: dispersion_name.to_owned(),
+            dispersion_toml: dispersion_toml.to_owned(),
+            seed: 1,
+            controller: Controller::Nmpc,
+            faults: Vec::new(),
+        })
+    }
+
+    /// A recipe from a built-in mission and a built-in set of dispersions.
+    ///
+    /// # Errors
+    /// One of them is not built in.
+    pub fn built_in(mission: &str, dispersion: &str) -> Result<Self, RecipeError> {
+        let known = vehicles::mission::BUILTIN.iter().find(|(known, _)| *known == mission);
+        let mission = known.ok_or_else(|| RecipeError::UnknownMission(mission.to_owned()))?;
+        Self::from_texts(*mission, (dispersion, Dispersion::builtin_toml(dispersion)?))
+    }
+}

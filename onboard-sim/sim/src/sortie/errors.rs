@@ -1,0 +1,59 @@
+//! The estimate against the truth.
+
+use flight::estimation::estimator::Estimate;
+use world::World;
+
+use super::Sortie;
+
+/// Errors of the estimate against the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EstimatorErrors {
+    /// Vertical velocity, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal velocity, m/s.
+    pub lateral_m_s: f64,
+    pub height_m: f64,
+    /// Angle between the estimated and the true nose, rad.
+    pub nose_rad: f64,
+}
+
+impl EstimatorErrors {
+    /// The larger value of each error.
+    pub(super) fn or_larger(self, other: &Self) -> Self {
+        Self {
+            vertical_m_s: self.vertical_m_s.max(other.vertical_m_s),
+            lateral_m_s: self.lateral_m_s.max(other.lateral_m_s),
+            height_m: self.height_m.max(other.height_m),
+            nose_rad: self.nose_rad.max(other.nose_rad),
+        }
+    }
+}
+
+impl Sortie {
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` if the pilot gets the
+    /// truth instead of an estimate, and while its computer is dead.
+    ///
+    /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
+    pub fn nees_of_motion(&self) -> Option<f64> {
+        self.measured.filter(|_| !self.dead)?;
+        self.pilot().estimator().nees_of_motion(self.world.state())
+    }
+
+    /// Errors of the estimate at this moment.
+    pub fn errors(&self) -> EstimatorErrors {
+        let Some(estimate) = self.pilot().estimate() else { return EstimatorErrors::default() };
+        let truth = self.world.state();
+        let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
+        EstimatorErrors {
+            vertical_m_s: velocity.z.abs(),
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            height_m: (estimate.state.position_m.z - truth.position_m.z).abs(),
+            nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
+        }
+    }
+}
+
+/// The truth, in the form of an estimate.
+pub(super) fn known(world: &World) -> Estimate {
+    Estimate::exact(world.time_s(), *world.state(), *world.specific_force_m_s2(), world.wind_m_s().xy())
+}

@@ -1,0 +1,411 @@
+//! One flight of a rocket in space: first on its pad, then from apogee until it is at rest. The ascent is not
+//! simulated.
+//!
+//! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
+
+mod breakage;
+mod errors;
+mod rehearsal;
+
+use std::time::Duration;
+
+pub use self::errors::EstimatorErrors;
+use self::rehearsal::Rehearsal;
+use flight::computer::crew::{Asked, Request};
+use flight::computer::pilot::{Pilot, Sensed};
+use flight::computer::{Commands, Computer, FRAME_MS, FRAME_S, Feeling, Input, Rehearsed, flight_time_s};
+use flight::estimation::estimator::{Measurements, StartUncertainty};
+use flight::guidance::baseline::Law;
+use flight::guidance::powered::PoweredReport;
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use world::sensors::{SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
+use world::world::WorldError;
+use world::{Actuators, World};
+
+use crate::dispersion::Dispersion;
+use crate::draw::{Draw, draw};
+use crate::fault::Injector;
+use crate::outcome::{Ending, Outcome, judge};
+use crate::outside::{Flown, Outside, Unwatched, Watch};
+use crate::recipe::Recipe;
+
+/// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
+const LONGEST_S: f64 = 150.0;
+
+/// Why a flight cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SetUpError {
+    /// The drawn truth cannot be simulated.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A sensor parameter is out of its range.
+    #[error(transparent)]
+    Sensors(#[from] SensorParamError),
+}
+
+/// The radio between vehicle and ground, in both directions. Nothing on board waits for it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Radio {
+    /// Nothing gets through.
+    pub silent: bool,
+    /// Messages arrive this much later, s.
+    pub delay_s: f64,
+}
+
+/// One flight. A clone continues with exactly the same bits.
+#[derive(Debug, Clone)]
+pub struct Sortie {
+    mission: Mission,
+    dispersion: Dispersion,
+    drawn: Draw,
+    believed: RigidState,
+    computer: Computer,
+    rehearsal: Option<Rehearsal>,
+    world: World,
+    sensors: Option<Sensors>,
+    sensor_faults: SensorFaults,
+    /// The sensor samples of the last frame.
+    measured: Option<Measurements>,
+    actuators: Actuators,
+    injector: Injector,
+    radio: Radio,
+    /// Frames until the dead flight computer starts again.
+    frames_down: u64,
+    dead: bool,
+    /// Frames since power-up.
+    frame: u64,
+    abort: bool,
+    finite: bool,
+    largest_errors: EstimatorErrors,
+}
+
+impl Sortie {
+    /// Flight `number` of a recipe, released at apogee at once.
+    ///
+    /// # Errors
+    /// It cannot be set up.
+    pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
+        let (mission, law, drawn) = prepared(recipe, number);
+        let injector = Injector::new(&recipe.faults, recipe.seed, number);
+        Ok(Self { injector, ..Self::of(&mission, &recipe.dispersion, &drawn, law)?.released() })
+    }
+
+    /// A flight without faults with the given draw, released at apogee at once.
+    ///
+    /// # Errors
+    /// The mission or the draw cannot be flown.
+    pub fn drawn_as(
+        mission: &Mission,
+        dispersion: &Dispersion,
+        drawn: &Draw,
+        law: Law,
+    ) -> Result<Self, SetUpError> {
+        Ok(Self::of(mission, dispersion, drawn, law)?.released())
+    }
+
+    /// Flight `number` of a recipe at power-up, upright on its pad.
+    ///
+    /// # Errors
+    /// It cannot be set up.
+    pub fn on_the_pad(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
+        let (mission, law, drawn) = prepared(recipe, number);
+        let airframe = &mission.airframe;
+        let cg_station_m = airframe.mass.loaded_cg_station_m + drawn.truth.cg_offset_m[0];
+        let standing = RigidState::upright(airframe.above_feet_m(cg_station_m));
+        let at_apogee = Self::of(&mission, &recipe.dispersion, &drawn, law)?;
+        let world = at_apogee.world_at(&standing)?;
+        Ok(Self {
+            world,
+            rehearsal: Some(Rehearsal::new(recipe)?),
+            injector: Injector::new(&recipe.faults, recipe.seed, number),
+            ..at_apogee
+        })
+    }
+
+    /// A flight in a world at apogee, with a computer at power-up.
+    fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
+        let (sensors, believed) = if dispersion.sensors {
+            let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
+            let uncertainty = StartUncertainty::at_apogee();
+            (Some(sensors), believed_start(&drawn.apogee, &uncertainty, drawn.flight_seed))
+        } else {
+            (None, drawn.apogee)
+        };
+        Ok(Self {
+            computer: Computer::in_space(mission, law, &believed),
+            rehearsal: None,
+            world: World::new(
+                &mission.airframe,
+                &mission.motor_curve,
+                &drawn.truth,
+                &drawn.apogee,
+                drawn.flight_seed,
+            )?,
+            sensors,
+            sensor_faults: SensorFaults::default(),
+            measured: None,
+            actuators: at_rest(mission),
+            injector: Injector::default(),
+            radio: Radio::default(),
+            frames_down: 0,
+            dead: false,
+            frame: 0,
+            abort: false,
+            finite: true,
+            largest_errors: EstimatorErrors::default(),
+            mission: mission.clone(),
+            dispersion: *dispersion,
+            drawn: *drawn,
+            believed,
+        })
+    }
+
+    fn world_at(&self, state: &RigidState) -> Result<World, SetUpError> {
+        let Draw { truth, flight_seed, .. } = &self.drawn;
+        let Mission { airframe, motor_curve, .. } = &self.mission;
+        Ok(World::new(airframe, motor_curve, truth, state, *flight_seed)?)
+    }
+
+    fn released(self) -> Self {
+        Self { computer: self.computer.released(), ..self }
+    }
+
+    /// Moves the simulation from the pad to apogee.
+    fn go_on_at_apogee(&mut self) {
+        // Both were already set up at power-up, which would have found any error.
+        if let Ok(world) = self.world_at(&self.drawn.apogee) {
+            self.world = world;
+        }
+        if self.dispersion.sensors {
+            self.sensors = Sensors::new(&self.dispersion.sensor_params, self.drawn.flight_seed, 0.0).ok();
+        }
+        self.actuators = at_rest(&self.mission);
+    }
+
+    /// Flies one frame without a crew.
+    pub fn step(&mut self) -> Flown {
+        self.step_with(&Outside::NOBODY, &mut Unwatched)
+    }
+
+    /// Flies one frame.
+    pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Flown {
+        if self.computer.released_at_s().is_some() {
+            let due = self.injector.due(self.world.time_s(), self.computer.mode().phase);
+            for breakage in due {
+                self.break_down(&breakage);
+            }
+        } else if let Some(rehearsal) =
+            self.rehearsal.as_mut().filter(|_| self.computer.mode().phase != Phase::Safe)
+        {
+            rehearsal.step();
+        }
+        let feeling = self.feel();
+        self.frame += 1;
+        self.dead = self.frames_down > 0;
+        if self.dead {
+            self.frames_down -= 1;
+            if self.frames_down == 0 {
+                self.computer.restart(flight_time_s(self.frame));
+            }
+            return Flown { output: None, took: Duration::ZERO };
+        }
+        let abort = [Request::of_the_programme(Asked::Abort)];
+        let aborting;
+        let requests = if core::mem::take(&mut self.abort) {
+            aborting = [outside.requests, abort.as_slice()].concat();
+            aborting.as_slice()
+        } else {
+            outside.requests
+        };
+        let input = Input {
+            frame: self.frame,
+            time_s: flight_time_s(self.frame),
+            feeling,
+            gimbal_rad: self.world.gimbal_rad(),
+            fins_rad: self.world.fins_rad(),
+            contact: self.computer.released_at_s().is_some() && self.world.touchdown().is_some(),
+            igniter_continuity: true,
+            pin_out: outside.pin_out,
+            log: outside.log,
+            uplink: outside.uplink,
+            commander: outside.commander,
+            requests,
+            rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
+            late: false,
+        };
+        let began = watch.now();
+        let mut output = self.computer.step(&input);
+        let took = watch.now().saturating_sub(began);
+        watch.decided(&input, &output, &self.computer);
+        // Nobody waits for an answer to an abort that the computer itself asked for.
+        output.answers.truncate(outside.requests.len());
+        self.command(&output.commands);
+        if output.released {
+            self.go_on_at_apogee();
+        }
+        Flown { output: Some(output), took }
+    }
+
+    /// The world moves for one frame, and the sensors measure it.
+    fn feel(&mut self) -> Feeling {
+        let mut measured = None;
+        for _ in 0..FRAME_MS {
+            self.world.step(&self.actuators);
+            if let Some(sensors) = &mut self.sensors {
+                measured = sensors.observe(&SensorTruth::of(&self.world), &self.sensor_faults).or(measured);
+            }
+        }
+        self.measured = measured;
+        let sensed = measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured);
+        Feeling::InSpace(sensed)
+    }
+
+    fn command(&mut self, commands: &Commands) {
+        let Commands { gimbal_rad, fins_rad, ignite, parachute } = *commands;
+        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute };
+        self.finite &= self.world.state().is_finite()
+            && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());
+        if self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
+            self.largest_errors = self.largest_errors.or_larger(&self.errors());
+        }
+    }
+
+    /// Whether the flight goes on: the vehicle is not at rest and the time limit has not passed.
+    pub fn goes_on(&self) -> bool {
+        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
+    }
+
+    /// Flies to the end.
+    pub fn run(&mut self) -> Outcome {
+        loop {
+            self.step();
+            if !self.goes_on() {
+                return self.outcome();
+            }
+        }
+    }
+
+    /// Asks for an abort in the next frame.
+    pub fn abort(&mut self) {
+        self.abort = true;
+    }
+
+    /// Stops the flight computer, which starts again after a time, s. The servos keep their last command meanwhile.
+    pub fn reboot(&mut self, down_s: f64) {
+        self.frames_down = libm::ceil(down_s / FRAME_S).max(1.0) as u64;
+    }
+
+    /// Changes the mission from now on, for the flight computer and for the verdict. The world does not change.
+    pub fn reconfigure(&mut self, mission: &Mission) {
+        self.computer.reconfigure(mission);
+        self.mission = mission.clone();
+    }
+
+    /// Changes the law of the landing burn from now on.
+    pub fn set_law(&mut self, law: Law) {
+        self.computer.set_law(law);
+    }
+
+    /// The flight computer.
+    pub fn computer(&self) -> &Computer {
+        &self.computer
+    }
+
+    /// The pilot in the flight computer.
+    ///
+    /// # Panics
+    /// Never: the computer of a rocket in space has one.
+    pub fn pilot(&self) -> &Pilot {
+        self.computer.pilot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
+    }
+
+    /// The flight computer is dead: it neither hears nor speaks.
+    pub fn computer_is_dead(&self) -> bool {
+        self.dead
+    }
+
+    /// The truth.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The truth, for a caller that replaces it.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// The sensor samples of the last frame; `None` if the computer gets the truth.
+    pub fn measured(&self) -> Option<&Measurements> {
+        self.measured.as_ref()
+    }
+
+    /// The drawn differences.
+    pub fn drawn(&self) -> &Draw {
+        &self.drawn
+    }
+
+    /// How many faults have happened.
+    pub fn faults_happened(&self) -> u64 {
+        self.injector.happened()
+    }
+
+    /// The radio. In a campaign nobody is at its other end; in a live flight the ground is.
+    pub fn radio(&self) -> &Radio {
+        &self.radio
+    }
+
+    /// What the flight computer believes about its state at apogee.
+    pub fn believed_at_apogee(&self) -> &RigidState {
+        &self.believed
+    }
+
+    /// The mission as flown.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// Frames since power-up.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// The result of the rehearsal on the pad and its last plan, once it is over.
+    pub fn rehearsed(&self) -> Option<&(Rehearsed, PoweredReport)> {
+        self.rehearsal.as_ref()?.over()
+    }
+
+    /// The largest errors of the estimate in the last ten metres.
+    pub fn largest_errors(&self) -> &EstimatorErrors {
+        &self.largest_errors
+    }
+
+    /// The outcome so far.
+    pub fn outcome(&self) -> Outcome {
+        let ending = Ending {
+            touchdown: self.world.touchdown().copied(),
+            rest: self.world.rest().map(|rest| rest.outcome),
+            phase: self.computer.mode().phase,
+            ignited: self.pilot().ignited_at_s().is_some(),
+            lit: self.world.thrust_begins_s().is_some(),
+            parachute: self.world.parachute_ejected(),
+            finite: self.finite,
+        };
+        judge(&self.mission, &ending)
+    }
+}
+
+/// The mission, its law and the draw.
+fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
+    let mut mission = recipe.mission.clone();
+    let law = Law::of(recipe.controller, &mission);
+    mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
+    let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
+    (mission, law, drawn)
+}
+
+fn at_rest(mission: &Mission) -> Actuators {
+    let closed_rad = mission.airframe.fins.closed_rad();
+    Actuators { gimbal_rad: [0.0; 2], fins_rad: [closed_rad; 4], ignite: false, parachute: false }
+}

@@ -1,0 +1,114 @@
+//! Keeps the stations' requests until the vehicle has decided. A command is acknowledged by the frame that carried it
+//! out.
+
+use std::time::Duration;
+
+use flight::computer::Commander;
+use flight::computer::crew::{Answer, Asked, Ending, Request};
+use flight::rules::arming::Uplink;
+use flight::rules::phase::Phase;
+use protocol::command::{CommandAnswer, CommandRequest};
+use protocol::identity::Address;
+
+use super::VehicleEndpoint;
+use crate::commands;
+use crate::vehicle::{Frame, Vehicle, VehicleEvent};
+
+/// Most commands that may wait for one frame (some milliseconds); more are ignored.
+const MAX_WAITING: usize = 64;
+
+/// A command that the vehicle decides in its next frame.
+#[derive(Debug, Clone)]
+pub(super) struct Waiting {
+    link: usize,
+    command: CommandRequest,
+    request: Request,
+}
+
+impl VehicleEndpoint {
+    /// Configures a vehicle that starts by itself: no station has to be heard, and the silence of a station does not
+    /// hold it.
+    #[must_use]
+    pub fn starting_by_itself(self) -> Self {
+        Self { starts_by_itself: true, ..self }
+    }
+
+    /// Gives a command to the vehicle's next frame.
+    pub(super) fn put(&mut self, link: usize, command: &CommandRequest, asked: Asked, vehicle: &Vehicle) {
+        // Other commands never displace an abort.
+        if self.waiting.len() >= MAX_WAITING && asked != Asked::Abort {
+            return;
+        }
+        let uplink = if self.starts_by_itself {
+            Uplink::NotNeeded
+        } else {
+            self.stations.uplink(command.source, vehicle.time_s())
+        };
+        let Address { system_id, component_id } = command.source;
+        let request = Request { asked, uplink, station: Some((system_id, component_id)) };
+        // A station that repeats an abort before the decision is answered once.
+        let repeats = |waiting: &Waiting| waiting.command.source == command.source;
+        if asked == Asked::Abort
+            && self.waiting.iter().any(|waiting| repeats(waiting) && waiting.request.asked == asked)
+        {
+            return;
+        }
+        self.waiting.push(Waiting { link, command: *command, request });
+    }
+
+    /// Steps the vehicle by one frame with the requests from the links and from its own programme. Returns the events
+    /// and the answers to its own programme. Answers to the links come out of [`VehicleEndpoint::poll`].
+    pub fn step(
+        &mut self,
+        vehicle: &mut Vehicle,
+        own: &[Request],
+        stopwatch: &mut dyn FnMut() -> Duration,
+    ) -> (Vec<VehicleEvent>, Vec<Answer>) {
+        let (uplink, commander) = self.uplink(vehicle.time_s());
+        vehicle.set_uplink(uplink, commander);
+        let requests = [self.requests().as_slice(), own].concat();
+        let Frame { events, mut answers } = vehicle.step(&requests, stopwatch);
+        let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
+        self.on_answers(&answers, vehicle);
+        for event in &events {
+            self.on_event(event);
+        }
+        (events, to_itself)
+    }
+
+    /// The requests for the next frame, in order.
+    fn requests(&self) -> Vec<Request> {
+        self.waiting.iter().map(|waiting| waiting.request).collect()
+    }
+
+    /// Takes the vehicle's answers to `requests`; `vehicle` has just decided. A dead flight computer gives no answers,
+    /// and its requests are dropped.
+    fn on_answers(&mut self, answers: &[Answer], vehicle: &Vehicle) {
+        let waiting = core::mem::take(&mut self.waiting);
+        for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
+            let armed = request.asked == Asked::Arm && answer.ending == Ending::Accepted;
+            // The first station that armed it is in command.
+            if armed && vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() {
+                self.stations.set_armed_by(Some(command.source));
+            }
+            let result = commands::mav_result(answer.ending);
+            if request.asked == Asked::Abort {
+                self.lane(link).answer_abort(CommandAnswer::to(&command, result));
+            } else {
+                self.acknowledge(link, &command, result);
+            }
+        }
+    }
+
+    /// How well the best station and the station that armed the vehicle are heard now.
+    fn uplink(&self, time_s: f64) -> (Uplink, Option<Commander>) {
+        if self.starts_by_itself {
+            return (Uplink::NotNeeded, None);
+        }
+        let commander = self.stations.armed_by().map(|station| Commander {
+            station: (station.system_id, station.component_id),
+            age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
+        });
+        (self.stations.best_uplink(time_s), commander)
+    }
+}

@@ -1,0 +1,37 @@
+//! Arms and starts a flight without a crew.
+
+use flight::computer::crew::{Answer, Asked, Request};
+use flight::rules::arming;
+use flight::rules::phase::Phase;
+
+use crate::vehicle::Vehicle;
+
+/// Arms and starts once the checks pass.
+pub(super) struct OwnStart {
+    pub(super) wanted: bool,
+    pub(super) refused: Option<String>,
+}
+
+impl OwnStart {
+    /// The request for this frame.
+    pub(super) fn requests(&mut self, vehicle: &Vehicle) -> Vec<Request> {
+        if !self.wanted || self.refused.is_some() || vehicle.phase() != Phase::PadIdle {
+            return Vec::new();
+        }
+        match arming::first_refusal(&vehicle.arming_checks()) {
+            Some(reason) if vehicle.time_s() > vehicle.ready_within_s() => self.refused = Some(reason),
+            Some(_) => {}
+            None => {
+                self.wanted = false;
+                return [Asked::Arm, Asked::Start].map(Request::of_the_programme).to_vec();
+            }
+        }
+        Vec::new()
+    }
+
+    /// Takes the answer to the request.
+    pub(super) fn on_answers(&mut self, answers: &[Answer]) {
+        self.refused =
+            self.refused.take().or_else(|| answers.iter().find_map(|answer| answer.reason.clone()));
+    }
+}

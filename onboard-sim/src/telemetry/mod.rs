@@ -1,0 +1,246 @@
+//! A vehicle's state as MAVLink messages.
+//!
+//! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are narrowed to the
+//! fields' types here and only here; what does not fit saturates.
+//!
+//! What is not modelled is sent as MAVLink's "unknown" and never invented: no vehicle has a battery.
+//!
+//! [`Motion`]: crate::vehicle::Motion
+
+mod global;
+mod ours;
+mod space;
+
+use flight::rules::phase::Phase;
+use mavlink::MessageData as _;
+use mavlink::types::CharArray;
+#[expect(deprecated, reason = "only [`protocol_version`] uses it")]
+use protocol::dialect::PROTOCOL_VERSION_DATA;
+use protocol::dialect::{
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA,
+    CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
+    MavLandedState, MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode,
+    MavState, MavSysStatusSensor, MavSysStatusSensorExtended, MavType, MavVtolState, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+};
+
+use crate::vehicle::Snapshot;
+
+/// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
+const PROTOCOL_VERSION_ID: u32 = 300;
+
+/// The message of this id in the current state, or `None` if the vehicle has no such message or no data for it.
+pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option<MavMessage> {
+    match message_id {
+        HEARTBEAT_DATA::ID => Some(heartbeat(snapshot)),
+        SYS_STATUS_DATA::ID => Some(sys_status(snapshot)),
+        EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(snapshot)),
+        ATTITUDE_QUATERNION_DATA::ID => Some(attitude(snapshot)),
+        LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
+        VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
+        CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
+        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version()),
+        PROTOCOL_VERSION_ID => Some(protocol_version()),
+        ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
+        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, boot_number)),
+        TD_FINS_DATA::ID => Some(ours::fins(snapshot)),
+        TD_GIMBAL_DATA::ID => Some(ours::gimbal(snapshot)),
+        TD_CONTROLLER_DATA::ID => ours::controller(snapshot),
+        TD_TOUCHDOWN_PREDICTION_DATA::ID => ours::touchdown_prediction(snapshot),
+        TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
+        TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
+        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
+        _ => space::message(message_id, snapshot).or_else(|| global::message(message_id, snapshot)),
+    }
+}
+
+/// One AVAILABLE_MODES for each phase.
+pub fn available_modes() -> impl Iterator<Item = MavMessage> {
+    Phase::ALL.into_iter().map(|phase| {
+        MavMessage::AVAILABLE_MODES(AVAILABLE_MODES_DATA {
+            custom_mode: u32::from(phase.index()),
+            properties: MavModeProperty::MAV_MODE_PROPERTY_NOT_USER_SELECTABLE,
+            number_modes: Phase::ALL.len() as u8,
+            mode_index: phase.index() + 1,
+            standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
+            mode_name: characters(phase.name()),
+        })
+    })
+}
+
+fn heartbeat(snapshot: &Snapshot) -> MavMessage {
+    // The vehicle marks itself as simulated from its boot on, so that every ground station can show it.
+    let mut base_mode = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED
+        | MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED;
+    base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, snapshot.interlocks.armed);
+    let system_status = match snapshot.phase {
+        _ if snapshot.interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
+        _ if snapshot.interlocks.no_light_latched => MavState::MAV_STATE_EMERGENCY,
+        Phase::Safe => MavState::MAV_STATE_BOOT,
+        Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => MavState::MAV_STATE_STANDBY,
+        Phase::Chute => MavState::MAV_STATE_EMERGENCY,
+        _ => MavState::MAV_STATE_ACTIVE,
+    };
+    MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: u32::from(snapshot.phase.index()),
+        mavtype: MavType::MAV_TYPE_ROCKET,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+        base_mode,
+        system_status,
+        mavlink_version: 3,
+    })
+}
+
+fn sys_status(snapshot: &Snapshot) -> MavMessage {
+    let (sensors, silent) = space::sensors(snapshot);
+    let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        | sensors;
+    let mut healthy = present - silent;
+    healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
+    MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+        onboard_control_sensors_present: present,
+        onboard_control_sensors_enabled: present,
+        onboard_control_sensors_health: healthy,
+        load: (1000.0 * snapshot.solve_time_s / snapshot.deadline_s).clamp(0.0, 1000.0) as u16,
+        voltage_battery: u16::MAX,
+        current_battery: -1,
+        battery_remaining: -1,
+        // Explicitly empty: the generated default of a set of flags is its first flag.
+        onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
+        onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),
+        onboard_control_sensors_health_extended: MavSysStatusSensorExtended::empty(),
+        ..SYS_STATUS_DATA::default()
+    })
+}
+
+fn extended_sys_state(snapshot: &Snapshot) -> MavMessage {
+    let landed_state = match snapshot.phase {
+        Phase::Safe | Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => {
+            MavLandedState::MAV_LANDED_STATE_ON_GROUND
+        }
+        Phase::Boost => MavLandedState::MAV_LANDED_STATE_TAKEOFF,
+        Phase::LandArmed | Phase::Ignition | Phase::Powered => MavLandedState::MAV_LANDED_STATE_LANDING,
+        Phase::Coast | Phase::Deploy | Phase::AeroDescent | Phase::Chute => {
+            MavLandedState::MAV_LANDED_STATE_IN_AIR
+        }
+    };
+    MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+        vtol_state: MavVtolState::MAV_VTOL_STATE_UNDEFINED,
+        landed_state,
+    })
+}
+
+fn attitude(snapshot: &Snapshot) -> MavMessage {
+    let [q1, q2, q3, q4] = snapshot.motion.ned_from_body.map(|part| part as f32);
+    let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
+    MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        q1,
+        q2,
+        q3,
+        q4,
+        rollspeed,
+        pitchspeed,
+        yawspeed,
+        ..ATTITUDE_QUATERNION_DATA::default()
+    })
+}
+
+fn position(snapshot: &Snapshot) -> MavMessage {
+    let [x, y, z] = snapshot.motion.position_m.map(|metres| metres as f32);
+    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed| speed as f32);
+    MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
+        x,
+        y,
+        z,
+        vx,
+        vy,
+        vz,
+    })
+}
+
+fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
+    let motion = &snapshot.motion;
+    let [north_m_s, east_m_s, down_m_s] = motion.velocity_m_s;
+    MavMessage::VFR_HUD(VFR_HUD_DATA {
+        airspeed: motion.airspeed_m_s as f32,
+        groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
+        alt: -motion.position_m[2] as f32,
+        climb: -down_m_s as f32,
+        heading: global::heading_deg(&motion.ned_from_body).round() as i16 % 360,
+        throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
+    })
+}
+
+fn current_mode(snapshot: &Snapshot) -> MavMessage {
+    MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {
+        custom_mode: u32::from(snapshot.phase.index()),
+        standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
+        ..CURRENT_MODE_DATA::default()
+    })
+}
+
+fn autopilot_version() -> MavMessage {
+    let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
+    MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
+        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST,
+        // Major, minor, patch, then 0 for a development version.
+        flight_sw_version: version.take(3).fold(0, |packed, part| (packed << 8) | (part & 0xff)) << 8,
+        ..AUTOPILOT_VERSION_DATA::default()
+    })
+}
+
+/// MAVLink 2 and nothing older: 100 times the version.
+#[expect(deprecated, reason = "the standard has dropped it; clients in use still ask")]
+fn protocol_version() -> MavMessage {
+    MavMessage::PROTOCOL_VERSION(PROTOCOL_VERSION_DATA {
+        version: 200,
+        min_version: 200,
+        max_version: 200,
+        ..PROTOCOL_VERSION_DATA::default()
+    })
+}
+
+/// Outputs 1 to 4 the fins (0 closed, 1 fully deployed), 5 and 6 the gimbal (-1 to 1, stop to stop).
+fn actuators(snapshot: &Snapshot) -> MavMessage {
+    let mut actuator = [0.0; 32];
+    for (output, angle_rad) in actuator.iter_mut().zip(snapshot.fins_rad.1) {
+        *output = (angle_rad / core::f64::consts::FRAC_PI_2) as f32;
+    }
+    for (output, (_, actual_rad)) in actuator[4..].iter_mut().zip(snapshot.gimbal_rad) {
+        *output = (actual_rad / snapshot.gimbal_limit_rad) as f32;
+    }
+    MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA {
+        time_usec: (1e6 * snapshot.time_s) as u64,
+        active: 0b11_1111,
+        actuator,
+    })
+}
+
+fn boot_ms(time_s: f64) -> u32 {
+    (1000.0 * time_s).round() as u32
+}
+
+fn centidegrees(angle_rad: f64) -> i16 {
+    (100.0 * angle_rad.to_degrees()).round() as i16
+}
+
+fn centimetres(length_m: f64) -> i16 {
+    (100.0 * length_m).round() as i16
+}
+
+fn characters<const N: usize>(text: &str) -> CharArray<N> {
+    let mut bytes = [0; N];
+    for (place, byte) in bytes.iter_mut().zip(text.bytes()) {
+        *place = byte;
+    }
+    CharArray::new(bytes)
+}

@@ -1,0 +1,207 @@
+//! The rocket's state at one instant, for telemetry: what its flight computer believes.
+
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, PilotOutput, touchdown_m};
+use flight::estimation::estimator::Estimate;
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::{Plane, PoweredReport};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::burn::Burn;
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::rigid::RigidState;
+use nalgebra::{Vector2, Vector3};
+use sim::limits::Limits;
+
+use super::{
+    Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path, Prediction, Snapshot, violations,
+};
+use crate::vehicle::{InSpace, Vehicle};
+
+/// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
+/// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.
+const CARRIED_M_S: f64 = 10.0;
+const CARRIED_WEIGHTS: f64 = 0.5;
+
+impl Vehicle {
+    pub(super) fn snapshot_in_space(&self, space: &InSpace) -> Snapshot {
+        let sortie = &space.sortie;
+        let mission = sortie.mission();
+        let limits = Limits::of(mission).legs;
+        let mass = MassModel::new(&mission.airframe.mass, sortie.pilot().curve().propellant_mass_kg());
+        let cg_m = mission.airframe.above_feet_m(mass.at(0.0).cg_station_m);
+        let believed = RigidState {
+            position_m: Vector3::z() * cg_m,
+            ..sortie.computer().believed_on_the_pad().unwrap_or_else(|| RigidState::upright(cg_m))
+        };
+        let (commands, world) = (sortie.computer().commands(), sortie.world());
+        let gimbal_rad = world.gimbal_rad();
+        let rehearsed = sortie.rehearsed();
+        let standing = Snapshot {
+            gimbal_rad: core::array::from_fn(|axis| (commands.gimbal_rad[axis], gimbal_rad[axis])),
+            fins_rad: (commands.fins_rad, world.fins_rad()),
+            controller: rehearsed.map(|(_, report)| facts(0, ControlLevel::Rehearsal, report)),
+            gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
+            sensors: space.sensors.facts(sortie.frame()),
+            site: mission.site,
+            pad_altitude_m: mission.pad_altitude_m,
+            ..self.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
+        };
+        let computer = sortie.computer();
+        let flying = computer.released_at_s().zip(computer.piloted()).zip(sortie.pilot().estimate());
+        match flying {
+            None => standing,
+            Some(((released_at_s, (input, output)), estimate)) => {
+                let since = Airborne {
+                    released_at_s,
+                    frame: input.frame,
+                    flight_s: input.time_s,
+                    output,
+                    estimate,
+                    mass: &mass,
+                };
+                self.flying(space, &since, standing)
+            }
+        }
+    }
+
+    fn flying(&self, space: &InSpace, since: &Airborne<'_>, standing: Snapshot) -> Snapshot {
+        let &Airborne { released_at_s, frame, flight_s, output, estimate, mass } = since;
+        let pilot = space.sortie.pilot();
+        let motor = pilot.motor();
+        let burn = Burn {
+            curve: pilot.curve(),
+            impulse_scale: motor.impulse_scale(),
+            time_scale: motor.burn_time_stretch(),
+        };
+        let burning_s = pilot.burning_s(flight_s);
+        let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
+        let feet_m = space.sortie.mission().airframe.above_feet_m(mass.at(burnt_kg).cg_station_m);
+        let planned = pilot.powered().planned().filter(|_| self.phase().in_landing_burn());
+        let until_s = self.judged().map_or(flight_s, |judged| judged.impact.time_s - released_at_s);
+        let sigmas = &estimate.sigmas;
+        Snapshot {
+            since_ignition_s: pilot.ignited_at_s().map(|ignited_at_s| until_s - ignited_at_s),
+            motion: Motion::in_space(&estimate.state, feet_m, &estimate.wind_m_s),
+            thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
+            controller: Some(facts(frame / FRAMES_PER_PLAN, output.level, pilot.report())),
+            prediction: planned.and_then(|planned| {
+                let landing_miss = space.sortie.mission().powered.landing_miss;
+                prediction(pilot, estimate, planned, flight_s, landing_miss, &standing.limits)
+            }),
+            path: planned.and_then(|planned| path_from_the_east(pilot, estimate, planned)),
+            solve_time_s: space.took_s,
+            thrust_scale: motor.impulse_scale(),
+            descent: Some(self.descent(space, estimate, feet_m)),
+            // Where the truth is the estimate there is no estimator to speak of.
+            estimator: standing.sensors.map(|_| EstimatorFacts {
+                health: estimate.health,
+                horizontal_sigma_m: sigmas.position_m.xy().max(),
+                height_sigma_m: sigmas.position_m.z,
+            }),
+            ..standing
+        }
+    }
+
+    fn descent(&self, space: &InSpace, estimate: &Estimate, feet_m: f64) -> DescentFacts {
+        let pilot = space.sortie.pilot();
+        let outlook = pilot.outlook();
+        let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
+        let height_m = place.z - feet_m;
+        let touchdown = touchdown_m(place, velocity, height_m);
+        let motor = pilot.motor();
+        let deciding = self.phase().in_descent();
+        // Also on the ground, after a descent under it.
+        let fired = space.sortie.world().parachute_ejected();
+        let weights_felt = estimate.specific_force_m_s2.norm() / space.sortie.mission().gravity_m_s2;
+        let carried = velocity.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS;
+        DescentFacts {
+            height_m,
+            vertical_m_s: velocity.z,
+            band_m: outlook.ignition.band.map(|band| (band.low_m, band.high_m)),
+            chosen_m: outlook.ignition.chosen_m,
+            commit_height_m: outlook.commit_height_m,
+            ignition_in_s: outlook.ignition.command_in_s.filter(|_| deciding),
+            // North is x, east is against y.
+            wind_m_s: [estimate.wind_m_s.x, -estimate.wind_m_s.y],
+            drag_scale: motor.air_scale(),
+            thrust_scale: motor.impulse_scale(),
+            touchdown_m: [touchdown.x, -touchdown.y],
+            chute: match self.phase() {
+                Phase::Chute if carried => Chute::Open,
+                Phase::Chute => Chute::Fired,
+                _ if fired => Chute::Open,
+                _ => Chute::Stowed,
+            },
+        }
+    }
+}
+
+/// A rocket in the air, or on the ground after its flight.
+#[derive(Clone, Copy)]
+struct Airborne<'a> {
+    released_at_s: f64,
+    /// Number of the frame since then.
+    frame: u64,
+    /// Time since then, s.
+    flight_s: f64,
+    output: &'a PilotOutput,
+    estimate: &'a Estimate,
+    mass: &'a MassModel,
+}
+
+/// The plan's end over the ground; the plan itself moves with the wind.
+fn prediction(
+    pilot: &Pilot,
+    estimate: &Estimate,
+    (states, step_s): (&[PlanarState], f64),
+    flight_s: f64,
+    landing_miss: f64,
+    limits: &TouchdownLimits,
+) -> Option<Prediction> {
+    let guidance = pilot.powered();
+    let whole_s = states.len().saturating_sub(1) as f64 * step_s;
+    let mut state = Plane::over_ground(states.last()?, along_m_s(estimate, guidance.plane()?), whole_s);
+    // A plan that misses its end by no more than this counts as a landing: it ends on the ground.
+    if state.z_m.abs() <= landing_miss {
+        state.z_m = 0.0;
+    }
+    Some(Prediction {
+        time_to_go_s: guidance.left_s(flight_s)?,
+        state,
+        violations: violations(&LandingVerdict::judge_plan(limits, &state)),
+    })
+}
+
+/// The wind along the plane, m/s.
+fn along_m_s(estimate: &Estimate, plane: &Plane) -> f64 {
+    estimate.wind_m_s.push(0.0).dot(&plane.along)
+}
+
+/// The plan's path over the ground as it looks from the east, where the path that is flown is seen from too: its plane
+/// stands as it happens to.
+fn path_from_the_east(
+    pilot: &Pilot,
+    estimate: &Estimate,
+    (states, step_s): (&[PlanarState], f64),
+) -> Option<Path> {
+    let plane = pilot.powered().plane()?;
+    let wind_m_s = along_m_s(estimate, plane);
+    let beside_north_m = estimate.state.position_m.dot(&plane.across) * plane.across.x;
+    Path::through(states.len(), |node| {
+        let state = Plane::over_ground(&states[node], wind_m_s, node as f64 * step_s);
+        (state.x_m * plane.along.x + beside_north_m, state.z_m)
+    })
+}
+
+fn facts(tick: u64, level: ControlLevel, report: &PoweredReport) -> ControllerFacts {
+    ControllerFacts {
+        tick,
+        cost: report.cost,
+        kkt_stationarity: report.kkt_stationarity,
+        kkt_feasibility: report.kkt_feasibility,
+        iterations: u32::try_from(report.iterations).unwrap_or(u32::MAX),
+        level,
+        status: report.status,
+    }
+}

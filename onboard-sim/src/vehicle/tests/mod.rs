@@ -1,0 +1,101 @@
+//! The vehicles as their crew meets them: arming, countdown, landing, and an abort in every phase they pass.
+
+mod aborts;
+mod motor;
+mod plane;
+mod space;
+
+use std::ops::{Deref, DerefMut};
+use std::time::Duration;
+
+use flight::computer::crew::{Answer, Asked, Request};
+use flight::rules::phase::Phase;
+
+use super::*;
+
+/// A vehicle, and what it has told that no test has read yet.
+pub(crate) struct Told {
+    vehicle: Vehicle,
+    unread: Vec<VehicleEvent>,
+}
+
+impl Deref for Told {
+    type Target = Vehicle;
+
+    fn deref(&self) -> &Vehicle {
+        &self.vehicle
+    }
+}
+
+impl DerefMut for Told {
+    fn deref_mut(&mut self) -> &mut Vehicle {
+        &mut self.vehicle
+    }
+}
+
+impl Told {
+    /// A vehicle whose pin is out and whose log runs.
+    pub(crate) fn of(mut vehicle: Vehicle) -> Self {
+        vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+        vehicle.set_pin_out(true);
+        Self { vehicle, unread: Vec::new() }
+    }
+
+    /// A frame in which the vehicle's own programme asks for something.
+    pub(crate) fn request(&mut self, asked: Asked) -> Answer {
+        let Frame { events, mut answers } =
+            self.vehicle.step(&[Request::of_the_programme(asked)], &mut || Duration::ZERO);
+        self.unread.extend(events);
+        answers.remove(0)
+    }
+
+    fn advance(&mut self) -> Vec<VehicleEvent> {
+        self.advance_timed(&mut || Duration::ZERO)
+    }
+
+    fn advance_timed(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {
+        let mut events = std::mem::take(&mut self.unread);
+        events.extend(self.vehicle.step(&[], stopwatch).events);
+        events
+    }
+
+    fn run_until(&mut self, mut done: impl FnMut(&Vehicle) -> bool) -> Vec<VehicleEvent> {
+        let mut events = Vec::new();
+        for _ in 0..30_000 {
+            if done(&self.vehicle) {
+                return events;
+            }
+            events.extend(self.advance());
+        }
+        panic!("still {:?} at {} s", self.phase(), self.time_s());
+    }
+
+    /// Armed and started as far as it takes.
+    fn run_to(mut self, phase: Phase) -> Self {
+        self.run_until(|vehicle| vehicle.snapshot().checks_failed == 0 && vehicle.phase() == Phase::PadIdle);
+        if phase == Phase::PadIdle {
+            return self;
+        }
+        assert_eq!(self.request(Asked::Arm), Answer { ending: Ending::Accepted, reason: None });
+        if phase == Phase::PadArmed {
+            return self;
+        }
+        assert_eq!(self.request(Asked::Start).ending, Ending::Accepted);
+        self.run_until(|vehicle| vehicle.phase() == phase);
+        self
+    }
+}
+
+use flight::computer::crew::Ending;
+
+fn phases(events: &[VehicleEvent]) -> Vec<Phase> {
+    let to = |event: &VehicleEvent| match event {
+        VehicleEvent::PhaseChanged { to, .. } => Some(*to),
+        _ => None,
+    };
+    events.iter().filter_map(to).collect()
+}
+
+fn said(events: &[VehicleEvent], words: &str) -> bool {
+    events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
+}

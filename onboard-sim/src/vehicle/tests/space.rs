@@ -1,0 +1,218 @@
+//! The rocket: pad, arming, and the flight from apogee.
+
+use campaign::tally;
+use flight::computer::pilot::FRAMES_PER_PLAN;
+use protocol::log::record::Record;
+use sim::dispersion::Dispersion;
+
+use super::*;
+use crate::fly::{LoadedFlight, load_flight};
+
+pub(super) fn flight_of(dispersion: &str, faults: &[&str]) -> RocketFlight {
+    let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+    flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
+    flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+    *flight
+}
+
+fn rocket_of(flight: &RocketFlight) -> Told {
+    Told::of(Vehicle::in_space(flight).unwrap())
+}
+
+fn sortie(rocket: &Vehicle) -> &Sortie {
+    let Flight::Space(space) = &rocket.flight else { panic!("in space") };
+    &space.sortie
+}
+
+pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Told {
+    rocket_of(flight).run_to(phase)
+}
+
+#[test]
+fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
+    for dispersion in ["none", "field"] {
+        let flight = flight_of(dispersion, &[]);
+        let mut rocket = in_phase(&flight, Phase::PadIdle);
+        rocket.request(Asked::Arm);
+        rocket.request(Asked::Start);
+        let events = rocket.run_until(Vehicle::is_over);
+        let row = tally::fly(&flight.recipe, flight.number).unwrap();
+        assert!(row.legs, "{row:?}");
+        let judged = rocket.judged().unwrap();
+        assert!(judged.landed && judged.verdict.landed());
+        assert_eq!(rocket.judged_by_table_2().unwrap().landed, row.strict);
+        assert_eq!(judged.impact.state.u_m_s.to_bits(), row.touchdown_vertical_m_s.unwrap().to_bits());
+        let distance_m = libm::hypot(row.touchdown_x_m.unwrap(), row.touchdown_y_m.unwrap());
+        assert_eq!(judged.impact.state.x_m.to_bits(), distance_m.to_bits());
+        let flown_s = judged.impact.time_s - rocket.computer().released_at_s().unwrap();
+        assert!((flown_s - row.touchdown_time_s.unwrap()).abs() < 1e-9);
+        let expected = [
+            Phase::PadArmed,
+            Phase::Deploy,
+            Phase::AeroDescent,
+            Phase::LandArmed,
+            Phase::Ignition,
+            Phase::Powered,
+            Phase::Touchdown,
+        ];
+        assert_eq!(phases(&events), expected);
+        assert!(said(&events, "no ascent is flown") && said(&events, "limits of the legs kept"));
+        assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict { .. })));
+        let recorded = rocket.verdict_record().unwrap();
+        assert_eq!((recorded.landed, recorded.limits.len()), (true, 4));
+    }
+}
+
+#[test]
+fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
+    let mut rocket = rocket_of(&flight_of("field", &[]));
+    rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
+    let refused = rocket.request(Asked::Arm);
+    assert_eq!(refused.ending, Ending::NotNow);
+    assert!(refused.reason.unwrap().starts_with("controller warm: found no rehearsal yet"));
+    rocket.run_until(|rocket| sortie(rocket).rehearsed().is_some());
+    let found = rocket.computer().stance();
+    // Sensors were at work: nothing is exactly nought, and nothing is far from it.
+    assert!((1e-6..0.01).contains(&found.rotation_rad_s), "{found:?}");
+    assert!((1e-4..0.2).contains(&found.speed_m_s), "{found:?}");
+    assert!((1e-6..0.02).contains(&found.tilt_rad), "{found:?}");
+    assert_eq!(rocket.snapshot().checks_failed, 0, "{:?}", rocket.arming_checks());
+    rocket.set_log_state(LogState { running: false, space_bytes: 0 });
+    let refused = rocket.request(Asked::Arm);
+    assert!(refused.reason.unwrap().starts_with("log: found not running"));
+    rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted, "armed already");
+}
+
+#[test]
+fn every_built_in_mission_is_ready_on_its_pad() {
+    for (name, _) in vehicles::mission::BUILTIN {
+        let LoadedFlight::FromApogee(flight) = load_flight(name).unwrap() else { panic!("from apogee") };
+        let mut rocket = rocket_of(&flight);
+        rocket.run_until(|rocket| rocket.time_s() > rocket.ready_within_s());
+        assert_eq!(rocket.snapshot().checks_failed, 0, "{name}: {:?}", rocket.arming_checks());
+    }
+}
+
+#[test]
+fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
+    let mut flight = flight_of("none", &[]);
+    // Far below the ignition band.
+    flight.recipe.mission.start.height_m = 30.0;
+    let mut rocket = rocket_of(&flight);
+    let mut events = rocket.run_until(|rocket| sortie(rocket).rehearsed().is_some());
+    for _ in 0..400 {
+        events.extend(rocket.advance());
+    }
+    let complaints = events.iter().filter(|event| {
+        matches!(event, VehicleEvent::Text { severity: Severity::Warning, text } if text.starts_with("not ready: controller warm"))
+    });
+    assert_eq!(complaints.count(), 1, "said unasked, and once: {events:?}");
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::NotNow);
+}
+
+#[test]
+fn telemetry_is_the_estimate_in_north_east_down() {
+    let flight = flight_of("none", &[]);
+    let mut rocket = in_phase(&flight, Phase::Powered);
+    rocket.run_until(|rocket| rocket.snapshot().prediction.is_some());
+    let snapshot = rocket.snapshot();
+    let world = sortie(&rocket).world();
+    let (truth, motion) = (world.state(), &snapshot.motion);
+    let close = |found: f64, should: f64| assert!((found - should).abs() < 1e-9, "{found}, not {should}");
+    close(motion.position_m[0], truth.position_m.x);
+    close(motion.position_m[1], -truth.position_m.y);
+    // The mass burnt is believed, not known: the centre of gravity is some tenths of a millimetre off.
+    assert!((-motion.position_m[2] - world.height_m()).abs() < 2e-3, "{}", motion.position_m[2]);
+    close(motion.velocity_m_s[2], -truth.velocity_m_s.z);
+    // The nose, turned by the quaternion of the wire.
+    let [w, x, y, z] = motion.ned_from_body;
+    let nose_ned = [w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)];
+    let nose = truth.nose_in_world();
+    close(nose_ned[0], nose.x);
+    close(nose_ned[1], -nose.y);
+    close(nose_ned[2], -nose.z);
+    let descent = snapshot.descent.unwrap();
+    close(descent.vertical_m_s, truth.velocity_m_s.z);
+    assert!(descent.ignition_in_s.is_none() && descent.band_m.is_some());
+    assert!(snapshot.path.is_some_and(|path| path.count > 2));
+    let prediction = snapshot.prediction.unwrap();
+    assert!((0.5..6.0).contains(&prediction.time_to_go_s), "{prediction:?}");
+    assert!(prediction.state.u_m_s.abs() < 1.0 && prediction.state.w_m_s.abs() < 1.0, "{prediction:?}");
+}
+
+#[test]
+fn the_countdown_to_ignition_runs_down_to_it() {
+    // In still air with everything known: what a gust or a better estimate changes in the last second is no error of
+    // the countdown.
+    let mut rocket = in_phase(&flight_of("none", &[]), Phase::LandArmed);
+    let announced = rocket.snapshot().descent.unwrap();
+    let (band, chosen_m) = (announced.band_m.unwrap(), announced.chosen_m.unwrap());
+    assert!(band.0 < chosen_m && chosen_m < band.1, "{announced:?}");
+    let left_s = |rocket: &Vehicle| rocket.snapshot().descent.and_then(|descent| descent.ignition_in_s);
+    assert!((2.0..3.1).contains(&left_s(&rocket).unwrap()), "{announced:?}");
+    rocket.run_until(|rocket| left_s(rocket).is_some_and(|left_s| left_s <= 1.0));
+    let at_s = rocket.time_s() + left_s(&rocket).unwrap();
+    rocket.run_until(|rocket| rocket.phase() == Phase::Ignition);
+    assert!((rocket.time_s() - at_s).abs() < 0.1, "{} s, announced {at_s} s", rocket.time_s());
+}
+
+#[test]
+fn a_dead_flight_computer_neither_hears_nor_speaks() {
+    let mut rocket = in_phase(&flight_of("field", &["reboot:0.2@descent+1"]), Phase::AeroDescent);
+    let mut silent = 0;
+    while rocket.phase() == Phase::AeroDescent {
+        rocket.advance();
+        silent += u64::from(rocket.radio().silent);
+        assert_eq!(rocket.radio().silent, sortie(&rocket).computer_is_dead());
+    }
+    assert_eq!(silent, 40, "0.2 s in frames of 5 ms");
+}
+
+#[test]
+fn the_log_holds_the_start_every_frame_and_how_well_the_estimate_knew_itself() {
+    let mut rocket = in_phase(&flight_of("field", &[]), Phase::PadArmed);
+    assert!(rocket.records(false).is_empty());
+    rocket.request(Asked::Start);
+    let (mut starts, mut frames, mut errors) = (0, Vec::new(), Vec::new());
+    while !rocket.is_over() {
+        let events = rocket.advance();
+        for record in rocket.records(!phases(&events).is_empty()) {
+            match record {
+                Record::PilotStart(_) => {
+                    starts += 1;
+                    assert!(frames.is_empty());
+                }
+                Record::PilotTick(tick) => frames.push(tick.input.frame),
+                Record::TruthSample(truth) if !truth.in_contact => errors.extend(truth.nees_of_motion),
+                _ => {}
+            }
+        }
+    }
+    assert_eq!(starts, 1);
+    assert!(frames.iter().enumerate().all(|(place, frame)| *frame == place as u64 + 1));
+    // Chi-square with 9 degrees of freedom, if the filter knows its errors: on average 9. One flight's errors hang
+    // together, so its average spreads far more than that of independent ones.
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(errors.len() > 1_000 && (2.0..27.0).contains(&mean), "{} of {}", mean, errors.len());
+}
+
+#[test]
+fn plans_are_timed_by_the_stopwatch_that_is_given() {
+    let mut rocket = in_phase(&flight_of("none", &[]), Phase::AeroDescent);
+    let mut now = Duration::ZERO;
+    let mut slow = || {
+        now += Duration::from_millis(2);
+        now
+    };
+    let mut took = Vec::new();
+    for _ in 0..3 * FRAMES_PER_PLAN {
+        for event in rocket.advance_timed(&mut slow) {
+            if let VehicleEvent::Planned { took_s, deadline_s, .. } = event {
+                took.push((took_s, deadline_s));
+            }
+        }
+    }
+    assert_eq!(took, [(0.002, 0.005); 3]);
+}

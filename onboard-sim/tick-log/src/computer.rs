@@ -1,0 +1,321 @@
+//! The flight computer's frames from power-up on, between its own types and the log's records, bit for bit. Both vehicles'
+//! frames are the same records.
+
+use flight::computer::crew::{Answer, Asked, Ending, Request};
+use flight::computer::pilot::Sensed;
+use flight::computer::plane::PlaneSensed;
+use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
+use flight::rules::arming::{PredictedLanding, Uplink};
+use protocol::log::computer_v1 as v1;
+
+use crate::pilot::{
+    PilotLogError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
+};
+use crate::{state_from_log, state_to_log};
+
+/// What can be asked for, by its number in the log.
+const ASKED: [Asked; 5] = [Asked::Arm, Asked::Disarm, Asked::Start, Asked::Hold, Asked::Abort];
+
+/// A frame's input, read from a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedInput {
+    requests: Vec<Request>,
+    rehearsed: Option<Rehearsed>,
+    rest: Input<'static>,
+}
+
+impl LoggedInput {
+    /// As the flight computer takes it.
+    pub fn input(&self) -> Input<'_> {
+        Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
+    }
+}
+
+/// A whole frame as a record; `computer` has just flown it. What the rehearsal came to is recorded in one frame only:
+/// `rehearsed_before` says that an earlier one has it.
+pub fn frame_to_log(
+    input: &Input<'_>,
+    output: &Output,
+    computer: &Computer,
+    rehearsed_before: bool,
+) -> v1::ComputerFrame {
+    let mut input = input_to_log(input);
+    if rehearsed_before {
+        input.rehearsed = None;
+    }
+    let phase = u32::from(computer.mode().phase.index());
+    v1::ComputerFrame { input, output: output_to_log(output, phase), state_digest: computer.digest() }
+}
+
+fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
+    let (mut measured, mut known, mut in_plane) = (None, None, None);
+    match &input.feeling {
+        Feeling::InSpace(Sensed::Measured(measurements)) => {
+            measured = Some(measurements_to_log(measurements))
+        }
+        Feeling::InSpace(Sensed::Known(estimate)) => known = Some(estimate_to_log(estimate)),
+        Feeling::InPlane(sensed) => in_plane = Some(plane_to_log(sensed)),
+    }
+    v1::ComputerInput {
+        frame: input.frame,
+        time_s: input.time_s,
+        measured,
+        known,
+        in_plane,
+        gimbal_rad: input.gimbal_rad.to_vec(),
+        fins_rad: input.fins_rad.to_vec(),
+        contact: input.contact,
+        igniter_continuity: input.igniter_continuity,
+        pin_out: input.pin_out,
+        log_running: input.log.running,
+        log_space_bytes: input.log.space_bytes,
+        uplink: uplink_to_log(input.uplink),
+        commander: input.commander.map(|Commander { station: (system, component), age_s }| v1::Commander {
+            system: u32::from(system),
+            component: u32::from(component),
+            age_s,
+        }),
+        requests: input.requests.iter().map(request_to_log).collect(),
+        rehearsed: input.rehearsed.map(|rehearsed| v1::Rehearsed {
+            warm: rehearsed.warm,
+            found: rehearsed.found.clone(),
+            lands: rehearsed.landing.as_ref().map(|landing| landing.lands),
+            landing_found: rehearsed.landing.as_ref().map(|landing| landing.found.clone()),
+        }),
+        late: input.late,
+    }
+}
+
+/// A recorded input.
+///
+/// # Errors
+/// It is not one of this build's.
+pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLogError> {
+    let frame = input.frame;
+    let feeling = match (&input.measured, &input.known, &input.in_plane) {
+        (Some(measurements), None, None) => {
+            Feeling::InSpace(Sensed::Measured(measurements_from_log(measurements)))
+        }
+        (None, Some(estimate), None) => Feeling::InSpace(Sensed::Known(estimate_from_log(estimate, frame)?)),
+        (None, None, Some(sensed)) => Feeling::InPlane(plane_from_log(sensed)),
+        _ => return Err(PilotLogError::Sensed { frame }),
+    };
+    let commander = input.commander.as_ref().map(|commander| {
+        let station =
+            (byte(commander.system, frame, "system")?, byte(commander.component, frame, "component")?);
+        Ok(Commander { station, age_s: commander.age_s })
+    });
+    let rest = Input {
+        frame,
+        time_s: input.time_s,
+        feeling,
+        gimbal_rad: list(&input.gimbal_rad, frame, "gimbal angles")?,
+        fins_rad: list(&input.fins_rad, frame, "fin angles")?,
+        contact: input.contact,
+        igniter_continuity: input.igniter_continuity,
+        pin_out: input.pin_out,
+        log: LogState { running: input.log_running, space_bytes: input.log_space_bytes },
+        uplink: uplink_from_log(input.uplink.as_ref()),
+        commander: commander.transpose()?,
+        requests: &[],
+        rehearsed: None,
+        late: input.late,
+    };
+    let requests = input.requests.iter().map(|request| request_from_log(request, frame));
+    let rehearsed = input.rehearsed.as_ref().map(|rehearsed| Rehearsed {
+        warm: rehearsed.warm,
+        found: rehearsed.found.clone(),
+        landing: rehearsed
+            .lands
+            .zip(rehearsed.landing_found.clone())
+            .map(|(lands, found)| PredictedLanding { lands, found }),
+    });
+    Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
+}
+
+fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
+    let ended = |answer: &Answer| match answer.ending {
+        Ending::Accepted => 0,
+        Ending::NotNow => 1,
+        Ending::Denied => 2,
+        Ending::Failed => 3,
+    };
+    v1::ComputerOutput {
+        gimbal_rad: output.commands.gimbal_rad.to_vec(),
+        fins_rad: output.commands.fins_rad.to_vec(),
+        ignite: output.commands.ignite,
+        parachute: output.commands.parachute,
+        released: output.released,
+        planned: output.planned,
+        phase,
+        answers: output.answers.iter().map(ended).collect(),
+    }
+}
+
+fn plane_to_log(sensed: &PlaneSensed) -> v1::PlaneSensed {
+    v1::PlaneSensed {
+        state: state_to_log(&sensed.state),
+        axial_specific_force_m_s2: sensed.axial_specific_force_m_s2,
+        gimbal_rad: sensed.gimbal_rad,
+        thrust_n: sensed.thrust_n,
+        thrust_below_weight: sensed.thrust_below_weight,
+    }
+}
+
+fn plane_from_log(sensed: &v1::PlaneSensed) -> PlaneSensed {
+    PlaneSensed {
+        state: state_from_log(&sensed.state),
+        axial_specific_force_m_s2: sensed.axial_specific_force_m_s2,
+        gimbal_rad: sensed.gimbal_rad,
+        thrust_n: sensed.thrust_n,
+        thrust_below_weight: sensed.thrust_below_weight,
+    }
+}
+
+fn uplink_to_log(uplink: Uplink) -> Option<v1::Uplink> {
+    match uplink {
+        Uplink::NotNeeded => None,
+        Uplink::NeverHeard => Some(v1::Uplink { age_s: None }),
+        Uplink::Heard { age_s } => Some(v1::Uplink { age_s: Some(age_s) }),
+    }
+}
+
+fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
+    match uplink {
+        None => Uplink::NotNeeded,
+        Some(v1::Uplink { age_s: None }) => Uplink::NeverHeard,
+        Some(v1::Uplink { age_s: Some(age_s) }) => Uplink::Heard { age_s: *age_s },
+    }
+}
+
+fn request_to_log(request: &Request) -> v1::Request {
+    // Every kind is in the list: a test holds that.
+    let asked = ASKED.iter().position(|known| *known == request.asked).unwrap_or(ASKED.len());
+    v1::Request {
+        asked: asked as u32,
+        uplink: uplink_to_log(request.uplink),
+        system: request.station.map(|(system, _)| u32::from(system)),
+        component: request.station.map(|(_, component)| u32::from(component)),
+    }
+}
+
+fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotLogError> {
+    let unknown =
+        PilotLogError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
+    let station = request.system.zip(request.component).map(|(system, component)| {
+        Ok((byte(system, frame, "system")?, byte(component, frame, "component")?))
+    });
+    Ok(Request {
+        asked: *ASKED.get(request.asked as usize).ok_or(unknown)?,
+        uplink: uplink_from_log(request.uplink.as_ref()),
+        station: station.transpose()?,
+    })
+}
+
+fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, PilotLogError> {
+    let most = usize::from(u8::MAX);
+    u8::try_from(number).map_err(|_| PilotLogError::Unknown { frame, what, found: number, most })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use prost::Message as _;
+
+    fn any_bits() -> impl Strategy<Value = f64> {
+        prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(0.0), Just(-0.0), Just(f64::NAN)]
+    }
+
+    fn any_uplink() -> impl Strategy<Value = Uplink> {
+        prop_oneof![
+            Just(Uplink::NotNeeded),
+            Just(Uplink::NeverHeard),
+            any_bits().prop_map(|age_s| Uplink::Heard { age_s }),
+        ]
+    }
+
+    fn any_request() -> impl Strategy<Value = Request> {
+        (0..ASKED.len(), any_uplink(), any::<Option<(u8, u8)>>())
+            .prop_map(|(asked, uplink, station)| Request { asked: ASKED[asked], uplink, station })
+    }
+
+    proptest! {
+        #[test]
+        fn an_input_survives_the_log_bit_for_bit(
+            frame: u64,
+            numbers in prop::collection::vec(any_bits(), 18),
+            flags: [bool; 8],
+            space_bytes: u64,
+            uplink in any_uplink(),
+            commander: Option<(u8, u8)>,
+            requests in prop::collection::vec(any_request(), 0..4),
+            rehearsed: Option<(bool, String, Option<(bool, String)>)>,
+        ) {
+            let number = |place: usize| numbers[place];
+            let sensed = PlaneSensed {
+                state: flight::vehicle::dynamics::PlanarState {
+                    x_m: number(0),
+                    z_m: number(1),
+                    theta_rad: number(2),
+                    u_m_s: number(3),
+                    w_m_s: number(4),
+                    q_rad_s: number(5),
+                },
+                axial_specific_force_m_s2: number(6),
+                gimbal_rad: number(7),
+                thrust_n: number(8),
+                thrust_below_weight: flags[0],
+            };
+            let rehearsed = rehearsed.map(|(warm, found, landing)| Rehearsed {
+                warm,
+                found,
+                landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
+            });
+            let input = Input {
+                frame,
+                time_s: number(9),
+                feeling: Feeling::InPlane(sensed),
+                gimbal_rad: [number(10), number(11)],
+                fins_rad: [12, 13, 14, 15].map(number),
+                contact: flags[1],
+                igniter_continuity: flags[2],
+                pin_out: flags[3],
+                log: LogState { running: flags[4], space_bytes },
+                uplink,
+                commander: commander.map(|station| Commander { station, age_s: number(16) }),
+                requests: &requests,
+                rehearsed: rehearsed.as_ref(),
+                late: flags[5],
+            };
+            let bytes = input_to_log(&input).encode_to_vec();
+            let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
+            // Once more, as bytes: floats that are not numbers are never equal to themselves.
+            prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
+            prop_assert_eq!(read.rehearsed, rehearsed);
+            prop_assert_eq!(read.requests.len(), requests.len());
+            let asked = |requests: &[Request]| requests.iter().map(|request| request.asked).collect::<Vec<_>>();
+            prop_assert_eq!(asked(&read.requests), asked(&requests));
+        }
+    }
+
+    #[test]
+    fn what_this_build_does_not_know_is_refused_by_its_frame() {
+        let sensed = v1::PlaneSensed::default();
+        let input = v1::ComputerInput {
+            frame: 7,
+            in_plane: Some(sensed),
+            gimbal_rad: vec![0.0; 2],
+            fins_rad: vec![0.0; 4],
+            requests: vec![v1::Request { asked: 5, ..v1::Request::default() }],
+            ..v1::ComputerInput::default()
+        };
+        let error = input_from_log(&input).unwrap_err().to_string();
+        assert_eq!(error, "frame 7: request 5 is unknown; this build knows 0 to 4");
+        let error =
+            input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
+        assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
+        let both = v1::ComputerInput { known: Some(protocol::log::flight_v1::Estimate::default()), ..input };
+        assert_eq!(input_from_log(&both).unwrap_err(), PilotLogError::Sensed { frame: 7 });
+    }
+}

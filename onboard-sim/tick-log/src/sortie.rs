@@ -1,0 +1,175 @@
+//! A simulated flight from apogee as log records: what the flight computer was given, believed and decided in every
+//! frame, and the truth beside it. A replay flies the flight computer again from these.
+
+use std::collections::BTreeMap;
+
+use flight::guidance::baseline::Controller;
+use flight::guidance::powered::Plane;
+use flight::rules::phase::Phase;
+use nalgebra::Vector3;
+use protocol::log::flight_v1::{PilotStart, TruthSample};
+use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::v1;
+use protocol::log::writer::LogHeader;
+use sim::dispersion::{Dispersion, DispersionError};
+use sim::outcome::Failure;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use world::Touchdown;
+
+use crate::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
+
+/// The header of such a log.
+pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
+    let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let run = [
+        ("profile", recipe.mission.name.clone()),
+        ("dispersion", recipe.dispersion_name.clone()),
+        ("seed", recipe.seed.to_string()),
+        ("flight", number.to_string()),
+        ("controller", recipe.controller.name().to_owned()),
+        ("faults", faults),
+        ("start_unix_ns", start_unix_ns.to_string()),
+    ];
+    LogHeader {
+        writer: writer.to_owned(),
+        start_unix_ns,
+        run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
+        profile_toml: Some(recipe.mission_toml.clone()),
+        scenario_toml: Some(recipe.dispersion_toml.clone()),
+    }
+}
+
+/// What comes before the first frame. Times in the records count from apogee.
+pub fn start(flight: &Sortie) -> Record {
+    Record::PilotStart(Box::new(pilot_start(flight)))
+}
+
+/// What the flight computer believes at its release, and its settings that the text of its mission does not contain.
+pub fn pilot_start(flight: &Sortie) -> PilotStart {
+    let mission = flight.mission();
+    PilotStart {
+        time_s: 0.0,
+        believed: state_to_log(flight.believed_at_apogee()),
+        steered: mission.steered,
+        fixed_ignition_height_m: mission.ignition.fixed_height_m,
+    }
+}
+
+/// The frame that was just flown; the truth alone while the flight computer is dead.
+pub fn frame(flight: &Sortie) -> Vec<Record> {
+    let mut records = Vec::with_capacity(3);
+    if let Some((input, output)) = flight.computer().piloted().filter(|_| !flight.computer_is_dead()) {
+        let tick = tick_to_log(input, output, flight.computer().flight_digest());
+        records.push(Record::PilotTick(Box::new(tick)));
+        if let Some(estimate) = flight.pilot().estimate() {
+            records.push(Record::Estimate(Box::new(estimate_to_log(estimate))));
+        }
+    }
+    records.push(Record::TruthSample(Box::new(truth(flight))));
+    records
+}
+
+fn truth(flight: &Sortie) -> TruthSample {
+    let world = flight.world();
+    let commanded = flight.computer().piloted().map(|(_, output)| output);
+    TruthSample {
+        time_s: world.time_s(),
+        state: state_to_log(world.state()),
+        height_m: world.height_m(),
+        thrust_n: world.thrust_n(),
+        mass_kg: world.mass().mass_kg,
+        wind_m_s: vector_to_log(&world.wind_m_s()),
+        gimbal_commanded_rad: commanded.map_or_else(Vec::new, |output| output.gimbal_rad.to_vec()),
+        gimbal_actual_rad: world.gimbal_rad().to_vec(),
+        fins_commanded_rad: commanded.map_or_else(Vec::new, |output| output.fins_rad.to_vec()),
+        fins_actual_rad: world.fins_rad().to_vec(),
+        parachute_open_share: world.parachute_open_share(),
+        in_contact: world.touchdown().is_some(),
+        nees_of_motion: flight.nees_of_motion(),
+    }
+}
+
+/// A flight of a campaign has no day: its log begins at the epoch, so that the same flight gives the same log.
+pub fn campaign_header(recipe: &Recipe, number: u64) -> LogHeader {
+    header("onboard-sim campaign", recipe, number, 0)
+}
+
+/// The dispersions of a log: by its scenario's text, or of a log without one the built-in that its run facts name.
+///
+/// # Errors
+/// The text is no set of dispersions, or no built-in has the name.
+pub fn dispersion_of(
+    run: &BTreeMap<String, String>,
+    scenario_toml: Option<&str>,
+) -> Result<Dispersion, DispersionError> {
+    let name = run.get("dispersion").map_or("", String::as_str);
+    match scenario_toml {
+        Some(text) => Dispersion::from_toml(text, name),
+        None => Dispersion::builtin(name),
+    }
+}
+
+/// Nanoseconds since apogee at the end of the last frame.
+pub fn time_ns(flight: &Sortie) -> u64 {
+    flight.frame() * u64::from(flight::computer::FRAME_MS) * 1_000_000
+}
+
+/// The last frame's records, and a change of phase since `phase`.
+pub fn frame_and_phase(flight: &Sortie, phase: Phase) -> Vec<Record> {
+    let mut records = frame(flight);
+    let now = flight.computer().mode().phase;
+    if now != phase {
+        records.push(Record::Event(Event {
+            level: EventLevel::Info,
+            name: "vehicle".to_owned(),
+            message: format!("phase {} to {}", phase.name(), now.name()),
+        }));
+    }
+    records
+}
+
+/// The verdict on a flight that is over, by what its legs take; `None` if it did not come down. What else went wrong
+/// (a parachute, a fall over) is a limit of its own that allows nothing.
+pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
+    let outcome = flight.outcome();
+    let touchdown = outcome.touchdown.as_ref()?;
+    let legs = &flight.mission().leg_limits;
+    let limit = |name: &str, value: f64, maximum: f64, lowest: f64, unit: &str| v1::LimitResult {
+        name: name.to_owned(),
+        value,
+        minimum: lowest * maximum,
+        maximum,
+        unit: unit.to_owned(),
+        passed: value.abs() <= maximum,
+    };
+    let (tilt_deg, rate_deg_s) = (touchdown.tilt_rad.to_degrees(), touchdown.rate_rad_s.to_degrees());
+    let mut limits = vec![
+        limit(Failure::Vertical.name(), touchdown.vertical_m_s, legs.vertical_m_s, -1.0, "m/s"),
+        limit(Failure::Lateral.name(), touchdown.lateral_m_s, legs.lateral_m_s, -1.0, "m/s"),
+        limit(Failure::Tilt.name(), tilt_deg, legs.tilt_deg, -1.0, "deg"),
+        limit(Failure::Rate.name(), rate_deg_s, legs.rate_deg_s, -1.0, "deg/s"),
+    ];
+    let of_legs = [Failure::Vertical, Failure::Lateral, Failure::Tilt, Failure::Rate];
+    if let Some(failure) = outcome.failure.filter(|failure| !of_legs.contains(failure)) {
+        limits.push(limit(failure.name(), 1.0, 0.0, 0.0, ""));
+    }
+    Some(v1::LandingVerdict {
+        time_s: touchdown.time_s,
+        state: crate::state_to_log(&in_world_plane(flight, touchdown)),
+        limits,
+        landed: outcome.legs,
+    })
+}
+
+/// The state at contact in the world's x-z plane.
+fn in_world_plane(flight: &Sortie, touchdown: &Touchdown) -> flight::vehicle::dynamics::PlanarState {
+    let nil = Vector3::zeros();
+    let feet_below_cg_m = flight.world().cg_above_feet_m();
+    Plane::choose(&nil, &nil, &nil).project(&touchdown.state, feet_below_cg_m, 0.0)
+}
+
+/// Who flew the landing burn of a recorded flight; the pilot itself if the log does not say.
+pub fn controller_of(run: &BTreeMap<String, String>) -> Option<Controller> {
+    run.get("controller").map_or(Some(Controller::Nmpc), |name| name.parse().ok())
+}

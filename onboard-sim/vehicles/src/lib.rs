@@ -1,0 +1,18 @@
+//! Reads mission, airframe, profile and motor files into the plain types of [`flight`].
+//!
+//! Each module reads one kind of file and knows the built-in files by name. Its errors name the wrong key or line and
+//! the accepted values.
+//!
+//! * [`mission`]: missions that start at apogee, from TOML.
+//! * [`airframe`]: airframes, from TOML.
+//! * [`motors`]: the built-in motors, by name.
+//! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
+//! * [`profile`]: profiles of planar landings, from TOML.
+
+// The unit tests of `flight` compile these files as one of their own modules, so paths here start with `super` or
+// `flight`.
+pub mod airframe;
+pub mod mission;
+pub mod motors;
+pub mod profile;
+pub mod thrust_curve;

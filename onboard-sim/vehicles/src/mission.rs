@@ -1,0 +1,178 @@
+//! Missions, from TOML. Unknown keys are errors.
+//!
+//! A mission contains its airframe as a table, or names a built-in airframe.
+
+use flight::vehicle::airframe::BadValue;
+use flight::vehicle::mission::Mission;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::airframe;
+use super::motors::{self, MotorError};
+
+/// Longest countdown, s.
+const COUNTDOWN_MAX_S: f64 = 600.0;
+
+/// Accepted altitudes of a pad, m: from the shore of the Dead Sea to above the highest road.
+const PAD_ALTITUDES_M: core::ops::RangeInclusive<f64> = -450.0..=6_000.0;
+
+/// The built-in missions: name and TOML text.
+pub const BUILTIN: &[(&str, &str)] = &[
+    ("mk2", include_str!("../missions/mk2.toml")),
+    ("mk2-h53", include_str!("../missions/mk2-h53.toml")),
+    ("mini-f10", include_str!("../missions/mini-f10.toml")),
+];
+
+/// Why a mission cannot be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum MissionError {
+    /// The text is not a mission.
+    #[error("{origin}: {message}")]
+    Parse {
+        /// Where the text came from (a path or a built-in's name).
+        origin: String,
+        /// The parser's words, with line, column and key.
+        message: String,
+    },
+    /// The airframe is out of range.
+    #[error("{origin}")]
+    Airframe {
+        /// Where the text came from.
+        origin: String,
+        #[source]
+        source: BadValue,
+    },
+    /// The countdown is out of range.
+    #[error("{origin}: start.countdown_s = {found}: must be 0 to {COUNTDOWN_MAX_S}")]
+    Countdown {
+        /// Where the text came from.
+        origin: String,
+        /// The value found.
+        found: f64,
+    },
+    /// The pad's place is out of range.
+    #[error("{origin}: {key} = {found}: must be {required}")]
+    Site {
+        /// Where the text came from.
+        origin: String,
+        /// The key, with its section.
+        key: &'static str,
+        /// The value found.
+        found: f64,
+        /// The accepted range, in words.
+        required: &'static str,
+    },
+    /// There is no motor of that name, or its file cannot be used.
+    #[error(transparent)]
+    Motor(#[from] MotorError),
+}
+
+/// Reads a mission and its landing motor; `origin` names the text in error messages.
+///
+/// # Errors
+/// [`MissionError`] names the key and what would be accepted.
+pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
+    let not_a_mission = |error: toml::de::Error| MissionError::Parse {
+        origin: origin.to_owned(),
+        message: error.to_string(),
+    };
+    let mission: Mission = match with_the_named_airframe(text).map_err(not_a_mission)? {
+        Some(expanded) => toml::from_str(&expanded),
+        None => toml::from_str(text),
+    }
+    .map_err(not_a_mission)?;
+    mission
+        .airframe
+        .validate()
+        .map_err(|source| MissionError::Airframe { origin: origin.to_owned(), source })?;
+    let countdown_s = mission.start.countdown_s;
+    if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
+        return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });
+    }
+    let altitude_m = mission.pad_altitude_m;
+    let nowhere =
+        (!PAD_ALTITUDES_M.contains(&altitude_m)).then_some(("pad_altitude_m", altitude_m, "-450 to 6000"));
+    if let Some((key, found, required)) = mission.site.bad_value().or(nowhere) {
+        return Err(MissionError::Site { origin: origin.to_owned(), key, found, required });
+    }
+    let motor = mission.airframe.motor.clone();
+    Ok(with_motor(mission, &motor)?)
+}
+
+/// The built-in mission of that name.
+pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
+    BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| from_toml(text, name))
+}
+
+/// Whether a text is a mission rather than a [profile](super::profile): a mission names or contains an airframe.
+pub fn is_meant(text: &str) -> bool {
+    toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
+}
+
+/// The mission with another landing motor: the name of a built-in motor, or the text of a motor file.
+///
+/// # Errors
+/// [`MotorError`] lists the known names, or says what is wrong with the text.
+pub fn with_motor(mut mission: Mission, motor: &str) -> Result<Mission, MotorError> {
+    mission.motor_curve = motors::named(motor)?;
+    motor.clone_into(&mut mission.airframe.motor);
+    Ok(mission)
+}
+
+/// The text with the named built-in airframe appended as a table; `None` if the text names no airframe.
+///
+/// The line with the name becomes empty, so the line numbers in error messages stay right.
+fn with_the_named_airframe(text: &str) -> Result<Option<String>, toml::de::Error> {
+    #[derive(Deserialize)]
+    struct Named {
+        #[serde(default)]
+        airframe: Option<Spanned<NameOrTable>>,
+    }
+    let Ok(Named { airframe: Some(found) }) = toml::from_str(text) else {
+        // The reader of the whole mission reports what is wrong with the text.
+        return Ok(None);
+    };
+    let span = found.span();
+    let NameOrTable::Name(name) = found.into_inner() else { return Ok(None) };
+    let Ok(airframe_toml) = airframe::known_toml(&name) else {
+        return Err(unknown_airframe(text));
+    };
+    let begins = text[..span.start].rfind('\n').map_or(0, |end| end + 1);
+    let ends = text[span.end..].find('\n').map_or(text.len(), |end| span.end + end);
+    let blank_lines = "\n".repeat(text[begins..ends].matches('\n').count());
+    let mut expanded = format!("{}{blank_lines}{}\n[airframe]\n", &text[..begins], &text[ends..]);
+    for line in airframe_toml.lines() {
+        match line.strip_prefix('[') {
+            Some(section) => expanded.extend(["[airframe.", section]),
+            None => expanded.push_str(line),
+        }
+        expanded.push('\n');
+    }
+    Ok(Some(expanded))
+}
+
+/// The name of an airframe, or any other value.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum NameOrTable {
+    Name(String),
+    Table(serde::de::IgnoredAny),
+}
+
+/// The parser's error, with line and column, for an unknown airframe name.
+fn unknown_airframe(text: &str) -> toml::de::Error {
+    #[derive(Debug, Deserialize)]
+    struct Named {
+        #[serde(rename = "airframe", deserialize_with = "known")]
+        _airframe: (),
+    }
+    fn known<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
+        let name = String::deserialize(deserializer)?;
+        airframe::known_toml(&name).map_err(serde::de::Error::custom)?;
+        Ok(())
+    }
+    match toml::from_str::<Named>(text) {
+        Err(error) => error,
+        Ok(_) => serde::de::Error::custom("unknown airframe"),
+    }
+}

@@ -1,0 +1,9 @@
+use vehicles::airframe::{builtin, from_toml};
+
+#[test]
+fn an_unknown_key_or_name_is_named_in_the_error() {
+    let error = from_toml("motor = 'x'\nwings = 2").unwrap_err().to_string();
+    assert!(error.contains("unknown field `wings`"), "{error}");
+    let error = builtin("mk3").unwrap_err().to_string();
+    assert_eq!(error, "no airframe is named 'mk3'; these are built in: mk2, mk2-h53, mini-f10");
+}

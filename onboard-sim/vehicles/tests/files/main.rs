@@ -1,0 +1,8 @@
+//! Good files are read into flight's types, and bad files give a helpful error.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod airframe;
+mod mission;
+mod motors;
+mod profile;
+mod thrust_curve;

@@ -1,0 +1,67 @@
+use flight::vehicle::site::Site;
+use vehicles::mission::{BUILTIN, from_toml, is_meant};
+
+#[test]
+fn every_builtin_mission_is_sound() {
+    for (name, text) in BUILTIN {
+        let mission = from_toml(text, name).expect("sound");
+        assert_eq!(mission.name, *name);
+    }
+}
+
+#[test]
+fn the_countdown_is_range_checked_and_five_seconds_by_default() {
+    let (name, text) = BUILTIN[0];
+    let of = |countdown: &str| from_toml(&text.replace("[start]", countdown), name);
+    assert!((of("[start]").expect("sound").start.countdown_s - 5.0).abs() < 1e-12);
+    assert!((of("[start]\ncountdown_s = 0").expect("sound").start.countdown_s).abs() < 1e-12);
+    for wrong in ["-1.0", "nan", "601.0"] {
+        let message = of(&format!("[start]\ncountdown_s = {wrong}")).expect_err("wrong").to_string();
+        assert!(message.contains("start.countdown_s") && message.contains("must be 0 to 600"), "{message}");
+    }
+    assert!(is_meant(text) && !is_meant("name = \"x\"") && !is_meant("="));
+}
+
+#[test]
+fn the_site_is_range_checked_and_a_known_field_by_default() {
+    let (name, text) = BUILTIN[0];
+    let of = |site: &str| from_toml(&text.replace("[start]", &format!("{site}\n[start]")), name);
+    assert_eq!(of("").expect("sound").site, Site::default());
+    let given = of("[site]\nlatitude_deg = 48.1\nlongitude_deg = 11.6").expect("sound").site;
+    assert_eq!(given, Site { latitude_deg: 48.1, longitude_deg: 11.6 });
+    let message = of("[site]\nlatitude_deg = 89.0\nlongitude_deg = 11.6").expect_err("wrong").to_string();
+    assert!(message.contains("site.latitude_deg = 89") && message.contains("-85 to 85"), "{message}");
+    assert!(of("[site]\nlatitude_deg = 48.1").is_err(), "a latitude without a longitude is an error");
+    let sunken = text.replace("pad_altitude_m = 0.0", "pad_altitude_m = -500.0");
+    let message = from_toml(&sunken, name).expect_err("wrong").to_string();
+    assert!(message.contains("pad_altitude_m = -500"), "{message}");
+}
+
+#[test]
+fn an_unknown_airframe_or_key_is_named_in_the_error() {
+    let (name, text) = BUILTIN[0];
+    let message = from_toml(&text.replace("airframe = \"mk2\"", "airframe = \"mk9\""), name)
+        .expect_err("unknown")
+        .to_string();
+    assert!(message.contains("no airframe is named 'mk9'"), "{message}");
+    let message = from_toml(&format!("colour = 1\n{text}"), name).expect_err("unknown").to_string();
+    assert!(message.contains("colour"), "{message}");
+}
+
+#[test]
+fn a_named_airframe_keeps_the_line_numbers_in_errors() {
+    let (name, text) = BUILTIN[0];
+    let wrong = text.replace("steered = true", "steered = 1");
+    let line = 1 + text.lines().position(|line| line == "steered = true").unwrap();
+    let message = from_toml(&wrong, name).unwrap_err().to_string();
+    assert!(message.contains(&format!("at line {line},")), "{message}");
+}
+
+#[test]
+fn another_motor_brings_its_own_curve() {
+    let mission = from_toml(BUILTIN[0].1, BUILTIN[0].0).unwrap();
+    let other = vehicles::mission::with_motor(mission.clone(), "G33").unwrap();
+    assert_eq!(other.airframe.motor, "G33");
+    assert_eq!(other.motor_curve, vehicles::motors::builtin("G33").unwrap());
+    assert_ne!(other.motor_curve, mission.motor_curve);
+}

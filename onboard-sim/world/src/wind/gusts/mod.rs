@@ -1,0 +1,151 @@
+//! Dryden gusts at low altitude, MIL-F-8785C section 3.7.3.4: intensities and lengths depend on height, and filtered
+//! noise on the path through the air.
+//!
+//! With the height h in feet, `L_w = h`, `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `sigma_w = 0.1 W20` and
+//! `sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4`, held at their values at 10 ft below and at 1,000 ft above.
+//! The gust field is frozen in the air: the filters run over the path flown through it. Along the mean wind the
+//! spectrum is the longitudinal one, across it and upwards the transverse one. (The standard is written for aircraft in
+//! level flight. For a falling vehicle the choice of the longitudinal component is free.)
+//!
+//! Both filters are discretised exactly: state transition and noise covariance of the continuous filter over the step,
+//! for any length of step, from a stationary start. The states have unit variance and are scaled by sigma at the
+//! output, so that a change of height does not disturb the variance.
+
+use nalgebra::Vector3;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use crate::wind::gusts::normal::Normals;
+
+mod normal;
+
+const FEET_M: f64 = 0.304_8;
+const LOWEST_FT: f64 = 10.0;
+const HIGHEST_FT: f64 = 1000.0;
+
+/// Gusts along the mean wind, across it (to the left) and upwards.
+#[derive(Debug, Clone)]
+pub struct Gusts {
+    wind_at_20_ft_m_s: f64,
+    normals: Normals,
+    along: f64,
+    across: Transverse,
+    up: Transverse,
+}
+
+/// Intensities and lengths at one height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GustScales {
+    /// Standard deviation along and across the wind, m/s.
+    pub horizontal_m_s: f64,
+    /// Standard deviation upwards, m/s.
+    pub vertical_m_s: f64,
+    /// Length along and across the wind, m.
+    pub horizontal_m: f64,
+    /// Length upwards, m.
+    pub vertical_m: f64,
+}
+
+impl GustScales {
+    /// The standard's values at a height above ground, m, for a wind at 20 ft, m/s.
+    pub fn at(height_m: f64, wind_at_20_ft_m_s: f64) -> Self {
+        let height_ft = (height_m / FEET_M).clamp(LOWEST_FT, HIGHEST_FT);
+        let base = 0.177 + 0.000_823 * height_ft;
+        // base^0.4 once, base^1.2 from it.
+        let root = libm::pow(base, 0.4);
+        let vertical_m_s = 0.1 * wind_at_20_ft_m_s;
+        Self {
+            horizontal_m_s: vertical_m_s / root,
+            vertical_m_s,
+            horizontal_m: height_ft / (root * root * root) * FEET_M,
+            vertical_m: height_ft * FEET_M,
+        }
+    }
+}
+
+/// The transverse filter `(1 + sqrt(3) L s) / (1 + L s)^2` over the path s: two equal lags in a row, the output a mix
+/// of their states.
+#[derive(Debug, Clone, Copy)]
+struct Transverse {
+    first: f64,
+    second: f64,
+}
+
+/// Stationary covariance of the two lags: 1/2, 1/4, 1/4 for a unit output.
+const FIRST_VARIANCE: f64 = 0.5;
+const CROSS: f64 = 0.25;
+const SECOND_VARIANCE: f64 = 0.25;
+
+impl Transverse {
+    fn stationary(normals: &mut Normals) -> Self {
+        let first = FIRST_VARIANCE.sqrt() * normals.next();
+        let second = CROSS / FIRST_VARIANCE * first
+            + (SECOND_VARIANCE - CROSS * CROSS / FIRST_VARIANCE).sqrt() * normals.next();
+        Self { first, second }
+    }
+
+    /// Advances by a fraction of the gust length.
+    fn step(&mut self, share: f64, normals: &mut Normals) {
+        let decay = libm::exp(-share);
+        let squared = decay * decay;
+        let first_noise = FIRST_VARIANCE * (1.0 - squared);
+        let cross_noise = CROSS - squared * (FIRST_VARIANCE * share + CROSS);
+        let second_noise = SECOND_VARIANCE
+            - squared * (FIRST_VARIANCE * share * share + 2.0 * CROSS * share + SECOND_VARIANCE);
+        let (one, two) = (normals.next(), normals.next());
+        let first_deviation = first_noise.max(0.0).sqrt();
+        let mix = if first_deviation > 0.0 { cross_noise / first_deviation } else { 0.0 };
+        self.second = decay * (self.second + share * self.first)
+            + mix * one
+            + (second_noise - mix * mix).max(0.0).sqrt() * two;
+        self.first = decay * self.first + first_deviation * one;
+    }
+
+    fn output(&self) -> f64 {
+        const ROOT_3: f64 = 1.732_050_807_568_877_2;
+        ROOT_3 * self.first + (1.0 - ROOT_3) * self.second
+    }
+}
+
+impl Gusts {
+    /// These gusts with the intensity of other gusts.
+    pub(crate) fn as_strong_as(&self, other: &Self) -> Self {
+        Self { wind_at_20_ft_m_s: other.wind_at_20_ft_m_s, ..self.clone() }
+    }
+
+    /// Gusts for a wind at 20 ft, m/s, from a seed.
+    pub fn new(wind_at_20_ft_m_s: f64, seed: u64) -> Self {
+        let mut normals = Normals::new(ChaCha8Rng::seed_from_u64(seed));
+        Self {
+            wind_at_20_ft_m_s,
+            along: normals.next(),
+            across: Transverse::stationary(&mut normals),
+            up: Transverse::stationary(&mut normals),
+            normals,
+        }
+    }
+
+    /// Whether there is any gust.
+    pub fn blow(&self) -> bool {
+        self.wind_at_20_ft_m_s > 0.0
+    }
+
+    /// Advances by a length of air, m, at a height above ground, m. Returns the gust along the mean wind, across it and
+    /// upwards, m/s.
+    pub fn step(&mut self, height_m: f64, path_m: f64) -> Vector3<f64> {
+        let scales = GustScales::at(height_m, self.wind_at_20_ft_m_s);
+        let share = path_m / scales.horizontal_m;
+        let decay = libm::exp(-share);
+        self.along = decay * self.along + (1.0 - decay * decay).sqrt() * self.normals.next();
+        self.across.step(share, &mut self.normals);
+        self.up.step(path_m / scales.vertical_m, &mut self.normals);
+        Vector3::new(
+            scales.horizontal_m_s * self.along,
+            scales.horizontal_m_s * self.across.output(),
+            scales.vertical_m_s * self.up.output(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,269 @@
+//! All parts together, one millisecond at a time.
+//!
+//! In the air a step is one Runge-Kutta step; near the ground it is several. Within a step wind, servo angles and
+//! masses are constant (masses at mid-step), while thrust and air density follow time and height. The centre of gravity
+//! moves through the body while propellant burns; that relative motion (some mm/s) is neglected in the velocities. The
+//! exhaust takes angular momentum with it (jet damping: W. T. Thomson, Introduction to Space Dynamics, section 7.7).
+
+mod build;
+mod change;
+mod getters;
+#[cfg(test)]
+mod tests;
+
+pub use build::WorldError;
+
+use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
+use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::rigid::RigidState;
+use nalgebra::{Rotation3, Vector3};
+
+use crate::STEP_S;
+use crate::aero::{Configuration, Flow, Load, Shape};
+use crate::body::{self, Inertia, Loads};
+use crate::fault::Fault;
+use crate::ground::{Ground, Rest, RestOutcome, Touchdown};
+use crate::motor::Motor;
+use crate::parachute::Parachute;
+use crate::servo::Servo;
+use crate::truth::Truth;
+use crate::wind::Wind;
+
+/// Below this clearance steps are divided, m. It is more than one step of fall at 40 m/s.
+const NEAR_M: f64 = 0.1;
+/// Number of parts of a step near the ground, where the friction of the feet is stiff.
+const PARTS: usize = 4;
+
+/// The commands of the flight computer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Actuators {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Opening angles of the four fins, rad.
+    pub fins_rad: [f64; 4],
+    /// Fires the igniter; only the first time counts.
+    pub ignite: bool,
+    /// Ejects the parachute; only the first time counts.
+    pub parachute: bool,
+}
+
+/// One vehicle, its air and its ground.
+#[derive(Debug, Clone)]
+pub struct World {
+    airframe: Airframe,
+    truth: Truth,
+    shape: Shape,
+    mass_model: MassModel,
+    motor: Motor,
+    gimbal: [Servo; 2],
+    fins: [Servo; 4],
+    parachute: Parachute,
+    wind: Wind,
+    ground: Ground,
+    steps: u64,
+    state: RigidState,
+    mass: MassProperties,
+    specific_force_m_s2: Vector3<f64>,
+    angular_acceleration_rad_s2: Vector3<f64>,
+    touchdown: Option<Touchdown>,
+    rest: Option<Rest>,
+}
+
+/// Everything that acts within one part of a step.
+struct Acting<'a> {
+    shape: &'a Shape,
+    configuration: Configuration,
+    wind_m_s: Vector3<f64>,
+    density_kg_m3: f64,
+    density_gradient_kg_m4: f64,
+    density_height_m: f64,
+    /// Thrust at the start, middle and end, N.
+    thrust_n: [f64; 3],
+    thrust_direction: Vector3<f64>,
+    thrust_place_m: Vector3<f64>,
+    /// Damping of the cross rates per newton of thrust, m s/rad.
+    jet_damping_m_s: f64,
+    ground: Option<&'a Ground>,
+}
+
+impl Loads for Acting<'_> {
+    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
+        let above_m = state.position_m.z - self.density_height_m;
+        let flow = Flow {
+            density_kg_m3: self.density_kg_m3 + self.density_gradient_kg_m4 * above_m,
+            velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
+            rate_rad_s: state.rate_rad_s,
+        };
+        let mut load = self.shape.load(&flow, &self.configuration);
+        let thrust_n = self.thrust_n[(2.0 * share) as usize];
+        if thrust_n > 0.0 {
+            load.add_at(&self.thrust_place_m, &(self.thrust_direction * thrust_n));
+            let damping_n_m_s = thrust_n * self.jet_damping_m_s;
+            load.moment_n_m.y -= damping_n_m_s * state.rate_rad_s.y;
+            load.moment_n_m.z -= damping_n_m_s * state.rate_rad_s.z;
+        }
+        if let Some(ground) = self.ground {
+            ground.add_load(&mut load, state, world_from_body, &self.configuration.cg_m);
+        }
+        load
+    }
+}
+
+impl World {
+    /// One step of a millisecond.
+    pub fn step(&mut self, actuators: &Actuators) {
+        let time_s = self.time_s();
+        self.command(actuators, time_s);
+        self.steps += 1;
+        if self.rest.is_some() {
+            return;
+        }
+        let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
+        self.parachute.step(time_s, airspeed_m_s);
+        self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S);
+        self.mass = self.mass_model.at(self.motor.burnt_kg(time_s + 0.5 * STEP_S) * self.truth.mass_scale);
+        let cg_m = self.cg_m();
+        if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
+            self.move_near_ground(time_s);
+        } else {
+            self.move_by(time_s, STEP_S, false);
+        }
+    }
+
+    /// Advances by several steps with the same commands.
+    pub fn advance(&mut self, actuators: &Actuators, steps: usize) {
+        for _ in 0..steps {
+            self.step(actuators);
+        }
+    }
+
+    /// Injects a fault.
+    pub fn inject(&mut self, fault: &Fault) {
+        self.motor.break_down(fault);
+        match *fault {
+            Fault::GimbalStuck => self.gimbal.iter_mut().for_each(Servo::stick),
+            Fault::GimbalSlow { scale } => self.gimbal.iter_mut().for_each(|servo| servo.slow(scale)),
+            Fault::FinStuck { fin } => {
+                if let Some(servo) = self.fins.get_mut(fin) {
+                    servo.stick();
+                }
+            }
+            Fault::NoLight
+            | Fault::LateLight { .. }
+            | Fault::WeakMotor { .. }
+            | Fault::EarlyBurnout { .. } => {}
+        }
+    }
+
+    fn command(&mut self, actuators: &Actuators, time_s: f64) {
+        for (servo, command_rad) in self.gimbal.iter_mut().zip(actuators.gimbal_rad) {
+            servo.step(command_rad);
+        }
+        for (servo, command_rad) in self.fins.iter_mut().zip(actuators.fins_rad) {
+            servo.step(command_rad);
+        }
+        if actuators.ignite {
+            self.motor.ignite(time_s);
+        }
+        if actuators.parachute {
+            self.parachute.eject(time_s);
+        }
+    }
+
+    /// Centre of gravity: x its station, y and z its distance from the axis, m.
+    fn cg_m(&self) -> Vector3<f64> {
+        Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + Vector3::from(self.truth.cg_offset_m)
+    }
+
+    fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
+        let cg_m = self.cg_m();
+        let air = Air::at_height_m(self.state.position_m.z);
+        let [pitch_rad, yaw_rad] =
+            [0, 1].map(|axis: usize| self.gimbal[axis].load_rad() + self.truth.thrust_misalignment_rad[axis]);
+        let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
+        let arm_m = cg_m.x;
+        let acting = Acting {
+            shape: &self.shape,
+            configuration: Configuration {
+                fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fins[fin].load_rad())),
+                parachute_area_m2: self.parachute.drag_area_m2(),
+                cg_m,
+            },
+            wind_m_s: self.wind.now_m_s(),
+            density_kg_m3: air.density_kg_m3,
+            density_gradient_kg_m4: air.density_gradient_kg_m4(),
+            density_height_m: self.state.position_m.z,
+            thrust_n: [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s)),
+            thrust_direction: Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw),
+            thrust_place_m: Vector3::new(0.0, self.truth.thrust_offset_m[0], self.truth.thrust_offset_m[1])
+                - cg_m,
+            jet_damping_m_s: self.motor.flow_kg_n_s() * (arm_m * arm_m + self.mass.pitch_inertia_slope_m2),
+            ground: near_ground.then_some(&self.ground),
+        };
+        let inertia = Inertia {
+            mass_kg: self.mass.mass_kg,
+            pitch_kg_m2: self.mass.pitch_inertia_kg_m2,
+            roll_kg_m2: self.mass.roll_inertia_kg_m2,
+        };
+        let (state, specific_force_m_s2) =
+            body::rk4_step(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s);
+        self.angular_acceleration_rad_s2 = (state.rate_rad_s - self.state.rate_rad_s) / step_s;
+        self.specific_force_m_s2 = specific_force_m_s2;
+        self.state = state;
+    }
+
+    fn move_near_ground(&mut self, from_s: f64) {
+        let part_s = STEP_S / PARTS as f64;
+        let (mut specific_force, mut angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
+        for part in 0..PARTS {
+            let time_s = from_s + part_s * part as f64;
+            let before = self.state;
+            self.move_by(time_s, part_s, true);
+            specific_force += self.specific_force_m_s2;
+            angular_acceleration += self.angular_acceleration_rad_s2;
+            let contact = self.ground.contact(&self.state, &self.cg_m());
+            if self.touchdown.is_none() && contact.any() {
+                // The last state before contact: within this part the feet have already pushed.
+                self.touchdown = Some(self.touchdown_at(time_s, &before));
+            }
+            if self.touchdown.is_some() {
+                let thrust_over_weight = self.motor.thrust_n(time_s) / self.weight_n();
+                let outcome = self.ground.outcome(&self.state, contact, thrust_over_weight, part_s);
+                if let Some(outcome) = outcome {
+                    self.come_to_rest(time_s + part_s, outcome);
+                    return;
+                }
+            }
+        }
+        self.specific_force_m_s2 = specific_force / PARTS as f64;
+        self.angular_acceleration_rad_s2 = angular_acceleration / PARTS as f64;
+    }
+
+    fn touchdown_at(&self, time_s: f64, state: &RigidState) -> Touchdown {
+        let (velocity, rate) = (&state.velocity_m_s, &state.rate_rad_s);
+        Touchdown {
+            time_s,
+            state: *state,
+            vertical_m_s: velocity.z,
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            tilt_rad: state.tilt_rad(),
+            rate_rad_s: rate.norm_squared().sqrt(),
+            cross_rate_rad_s: libm::hypot(rate.y, rate.z),
+            thrust_n: self.motor.thrust_n(time_s),
+            weight_n: self.weight_n(),
+        }
+    }
+
+    /// The vehicle does not move from now on.
+    fn come_to_rest(&mut self, time_s: f64, outcome: RestOutcome) {
+        self.rest = Some(Rest { time_s, outcome, tilt_rad: self.state.tilt_rad() });
+        self.state.velocity_m_s = Vector3::zeros();
+        self.state.rate_rad_s = Vector3::zeros();
+        self.angular_acceleration_rad_s2 = Vector3::zeros();
+        self.specific_force_m_s2 = self.state.world_from_body.inverse_transform_vector(&Vector3::new(
+            0.0,
+            0.0,
+            STANDARD_GRAVITY_M_S2,
+        ));
+    }
+}

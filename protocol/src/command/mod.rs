@@ -1,0 +1,133 @@
+//! Parses MAVLink commands, builds their answers, and sends commands with retries.
+//!
+//! Protocol: <https://mavlink.io/en/services/command.html>. Requests and answers hold numbers instead of the
+//! dialect's enums, because a command that the dialect does not know must still be answered UNSUPPORTED.
+
+mod sender;
+
+use crate::dialect::{MavCmd, MavResult};
+use crate::frame::{Encoder, Frame};
+use crate::identity::Address;
+
+pub use sender::{CommandEvent, CommandSender, Resend, Ticket};
+
+const COMMAND_INT_ID: u32 = 75;
+const COMMAND_LONG_ID: u32 = 76;
+const COMMAND_ACK_ID: u32 = 77;
+
+/// A command as received, from COMMAND_LONG or COMMAND_INT.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandRequest {
+    pub source: Address,
+    /// The addressed component; id 0 means all.
+    pub target: Address,
+    /// MAV_CMD number, which may be unknown.
+    pub command: u16,
+    /// Parameters 1 to 7; unused ones may be NaN. COMMAND_INT's integers are converted.
+    pub params: [f32; 7],
+    /// How often the sender has sent it before.
+    pub confirmation: u8,
+}
+
+impl CommandRequest {
+    /// Parses the request in a COMMAND_LONG or COMMAND_INT frame; returns `None` for any other message.
+    pub fn from_frame(frame: &Frame) -> Option<Self> {
+        let payload = frame.padded_payload();
+        let float =
+            |at: usize| f32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]);
+        let integer = |at: usize| {
+            i32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]) as f32
+        };
+        let (params, confirmation) = match frame.message_id() {
+            COMMAND_LONG_ID => {
+                ([float(0), float(4), float(8), float(12), float(16), float(20), float(24)], payload[32])
+            }
+            COMMAND_INT_ID => {
+                ([float(0), float(4), float(8), float(12), integer(16), integer(20), float(24)], 0)
+            }
+            _ => return None,
+        };
+        Some(Self {
+            source: frame.source(),
+            target: Address { system_id: payload[30], component_id: payload[31] },
+            command: u16::from_le_bytes([payload[28], payload[29]]),
+            params,
+            confirmation,
+        })
+    }
+
+    /// Returns whether the request is this MAV_CMD.
+    pub fn is(&self, command: MavCmd) -> bool {
+        self.command == command as u16
+    }
+}
+
+/// An answer to a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CommandAnswer {
+    /// MAV_CMD number of the request.
+    pub command: u16,
+    /// MAV_RESULT number.
+    pub result: u8,
+    /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
+    pub progress: u8,
+    /// The component that the answer is for.
+    pub target: Address,
+}
+
+impl CommandAnswer {
+    pub fn to(request: &CommandRequest, result: MavResult) -> Self {
+        Self { command: request.command, result: result as u8, progress: 0, target: request.source }
+    }
+
+    /// Encodes the answer as a COMMAND_ACK frame.
+    pub fn encode(&self, encoder: &mut Encoder) -> Option<Frame> {
+        let command = self.command.to_le_bytes();
+        let payload = [
+            command[0],
+            command[1],
+            self.result,
+            self.progress,
+            0,
+            0,
+            0,
+            0,
+            self.target.system_id,
+            self.target.component_id,
+        ];
+        encoder.encode_payload(COMMAND_ACK_ID, &payload)
+    }
+
+    /// Parses the answer in a COMMAND_ACK frame; returns `None` for any other message.
+    pub fn from_frame(frame: &Frame) -> Option<Self> {
+        if frame.message_id() != COMMAND_ACK_ID {
+            return None;
+        }
+        let payload = frame.padded_payload();
+        Some(Self {
+            command: u16::from_le_bytes([payload[0], payload[1]]),
+            result: payload[2],
+            progress: payload[3],
+            target: Address { system_id: payload[8], component_id: payload[9] },
+        })
+    }
+
+    /// The result in words, for the operator.
+    pub fn result_words(&self) -> &'static str {
+        result_words(self.result)
+    }
+}
+
+/// A MAV_RESULT number in words, for the operator.
+pub fn result_words(result: u8) -> &'static str {
+    match result {
+        0 => "accepted",
+        1 => "temporarily rejected",
+        2 => "denied",
+        3 => "unsupported",
+        4 => "failed",
+        5 => "in progress",
+        6 => "cancelled",
+        _ => "answered with an unknown result",
+    }
+}

@@ -1,0 +1,173 @@
+//! Converts bytes into checked MAVLink frames and messages into frames, without I/O.
+//!
+//! [`Framer`] keeps what the crate `mavlink` would drop: the exact bytes of a frame (for the log), counters of what
+//! was rejected and why, and frames whose fields hold values outside the dialect (so that an unknown command can
+//! still be answered). It accepts MAVLink 2 only: MAVLink 1 has a one-byte marker and unchecked ids, so its framer
+//! would wait on noise for bytes that never come. Wire format: <https://mavlink.io/en/guide/serialization.html>.
+
+mod encoder;
+mod framer;
+
+use mavlink::{MavlinkVersion, Message as _};
+
+use crate::dialect::MavMessage;
+use crate::identity::Address;
+
+pub use encoder::Encoder;
+pub use framer::{Framer, FramerCounters};
+
+const MAGIC: u8 = 0xFD;
+const HEADER_LEN: usize = 10;
+const CRC_LEN: usize = 2;
+/// Length of a signature, bytes: link id, six bytes of timestamp, six of hash.
+pub const SIGNATURE_LEN: usize = 13;
+const INCOMPAT_SIGNED: u8 = 0x01;
+/// The message SETUP_SIGNING, which contains a key in the clear.
+const SETUP_SIGNING_ID: u32 = 256;
+
+/// One whole frame with a correct CRC.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    bytes: Vec<u8>,
+}
+
+impl Frame {
+    /// Returns the frame's bytes as they were on the wire, from start marker to signature.
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    pub fn sequence(&self) -> u8 {
+        self.bytes[4]
+    }
+
+    pub fn source(&self) -> Address {
+        Address { system_id: self.bytes[5], component_id: self.bytes[6] }
+    }
+
+    pub fn message_id(&self) -> u32 {
+        self.view().message_id()
+    }
+
+    /// Returns the payload as sent; trailing zeros may be cut.
+    pub fn payload(&self) -> &[u8] {
+        &self.bytes[HEADER_LEN..HEADER_LEN + usize::from(self.bytes[1])]
+    }
+
+    /// Returns the payload with the trailing zeros that the sender cut.
+    pub fn padded_payload(&self) -> [u8; 255] {
+        let mut padded = [0; 255];
+        let payload = self.payload();
+        padded[..payload.len()].copy_from_slice(payload);
+        padded
+    }
+
+    pub fn crc(&self) -> u16 {
+        let at = HEADER_LEN + usize::from(self.bytes[1]);
+        u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]])
+    }
+
+    /// Returns whether the frame has a signature, right or wrong.
+    pub fn is_signed(&self) -> bool {
+        self.bytes[2] & INCOMPAT_SIGNED != 0
+    }
+
+    /// Returns link id, timestamp and the first six bytes of the hash, as they are on the wire; `None` if the frame
+    /// is unsigned.
+    pub(crate) fn signature(&self) -> Option<&[u8]> {
+        self.is_signed().then(|| &self.bytes[self.bytes.len() - SIGNATURE_LEN..])
+    }
+
+    /// Returns the same frame marked as signed, without its signature, which must follow.
+    pub(crate) fn marked_signed(&self) -> Self {
+        self.with_flags(INCOMPAT_SIGNED)
+    }
+
+    /// Appends a signature to a frame that is marked as signed.
+    pub(crate) fn push_signature(&mut self, signature: &[u8; SIGNATURE_LEN]) {
+        self.bytes.extend_from_slice(signature);
+    }
+
+    /// Returns the same message unsigned.
+    #[must_use]
+    pub fn without_signature(&self) -> Self {
+        if self.is_signed() { self.with_flags(0) } else { self.clone() }
+    }
+
+    /// Returns the bytes that may be logged: without the signature, and `None` for a message that contains a key.
+    pub fn for_log(&self) -> Option<Vec<u8>> {
+        (self.message_id() != SETUP_SIGNING_ID).then(|| self.without_signature().bytes)
+    }
+
+    fn with_flags(&self, flags: u8) -> Self {
+        let crc_at = HEADER_LEN + usize::from(self.bytes[1]);
+        let mut bytes = self.bytes[..crc_at].to_vec();
+        bytes[2] = flags;
+        // The id of a frame is always in the dialect; the framer checks it.
+        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
+        bytes.extend_from_slice(&crc.to_le_bytes());
+        Self { bytes }
+    }
+
+    ///
+    /// # Errors
+    /// A field holds a value that the dialect does not define.
+    pub fn decode(&self) -> Result<MavMessage, DecodeError> {
+        self.view().decode()
+    }
+
+    fn view(&self) -> FrameView<'_> {
+        FrameView { bytes: &self.bytes }
+    }
+}
+
+/// A frame inside the buffer of a [`Framer`], for code that only decodes it: nothing is copied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameView<'a> {
+    bytes: &'a [u8],
+}
+
+impl FrameView<'_> {
+    /// Message id.
+    #[inline]
+    pub fn message_id(&self) -> u32 {
+        u32::from_le_bytes([self.bytes[7], self.bytes[8], self.bytes[9], 0])
+    }
+
+    ///
+    /// # Errors
+    /// A field holds a value that the dialect does not define.
+    #[inline]
+    pub fn decode(&self) -> Result<MavMessage, DecodeError> {
+        let payload = &self.bytes[HEADER_LEN..HEADER_LEN + usize::from(self.bytes[1])];
+        match MavMessage::parse(MavlinkVersion::V2, self.message_id(), payload) {
+            Ok(message) => Ok(message),
+            Err(error) => Err(DecodeError { message_id: self.message_id(), reason: error.to_string() }),
+        }
+    }
+
+    /// Copies the frame.
+    pub fn to_frame(&self) -> Frame {
+        Frame { bytes: self.bytes.to_vec() }
+    }
+}
+
+/// A frame with a correct CRC whose fields could not be decoded.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("message {message_id}: {reason}")]
+pub struct DecodeError {
+    pub message_id: u32,
+    /// The parser's message.
+    pub reason: String,
+}
+
+/// Returns the dialect's CRC seed (CRC_EXTRA) of a message; `None` for an id outside the dialect.
+///
+/// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so both cases must be told apart.
+#[inline]
+fn crc_extra(message_id: u32) -> Option<u8> {
+    match MavMessage::extra_crc(message_id) {
+        0 if MavMessage::default_message_from_id(message_id).is_none() => None,
+        extra => Some(extra),
+    }
+}

@@ -1,0 +1,220 @@
+//! Combines several links to the same peer, without I/O: it takes the bytes of each link and returns frames and link
+//! events; it takes a frame and returns the bytes for each link.
+//!
+//! A frame that arrives over more than one link is passed on once. With a key, a frame without a valid signature is
+//! not passed on. Every link has its own framing and its own statistics.
+
+mod received;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::duplicate::Duplicates;
+use crate::frame::{Frame, Framer, FramerCounters};
+use crate::link_stats::LinkStats;
+use crate::signing::{Rejection, Signing, SigningCounters};
+
+pub use received::{Origin, Received, StreamId};
+
+/// This many streams of one link may be open at the same time.
+const MAX_STREAMS: usize = 8;
+
+/// Something that happened on a link.
+#[derive(Debug, Clone, PartialEq)]
+pub enum News {
+    /// A valid frame that was not heard before.
+    Frame(Frame),
+    /// A frame that had already arrived over another link.
+    Copy(Frame),
+    /// A frame whose signature is missing or wrong although a key is set; it must not be acted on.
+    Rejected(Frame, Rejection),
+    /// A frame of this sender was accepted; that frame follows. The caller must pass this on to the link
+    /// (`transport::TransportSender::believe`).
+    Believed(Origin),
+    /// The link does not answer some senders; the text says how many.
+    Strangers(String),
+    /// The link works; the text names the peer.
+    Up(String),
+    /// The link does not work; the text says why.
+    Down(String),
+}
+
+#[derive(Debug, Default)]
+pub struct HubLink {
+    datagrams: Framer,
+    streams: BTreeMap<StreamId, Framer>,
+    /// Counters of the streams that have ended.
+    ended_streams: FramerCounters,
+    stats: LinkStats,
+    trouble: Option<String>,
+    copies: u64,
+}
+
+impl HubLink {
+    pub fn stats(&self) -> &LinkStats {
+        &self.stats
+    }
+
+    /// Returns the framing counters of all streams of this link.
+    pub fn framing(&self) -> FramerCounters {
+        let mut sum = self.ended_streams;
+        for framer in self.streams.values().chain([&self.datagrams]) {
+            sum += framer.counters();
+        }
+        sum
+    }
+
+    /// Returns why the link does not work, if it does not.
+    pub fn trouble(&self) -> Option<&str> {
+        self.trouble.as_deref()
+    }
+
+    /// Returns how many frames had already arrived over another link.
+    pub fn copies(&self) -> u64 {
+        self.copies
+    }
+
+    fn take(&mut self, received: Received, now: Duration) -> Taken {
+        let (framer, bytes, origin) = match received {
+            Received::Datagram { from, bytes } => {
+                self.datagrams.push_datagram(&bytes);
+                (&mut self.datagrams, bytes.len(), Origin::Datagram(from))
+            }
+            Received::Stream(id, bytes) => {
+                if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(&id) {
+                    // The transport opens no more streams than this; the bytes of a further one are dropped.
+                    return Taken::Nothing;
+                }
+                let framer = self.streams.entry(id).or_default();
+                framer.push(&bytes);
+                (framer, bytes.len(), Origin::Stream(id))
+            }
+            Received::Silence(id) => match self.streams.get_mut(&id) {
+                Some(framer) => {
+                    framer.on_silence();
+                    (framer, 0, Origin::Stream(id))
+                }
+                None => return Taken::Nothing,
+            },
+            Received::Gone(id) => {
+                if let Some(framer) = self.streams.remove(&id) {
+                    self.ended_streams += framer.counters();
+                }
+                return Taken::Nothing;
+            }
+            Received::Strangers(words) => return Taken::News(News::Strangers(words)),
+            Received::Up(peer) => {
+                self.trouble = None;
+                return Taken::News(News::Up(peer));
+            }
+            Received::Down(why) => {
+                self.trouble = Some(why.clone());
+                return Taken::News(News::Down(why));
+            }
+        };
+        let frames: Vec<Frame> = std::iter::from_fn(|| framer.next_frame()).collect();
+        if bytes > 0 {
+            self.stats.on_rx_bytes(bytes, now);
+        }
+        Taken::Frames(frames, origin)
+    }
+}
+
+enum Taken {
+    Nothing,
+    News(News),
+    Frames(Vec<Frame>, Origin),
+}
+
+#[derive(Debug)]
+pub struct Hub {
+    links: Vec<HubLink>,
+    duplicates: Duplicates,
+    signing: Option<Signing>,
+}
+
+impl Hub {
+    /// Creates this many links. With `signing`, frames that are sent are signed and frames that arrive are checked.
+    pub fn new(links: usize, signing: Option<Signing>) -> Self {
+        Self {
+            links: (0..links).map(|_| HubLink::default()).collect(),
+            duplicates: Duplicates::new(),
+            signing,
+        }
+    }
+
+    /// The links, ordered by their numbers.
+    pub fn links(&self) -> &[HubLink] {
+        &self.links
+    }
+
+    /// Takes what a link received. `clock` is the wall clock as a timestamp ([`crate::signing::stamp_of`]), which
+    /// only signatures need. An unknown link number is ignored.
+    pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<News> {
+        let Some(of) = self.links.get_mut(link) else { return Vec::new() };
+        let (frames, origin) = match of.take(received, now) {
+            Taken::Nothing => return Vec::new(),
+            Taken::News(news) => return vec![news],
+            Taken::Frames(frames, origin) => (frames, origin),
+        };
+        let mut news: Vec<News> =
+            frames.into_iter().map(|frame| self.judge(link, frame, now, clock)).collect();
+        if news.iter().any(|news| self.proves_its_sender(news)) {
+            news.insert(0, News::Believed(origin));
+        }
+        news
+    }
+
+    /// With a key the frame must be signed: a radio's report is accepted unsigned, and anybody can forge one.
+    fn proves_its_sender(&self, news: &News) -> bool {
+        match news {
+            News::Frame(frame) | News::Copy(frame) => self.signing.is_none() || frame.is_signed(),
+            _ => false,
+        }
+    }
+
+    fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> News {
+        if let Some(signing) = &mut self.signing
+            && let Err(rejection) = signing.check(&frame, clock)
+        {
+            return News::Rejected(frame, rejection);
+        }
+        // A rejected frame is no sign of life either, so it does not count in the statistics.
+        self.links[link].stats.on_frame(&frame, now);
+        // The signature is checked first: a forged frame must not turn the true one into a copy.
+        if self.duplicates.is_copy(&frame, link, now) {
+            self.links[link].copies += 1;
+            return News::Copy(frame);
+        }
+        News::Frame(frame)
+    }
+
+    /// Returns the bytes of a frame for one link; with a key they are signed for this link alone.
+    pub fn bytes_for(&mut self, link: usize, frame: &Frame, clock: u64) -> Vec<u8> {
+        match &mut self.signing {
+            // Links beyond the 256th share an id, which costs nothing but exact statistics.
+            Some(signing) => signing.sign(frame, link as u8, clock).as_bytes().to_vec(),
+            None => frame.as_bytes().to_vec(),
+        }
+    }
+
+    /// Counts bytes that a link has sent.
+    pub fn on_sent(&mut self, link: usize, bytes: usize, now: Duration) {
+        if let Some(of) = self.links.get_mut(link) {
+            of.stats.on_tx_bytes(bytes, now);
+        }
+    }
+
+    /// Returns how many frames were accepted and rejected; `None` without a key.
+    pub fn signing(&self) -> Option<SigningCounters> {
+        self.signing.as_ref().map(Signing::counters)
+    }
+
+    /// Returns the timestamps that must survive a restart; `None` without a key.
+    pub fn signing_memory(&self) -> Option<crate::signing::Memory> {
+        self.signing.as_ref().map(Signing::memory)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,123 @@
+//! The whole flight computer, from power-up on. One path for both vehicles.
+
+use std::collections::BTreeMap;
+
+use flight::computer::plane::PlaneError;
+use flight::computer::{Computer, Output, flight_time_s};
+use flight::guidance::baseline::{Controller, Law, UnknownController};
+use prost_reflect::MessageDescriptor;
+use protocol::log::{computer_v1, flight_v1, v1};
+use tick_log::computer::{frame_to_log, input_from_log};
+use tick_log::pilot::state_from_log;
+
+use super::{FrameError, LoggedPilot, Moment, Replayed, phase_name};
+use crate::log::computer_descriptor;
+use crate::settings::{SettingError, profile_with};
+
+/// Why a flight computer cannot be built as it was at power-up.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    #[error(transparent)]
+    Plane(#[from] PlaneError),
+    #[error("controller {0}")]
+    Controller(#[from] UnknownController),
+    #[error("its record /computer/start must name one vehicle, in space or in the plane")]
+    NoVehicle,
+}
+
+/// A flight computer that is fed from a log, from power-up on. Frames must come in order. Missing frames mean that the
+/// computer was restarted: it is restarted here too.
+#[derive(Debug, Clone)]
+pub struct LoggedComputer {
+    computer: Computer,
+    /// The frame after the last one.
+    next: Option<u64>,
+    rehearsed: bool,
+    last: Option<Output>,
+}
+
+impl LoggedComputer {
+    /// The flight computer that a log's frames came from, before its first frame: of the text of its profile or mission, and
+    /// of the law that its run facts name.
+    ///
+    /// # Errors
+    /// The text is none of this build, or a name is unknown.
+    pub fn recorded(
+        toml: &str,
+        start: &computer_v1::ComputerStart,
+        run: &BTreeMap<String, String>,
+    ) -> Result<Self, StartError> {
+        let computer = match (&start.in_space, &start.in_plane) {
+            (Some(start), None) => {
+                let schedule = LoggedPilot::schedule(toml, start, &[])?;
+                let controller = run.get("controller").map(|name| name.parse::<Controller>()).transpose()?;
+                let law = Law::of(controller.unwrap_or_default(), schedule.base());
+                Computer::in_space(schedule.base(), law, &state_from_log(&start.believed))
+            }
+            (None, Some(release)) => {
+                let profile = profile_with(toml, &[])?;
+                Computer::in_plane(&profile, tick_log::state_from_log(release))?
+            }
+            _ => return Err(StartError::NoVehicle),
+        };
+        Ok(Self { computer, next: None, rehearsed: false, last: None })
+    }
+
+    /// The pilot's part of the last frame, as a log has it; `None` on the pad, and of the planar vehicle.
+    pub fn pilot_tick(&self) -> Option<flight_v1::PilotTick> {
+        let (input, output) = self.computer.piloted()?;
+        Some(tick_log::pilot::tick_to_log(input, output, self.computer.flight_digest()))
+    }
+
+    /// The landing controller's tick in the last frame, as a log has it but for its measured times; `None` if none fell into
+    /// it, and of a rocket in space.
+    pub fn controller_tick(&self) -> Option<v1::ControllerTick> {
+        let tick = self.last.as_ref()?.tick.as_ref()?;
+        Some(tick_log::tick_to_log(&tick.input, &tick.output, tick.state_digest, 0.0, 0.0))
+    }
+}
+
+impl Replayed for LoggedComputer {
+    type Tick = computer_v1::ComputerFrame;
+    type Error = FrameError;
+
+    fn descriptor() -> Option<MessageDescriptor> {
+        computer_descriptor()
+    }
+
+    fn moment(frame: &computer_v1::ComputerFrame) -> Moment {
+        let input = &frame.input;
+        Moment { tick: input.frame, time_s: input.time_s, phase: phase_name(frame.output.phase) }
+    }
+
+    fn apart(a: &computer_v1::ComputerFrame, b: &computer_v1::ComputerFrame) -> (f64, Option<f64>) {
+        let axes = a.output.gimbal_rad.iter().zip(&b.output.gimbal_rad);
+        (axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max), None)
+    }
+
+    fn run_again(
+        &mut self,
+        frame: &computer_v1::ComputerFrame,
+    ) -> Result<computer_v1::ComputerFrame, FrameError> {
+        let read = input_from_log(&frame.input)?;
+        let number = frame.input.frame;
+        if let Some(next) = self.next {
+            if number < next {
+                return Err(FrameError::Order { frame: number, after: next - 1 });
+            }
+            if number > next {
+                // It was dead meanwhile, and came back at the end of the frame before this.
+                self.computer.restart(flight_time_s(number - 1));
+            }
+        }
+        self.next = Some(number.saturating_add(1));
+        let input = read.input();
+        let output = self.computer.step(&input);
+        let again = frame_to_log(&input, &output, &self.computer, self.rehearsed);
+        self.rehearsed |= input.rehearsed.is_some();
+        self.last = Some(output);
+        Ok(again)
+    }
+}

@@ -1,0 +1,150 @@
+//! A flight computer run again from power-up on, and the ticks that its log has beside its frames.
+//!
+//! A log holds what a frame decided twice: as the frame itself, and as the pilot's or the landing controller's tick, which the
+//! other tools read. Both are compared with the same run of the computer. They belong together by their numbers, so that a
+//! tool may have sorted the records.
+
+use std::collections::BTreeMap;
+
+use protocol::log::{computer_v1, flight_v1, v1};
+
+use super::report::{FramesReport, Obstacle};
+use super::tally::Tally;
+use super::verifier::Verifier;
+use crate::controller::{LoggedComputer, LoggedController, LoggedPilot, Replayed};
+use crate::log::{FrameOrder, Gap};
+
+/// A tick of either vehicle.
+#[derive(Debug, Clone)]
+pub(super) enum Tick {
+    Plane(Box<v1::ControllerTick>),
+    Space(Box<flight_v1::PilotTick>),
+}
+
+impl Tick {
+    fn number(&self) -> u64 {
+        match self {
+            Self::Plane(tick) => tick.input.tick,
+            Self::Space(tick) => tick.input.frame,
+        }
+    }
+}
+
+/// The flight computer being run again.
+pub(super) struct FromPowerUp {
+    verifier: Verifier<LoggedComputer>,
+    order: FrameOrder,
+    recorded: u64,
+    ticks: Tally,
+    /// Ticks that were made again, and their records have not come yet.
+    made: BTreeMap<u64, Tick>,
+    /// Recorded ticks whose frames have not come yet.
+    waiting: BTreeMap<u64, Tick>,
+    last_compared: Option<u64>,
+    obstacle: Option<Obstacle>,
+}
+
+impl FromPowerUp {
+    pub(super) fn new(computer: LoggedComputer, order: FrameOrder) -> Self {
+        Self {
+            verifier: Verifier::new(computer),
+            order,
+            recorded: 0,
+            ticks: Tally::default(),
+            made: BTreeMap::new(),
+            waiting: BTreeMap::new(),
+            last_compared: None,
+            obstacle: None,
+        }
+    }
+
+    /// Whether every frame so far was run again.
+    pub(super) fn is_unbroken(&self) -> bool {
+        self.obstacle.is_none()
+    }
+
+    /// Takes a frame; `sequence` is its record's number within its channel.
+    pub(super) fn take_frame(&mut self, frame: &computer_v1::ComputerFrame, sequence: u32) {
+        self.recorded += 1;
+        let lost = self.order.note(frame.input.frame, sequence);
+        if self.obstacle.is_some() {
+            return;
+        }
+        self.obstacle = match lost {
+            Some(Gap { after, before }) => Some(Obstacle::FramesLost { after, before }),
+            None => self.verifier.check(frame).err().map(Obstacle::Frame),
+        };
+        if self.obstacle.is_none() {
+            let computer = self.verifier.controller();
+            let made = computer.controller_tick().map(|tick| Tick::Plane(Box::new(tick)));
+            let made = made.or_else(|| computer.pilot_tick().map(|tick| Tick::Space(Box::new(tick))));
+            if let Some(made) = made {
+                match self.waiting.remove(&made.number()) {
+                    Some(recorded) => self.compare(&recorded, made),
+                    None => {
+                        self.made.insert(made.number(), made);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes a recorded tick.
+    pub(super) fn take_tick(&mut self, recorded: Tick) {
+        let number = recorded.number();
+        match self.made.remove(&number) {
+            Some(made) => self.compare(&recorded, made),
+            None if self.last_compared.is_some_and(|last| number <= last) => {
+                self.obstacle.get_or_insert(Obstacle::Repeated { tick: number });
+            }
+            None => {
+                if self.waiting.insert(number, recorded).is_some() {
+                    self.obstacle.get_or_insert(Obstacle::Repeated { tick: number });
+                }
+            }
+        }
+    }
+
+    fn compare(&mut self, recorded: &Tick, made: Tick) {
+        self.last_compared = self.last_compared.max(Some(recorded.number()));
+        match (recorded, made) {
+            (Tick::Plane(recorded), Tick::Plane(mut made)) => {
+                // Measured, not decided.
+                (made.solve_time_s, made.deadline_s) = (recorded.solve_time_s, recorded.deadline_s);
+                compare::<LoggedController>(&mut self.ticks, recorded, &made);
+            }
+            (Tick::Space(recorded), Tick::Space(made)) => {
+                compare::<LoggedPilot>(&mut self.ticks, recorded, &made);
+            }
+            (recorded, _) => {
+                self.obstacle.get_or_insert(Obstacle::TickWithoutFrame { tick: recorded.number() });
+            }
+        }
+    }
+
+    /// The ticks compared, the frames compared, and why not all of them were. `whole`: the log was read to its end.
+    pub(super) fn finish(mut self, whole: bool) -> (Tally, FramesReport, Option<Obstacle>) {
+        if whole {
+            // A tick that was made and is not in the log, though a later one is.
+            let lost = self.made.keys().find(|tick| self.last_compared > Some(**tick));
+            let alone = self.waiting.keys().next();
+            let missing = lost.map(|tick| Obstacle::TickLost { tick: *tick });
+            let missing = missing.or(alone.map(|tick| Obstacle::TickWithoutFrame { tick: *tick }));
+            self.obstacle = self.obstacle.or(missing);
+        }
+        let frames = self.verifier.tally;
+        let report = FramesReport {
+            recorded: self.recorded,
+            compared: frames.ticks,
+            different: frames.ticks_different,
+            first_divergence: frames.divergence,
+            until_s: frames.last.map(|last| last.time_s),
+        };
+        (self.ticks, report, self.obstacle)
+    }
+}
+
+fn compare<C: Replayed>(tally: &mut Tally, recorded: &C::Tick, made: &C::Tick) {
+    let descriptor = C::descriptor();
+    tally.compare(C::moment(made), descriptor.as_ref(), (recorded, made), || C::apart(recorded, made));
+}

@@ -1,0 +1,67 @@
+//! Screens that are attached to a station in another process, and what they show when it dies.
+
+use e2e::{ABORT, Signal};
+
+use crate::rig::Pad;
+
+fn aborts_sent(pad: &Pad) -> usize {
+    pad.proxy.commands().iter().filter(|request| request.is(ABORT)).count()
+}
+
+#[test]
+fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_station() {
+    let pad = Pad::new();
+    let first = pad.daemon("first.mcap");
+    let mut screen = pad.attach(&[], &[]);
+    let watching = pad.attach(&["--watch"], &[]);
+    screen.wait_for("GO: every arming check passes");
+    watching.wait_for("GO: every arming check passes");
+    first.signal(Signal::SIGKILL);
+    first.wait();
+    screen.wait_for("LINK DOWN: the ground station of this screen is gone");
+    // This page has no list of events.
+    screen.type_bytes(b"2");
+    screen.wait_for("[2Descent]");
+    screen.type_bytes(b"\x18\r");
+    screen.wait_for("ABORT NOT SENT");
+    assert_eq!(aborts_sent(&pad), 0);
+    let second = pad.daemon("second.mcap");
+    for shown in [&screen, &watching] {
+        // The second station has another clock than the first; its values must not look old, nor the link lost.
+        shown.wait_until("the abort, by the second station", |window| {
+            let rows = window.rows();
+            let heard = rows[1].contains(" down 0s up 0s") && rows[1].starts_with(" PAD_IDLE ");
+            (heard && rows[2].contains("acknowledged accepted  observed yes")).then_some(())
+        });
+    }
+    assert!(aborts_sent(&pad) >= 1);
+    second.signal(Signal::SIGTERM);
+    assert_eq!(second.wait().code, Some(4), "the exit code of an aborted flight");
+}
+
+#[test]
+fn a_terminal_that_cannot_show_a_screen_gets_lines() {
+    let pad = Pad::new();
+    let daemon = pad.daemon("flight.mcap");
+    for environment in [[("TERM", "dumb")], [("TERM", "")]] {
+        let mut lines = pad.attach(&[], &environment);
+        lines.wait_for("PAD_IDLE");
+        lines.signal(Signal::SIGTERM);
+        assert_eq!(lines.wait_for_end(), Some(0));
+        assert!(
+            lines.is_restored() && !lines.window().bytes().contains(&0x1B),
+            "the output contains an escape sequence"
+        );
+    }
+    let mut ascii = pad.attach(&[], &[("LC_ALL", "C"), ("NO_COLOR", "1")]);
+    ascii.wait_for("[1Pad]");
+    ascii.wait_for("Arming ladder ---");
+    assert!(ascii.window().bytes().is_ascii());
+    // In ECMA-48's SGR, 30 to 37 are colours and 38 begins a longer colour sequence; none of them may remain.
+    let coloured = |bytes: &[u8]| bytes.windows(3).any(|found| found == b"[38" || found == b"[31");
+    assert!(!coloured(ascii.window().bytes()));
+    ascii.type_bytes(b"q");
+    assert_eq!(ascii.wait_for_end(), Some(0));
+    daemon.signal(Signal::SIGTERM);
+    assert_eq!(daemon.wait().code, Some(5), "the exit code without a flight");
+}
