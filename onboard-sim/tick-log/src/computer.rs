@@ -51,7 +51,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
     let (mut measured, mut known, mut in_plane) = (None, None, None);
     match &input.feeling {
         Feeling::InSpace(Sensed::Measured(measurements)) => {
-            measured = Some(measurements_to_log(measurements))
+            measured = Some(measurements_to_log(measurements));
         }
         Feeling::InSpace(Sensed::Known(estimate)) => known = Some(estimate_to_log(estimate)),
         Feeling::InPlane(sensed) => in_plane = Some(plane_to_log(sensed)),
@@ -214,7 +214,7 @@ fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotL
 
 fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, PilotLogError> {
     let most = usize::from(u8::MAX);
-    u8::try_from(number).map_err(|_| PilotLogError::Unknown { frame, what, found: number, most })
+    u8::try_from(number).map_err(|_too_large| PilotLogError::Unknown { frame, what, found: number, most })
 }
 
 #[cfg(test)]

@@ -149,7 +149,7 @@ fn records_of_chunk(body: &[u8]) -> mcap::McapResult<Vec<Record<'static>>> {
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
         .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(RECORD_LIMIT_BYTES as usize);
+        .with_record_length_limit(RECORD_LIMIT_BYTES);
     let mut reader = LinearReader::new_with_options(options);
     let head: Vec<u8> = std::iter::once(op::CHUNK).chain((body.len() as u64).to_le_bytes()).collect();
     let mut input = head.as_slice().chain(body);

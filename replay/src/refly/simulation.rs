@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use flight::computer::Computer;
-use flight::computer::plane::{Moment, PlanarLaw, PlanarTick, PlaneError};
+use flight::computer::plane::{Moment, PlanarLaw, PlanarTick, Plane, PlaneError};
 use flight::rules::phase::Phase;
 use flight::rules::verdict::TouchdownLimits;
 use flight::vehicle::profile::Profile;
@@ -74,7 +74,7 @@ fn plant_at_start(
 ) -> Plant {
     let sample_s = profile.nmpc.sample_time_s;
     let steps = |time_s: f64| ((time_s / sample_s).round() * (sample_s / STEP_S).round()) as u64;
-    let lit_at = computer.plane().and_then(|plane| plane.ignited_at_s()).map(steps);
+    let lit_at = computer.plane().and_then(Plane::ignited_at_s).map(steps);
     let mut plant = Plant::new(plant_profile, draw);
     plant.command(start.gimbal_rad, start.fins_rad);
     let until = steps(start.input.time_s);

@@ -79,7 +79,7 @@ pub struct Input<'a> {
     pub late: bool,
 }
 
-impl<'a> Input<'a> {
+impl Input<'_> {
     /// A frame in the air of a computer that was [released at once](Computer::released), by what a pilot's log holds of it:
     /// nobody watches, and a recorded abort is asked for.
     pub fn in_the_air(input: &PilotInput) -> Self {

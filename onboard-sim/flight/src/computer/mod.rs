@@ -240,7 +240,7 @@ impl Computer {
             igniter_continuity: input.igniter_continuity,
             abort,
         };
-        let PilotOutput { gimbal_rad, fins_rad, level, .. } = space.fly(&mut self.table, input);
+        let PilotOutput { gimbal_rad, fins_rad, level, .. } = space.fly(&mut self.table, &input);
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
         let phase = self.table.mode().phase;
         if phase.in_landing_burn() && level != self.level {

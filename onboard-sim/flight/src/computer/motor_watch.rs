@@ -86,7 +86,7 @@ mod tests {
 
     fn mode(phase: Phase, motor: Motor, pin_out: bool) -> Mode {
         let interlocks = Interlocks { pin_out, ..Interlocks::default() };
-        Mode { phase, motor, interlocks, ..Mode::power_up(0.0) }
+        Mode { phase, interlocks, motor, ..Mode::power_up(0.0) }
     }
 
     #[test]

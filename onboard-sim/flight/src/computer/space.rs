@@ -31,9 +31,9 @@ impl Space {
         Self { pad: PadWatch::default(), pilot, last: None, gate_refusal: None }
     }
 
-    pub(super) fn fly(&mut self, table: &mut PhaseTable, input: PilotInput) -> PilotOutput {
-        let output = self.pilot.step(table, &input);
-        self.last = Some((input, output));
+    pub(super) fn fly(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
+        let output = self.pilot.step(table, input);
+        self.last = Some((*input, output));
         let refusal = self.pilot.gate_refusal().filter(|_| table.mode().phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_refusal) {
             table.say_gate_shut(check);

@@ -60,12 +60,12 @@ impl Vehicle {
                     estimate,
                     mass: &mass,
                 };
-                self.flying(space, &since, standing)
+                self.flying(space, &since, &standing)
             }
         }
     }
 
-    fn flying(&self, space: &InSpace, since: &Airborne<'_>, standing: Snapshot) -> Snapshot {
+    fn flying(&self, space: &InSpace, since: &Airborne<'_>, standing: &Snapshot) -> Snapshot {
         let &Airborne { released_at_s, frame, flight_s, output, estimate, mass } = since;
         let pilot = space.sortie.pilot();
         let motor = pilot.motor();
@@ -99,7 +99,7 @@ impl Vehicle {
                 horizontal_sigma_m: sigmas.position_m.xy().max(),
                 height_sigma_m: sigmas.position_m.z,
             }),
-            ..standing
+            ..*standing
         }
     }
 
