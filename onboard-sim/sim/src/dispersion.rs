@@ -42,6 +42,49 @@ pub struct Dispersion {
     pub apogee_tilt_deg: f64,
     /// Rotation rate at apogee, degrees per second, in each axis.
     pub apogee_rate_deg_s: f64,
+    /// Differences between the vehicle and its data that the flight computer's own models do not have.
+    pub mismatch: Mismatch,
+}
+
+/// How the true vehicle, the weather and the ground differ from the flight computer's models. Each value is the standard
+/// deviation of a normal distribution unless its name says otherwise; a pair is the lowest and highest value of a uniform
+/// one.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mismatch {
+    /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations are larger than fast
+    /// ones; the impulse stays.
+    pub thrust_shape_share: f64,
+    /// Fraction of the body's axial drag that the exhaust takes away.
+    pub plume_body_loss: [f64; 2],
+    /// Fraction of the fins' drag that the exhaust takes away.
+    pub plume_fin_loss: [f64; 2],
+    /// Drag along the body, as a fraction.
+    pub body_drag_share: f64,
+    /// Drag of the fins, as a fraction.
+    pub fin_drag_share: f64,
+    /// Drag across the body, as a fraction.
+    pub crossflow_share: f64,
+    /// Moments of inertia, as a fraction.
+    pub inertia_share: f64,
+    /// Centre of gravity along the axis, m.
+    pub cg_along_m: f64,
+    /// Thrust off the axis, m, in each direction.
+    pub thrust_offset_m: f64,
+    /// Turn of the nozzle over the turn of its servo, as a fraction.
+    pub gimbal_gain_share: f64,
+    /// Play of the gimbal beside the airframe's, degrees.
+    pub gimbal_slop_deg: [f64; 2],
+    /// Misalignment of each fin, degrees.
+    pub fin_offset_deg: f64,
+    /// Play of the fins beside the airframe's, degrees.
+    pub fin_slop_deg: [f64; 2],
+    /// Exponent of the wind's power law over height.
+    pub wind_exponent: f64,
+    /// Turn of the wind over the first 100 m of height, degrees.
+    pub wind_veer_deg_100m: f64,
+    /// Slope of the ground, degrees, along each axis of the world.
+    pub ground_slope_deg: f64,
 }
 
 /// The built-in sets: name and TOML text.
@@ -50,6 +93,8 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("thrust-only", include_str!("dispersions/thrust-only.toml")),
     ("field", include_str!("dispersions/field.toml")),
     ("harsh", include_str!("dispersions/harsh.toml")),
+    ("real", include_str!("dispersions/real.toml")),
+    ("real-harsh", include_str!("dispersions/real-harsh.toml")),
 ];
 
 /// Why a set cannot be used.

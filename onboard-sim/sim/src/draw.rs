@@ -7,10 +7,10 @@ use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
-use world::Truth;
+use world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use world::wind::Wind;
 
-use crate::dispersion::Dispersion;
+use crate::dispersion::{Dispersion, Mismatch};
 
 /// What chance decided about one flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,7 +85,62 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         gust_scale: sigma.gust_scale,
         ..nominal
     };
+    let truth = mismatched(truth, &sigma.mismatch, seed, number);
     Draw { truth, apogee, flight_seed }
+}
+
+/// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
+/// generator of their own: a set without them draws what it always drew.
+fn mismatched(truth: Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
+    /// Any number that no other draw uses.
+    const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
+    let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_MISMATCH);
+    random.set_stream(number);
+    let mut chance = Chance { random };
+    // Amplitudes that fall as 1 / k; a cosine's rms is its amplitude over the root of 2.
+    let terms: [f64; SHAPE_TERMS] = core::array::from_fn(|k| 1.0 / (k + 1) as f64);
+    let whole = libm::sqrt(0.5 * terms.iter().map(|term| term * term).sum::<f64>());
+    let thrust_shape = terms.map(|term| {
+        (sigma.thrust_shape_share * term / whole * chance.normal()).clamp(-SHAPE_MOST, SHAPE_MOST)
+    });
+    let plume_body_loss = chance.between(sigma.plume_body_loss);
+    let plume_fin_loss = chance.between(sigma.plume_fin_loss);
+    let [body_drag_scale, fin_drag_scale, crossflow_scale, inertia_scale, gimbal_gain] = [
+        sigma.body_drag_share,
+        sigma.fin_drag_share,
+        sigma.crossflow_share,
+        sigma.inertia_share,
+        sigma.gimbal_gain_share,
+    ]
+    .map(|share| (1.0 + share * chance.normal()).clamp(0.2, 2.0));
+    let [_, y_m, z_m] = truth.cg_offset_m;
+    let cg_offset_m = [sigma.cg_along_m * chance.normal(), y_m, z_m];
+    let thrust_offset_m = [sigma.thrust_offset_m * chance.normal(), sigma.thrust_offset_m * chance.normal()];
+    let gimbal_slop_rad = chance.between(sigma.gimbal_slop_deg).to_radians();
+    let fin_slop_rad = chance.between(sigma.fin_slop_deg).to_radians();
+    let fin_offset_rad = [(); 4].map(|()| sigma.fin_offset_deg.to_radians() * chance.normal());
+    let wind_exponent = (truth.wind_exponent + sigma.wind_exponent * chance.normal()).clamp(0.0, 0.5);
+    let wind_veer_rad_m = sigma.wind_veer_deg_100m.to_radians() / 100.0 * chance.normal();
+    let ground_rise = [(); 2].map(|()| libm::tan(sigma.ground_slope_deg.to_radians()) * chance.normal());
+    Truth {
+        thrust_shape,
+        plume_body_loss,
+        plume_fin_loss,
+        body_drag_scale,
+        fin_drag_scale,
+        crossflow_scale,
+        inertia_scale,
+        gimbal_gain,
+        cg_offset_m,
+        thrust_offset_m,
+        gimbal_slop_rad,
+        fin_slop_rad,
+        fin_offset_rad,
+        wind_exponent,
+        wind_veer_rad_m,
+        ground_rise,
+        ..truth
+    }
 }
 
 /// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a generator of their
@@ -113,6 +168,11 @@ impl Chance {
     /// Uniform in [-1, 1).
     fn even(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
+    }
+
+    /// Uniform between two values.
+    fn between(&mut self, [least, most]: [f64; 2]) -> f64 {
+        least + (most - least) * self.unit()
     }
 
     /// Standard normal, by Box and Muller.

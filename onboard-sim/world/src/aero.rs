@@ -9,6 +9,8 @@ use flight::vehicle::airframe::Airframe;
 use flight::vehicle::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
 use nalgebra::Vector3;
 
+use crate::truth::Truth;
+
 /// Strips of the body's crossflow.
 const STRIPS: usize = 8;
 
@@ -24,7 +26,15 @@ pub(crate) struct Shape {
     /// Directions from the axis to the fins, in body axes.
     fin_directions: [Vector3<f64>; 4],
     nose_station_m: f64,
+    fin_scale: f64,
     scale: f64,
+}
+
+/// Fractions of the drag that the exhaust leaves: of the body along its axis, and of the fins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plume {
+    pub(crate) body: f64,
+    pub(crate) fins: f64,
 }
 
 /// The air and the vehicle's moving parts at one instant.
@@ -45,6 +55,7 @@ pub(crate) struct Configuration {
     pub(crate) fin_sines: [f64; 4],
     /// Parachute's drag area, m^2.
     pub(crate) parachute_area_m2: f64,
+    pub(crate) plume: Plume,
     /// Centre of gravity: x is its station (above the nozzle), y and z its distance from the axis, m.
     pub(crate) cg_m: Vector3<f64>,
 }
@@ -68,19 +79,20 @@ impl Load {
 }
 
 impl Shape {
-    /// The shape of an airframe; all its forces are scaled.
-    pub(crate) fn new(airframe: &Airframe, scale: f64) -> Self {
+    /// The shape of an airframe, its forces scaled as the truth says.
+    pub(crate) fn new(airframe: &Airframe, truth: &Truth) -> Self {
         let body = &airframe.body;
         let strip_m = body.length_m / STRIPS as f64;
         Self {
-            axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient,
-            strip_area_m2: body.crossflow_drag_coefficient * body.diameter_m * strip_m,
+            axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient * truth.body_drag_scale,
+            strip_area_m2: body.crossflow_drag_coefficient * body.diameter_m * strip_m * truth.crossflow_scale,
             strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
             fins: airframe.fin_model(),
             fin_station_m: airframe.fins.station_m,
             fin_directions: core::array::from_fn(|i| Vector3::new(0.0, -YAW[i] * COS_30, PITCH[i] * SIN_30)),
             nose_station_m: body.length_m,
-            scale,
+            fin_scale: truth.fin_drag_scale,
+            scale: truth.drag_scale,
         }
     }
 
@@ -89,8 +101,9 @@ impl Shape {
         let half_density = 0.5 * self.scale * flow.density_kg_m3;
         let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;
         let mut load = Load::none();
-        self.add_body(&mut load, flow, half_density, &axis_m);
-        self.add_fins(&mut load, flow, half_density, configuration);
+        let Plume { body, fins } = configuration.plume;
+        self.add_body(&mut load, flow, half_density, body, &axis_m);
+        self.add_fins(&mut load, flow, half_density * self.fin_scale * fins, configuration);
         if configuration.parachute_area_m2 > 0.0 {
             let place_m = axis_m(self.nose_station_m);
             let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
@@ -105,10 +118,11 @@ impl Shape {
         load: &mut Load,
         flow: &Flow,
         half_density: f64,
+        axial_share: f64,
         axis_m: &impl Fn(f64) -> Vector3<f64>,
     ) {
         let velocity = &flow.velocity_m_s;
-        let axial_n = -half_density * self.axial_area_m2 * length(velocity) * velocity.x;
+        let axial_n = -half_density * axial_share * self.axial_area_m2 * length(velocity) * velocity.x;
         load.add_at(&axis_m(0.0), &Vector3::new(axial_n, 0.0, 0.0));
         for station_m in self.strip_stations_m {
             let place_m = axis_m(station_m);

@@ -1,4 +1,4 @@
-//! The ground: flat, level, at height 0. The four legs are springs with dampers, and their feet have friction. The
+//! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
 //! vehicle is broken if any other part touches the ground.
 
 use flight::vehicle::airframe::Airframe;
@@ -69,6 +69,8 @@ pub(crate) struct Ground {
     feet_m: [Vector3<f64>; 4],
     /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
     hull_m: [Vector3<f64>; 8],
+    /// Rise of the ground along world x and y, metre per metre.
+    rise: [f64; 2],
     still_s: f64,
 }
 
@@ -86,7 +88,7 @@ impl Contact {
 }
 
 impl Ground {
-    pub(crate) fn new(airframe: &Airframe) -> Self {
+    pub(crate) fn new(airframe: &Airframe, rise: [f64; 2]) -> Self {
         let (legs, body) = (&airframe.legs, &airframe.body);
         let around = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)];
         let ring = |station_m: f64, radius_m: f64| {
@@ -99,23 +101,31 @@ impl Ground {
             friction: legs.friction_coefficient,
             feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
             hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
+            rise,
             still_s: 0.0,
         }
     }
 
+    /// A vector whose product with a place in the world is the place's height above the ground.
+    fn upwards(&self) -> Vector3<f64> {
+        Vector3::new(-self.rise[0], -self.rise[1], 1.0)
+    }
+
     /// Height of the vehicle's lowest point above the ground, m.
     pub(crate) fn clearance_m(&self, state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
-        let up_in_body = state.world_from_body.inverse_transform_vector(&Vector3::z());
+        let up_in_body = state.world_from_body.inverse_transform_vector(&self.upwards());
         let lowest = |places: &[Vector3<f64>]| {
             places.iter().fold(f64::INFINITY, |low, place| low.min((place - cg_m).dot(&up_in_body)))
         };
-        state.position_m.z + lowest(&self.feet_m).min(lowest(&self.hull_m))
+        state.position_m.dot(&self.upwards()) + lowest(&self.feet_m).min(lowest(&self.hull_m))
     }
 
     /// What touches the ground.
     pub(crate) fn contact(&self, state: &RigidState, cg_m: &Vector3<f64>) -> Contact {
-        let up_in_body = state.world_from_body.inverse_transform_vector(&Vector3::z());
-        let below = |place: &&Vector3<f64>| state.position_m.z + (**place - cg_m).dot(&up_in_body) <= 0.0;
+        let upwards = self.upwards();
+        let up_in_body = state.world_from_body.inverse_transform_vector(&upwards);
+        let cg_height_m = state.position_m.dot(&upwards);
+        let below = |place: &&Vector3<f64>| cg_height_m + (**place - cg_m).dot(&up_in_body) <= 0.0;
         Contact {
             feet: self.feet_m.iter().filter(below).count(),
             hull: self.hull_m.iter().any(|place| below(&place)),
@@ -130,18 +140,21 @@ impl Ground {
         world_from_body: &Rotation3<f64>,
         cg_m: &Vector3<f64>,
     ) {
+        let upwards = self.upwards();
+        let length = upwards.norm();
+        let normal = upwards / length;
         for foot_m in &self.feet_m {
             let place_m = foot_m - cg_m;
-            let depth_m = -(state.position_m.z + (world_from_body * place_m).z);
+            let depth_m = -(state.position_m + world_from_body * place_m).dot(&upwards) / length;
             if depth_m <= 0.0 {
                 continue;
             }
             let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
-            let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * sliding.z).max(0.0);
-            sliding.z = 0.0;
+            let rising_m_s = sliding.dot(&normal);
+            let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
+            sliding -= normal * rising_m_s;
             let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
-            let mut force_n = sliding * (-self.friction * normal_n / fading);
-            force_n.z = normal_n;
+            let force_n = sliding * (-self.friction * normal_n / fading) + normal * normal_n;
             load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
         }
     }

@@ -5,7 +5,7 @@
 //! [`flight::vehicle::rigid`].
 //!
 //! * [`world`]: all parts together, one millisecond at a time.
-//! * `body`, `aero`, `motor`, `servo`, `parachute`, [`ground`]: the parts, one model each.
+//! * `body`, `aero`, `motor`, `servo`, `linkage`, `parachute`, [`ground`]: the parts, one model each.
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data.
@@ -15,6 +15,7 @@ mod aero;
 mod body;
 pub mod fault;
 pub mod ground;
+mod linkage;
 mod motor;
 mod parachute;
 pub mod sensors;

@@ -1,9 +1,13 @@
-//! The true landing motor: `T(t) = s/b T0(t/b)` for impulse scale s and burn-time scale b.
+//! The true landing motor: `T(t) = s/b T0(t/b) (1 + sum of a_k cos(k pi i))` for impulse scale s, burn-time scale b and
+//! the fraction i of the impulse that `T0` has given by then. The cosines have no mean over the impulse, so a shape keeps
+//! it.
+
+use core::f64::consts::PI;
 
 use flight::vehicle::thrust_curve::ThrustCurve;
 
 use crate::fault::Fault;
-use crate::truth::Truth;
+use crate::truth::{SHAPE_TERMS, Truth};
 
 /// The true motor.
 #[derive(Debug, Clone)]
@@ -12,6 +16,7 @@ pub(crate) struct Motor {
     impulse_scale: f64,
     burn_time_scale: f64,
     ignition_delay_s: f64,
+    shape: [f64; SHAPE_TERMS],
     /// Time of the ignition command, s.
     commanded_s: Option<f64>,
     no_light: bool,
@@ -25,6 +30,7 @@ impl Motor {
             impulse_scale: truth.impulse_scale,
             burn_time_scale: truth.burn_time_scale,
             ignition_delay_s: truth.ignition_delay_s,
+            shape: truth.thrust_shape,
             commanded_s: None,
             no_light: false,
             out_after_s: f64::INFINITY,
@@ -50,6 +56,7 @@ impl Motor {
             impulse_scale,
             burn_time_scale: after.burn_time_scale,
             ignition_delay_s,
+            shape: after.shape,
             ..self.clone()
         }
     }
@@ -75,12 +82,33 @@ impl Motor {
         if curve_s * self.burn_time_scale >= self.out_after_s {
             return 0.0;
         }
-        self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s)
+        self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s) * self.shape_at(curve_s).0
+    }
+
+    /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the impulse by which the
+    /// shape has changed what was given until then.
+    fn shape_at(&self, curve_s: f64) -> (f64, f64) {
+        if self.shape == [0.0; SHAPE_TERMS] {
+            return (1.0, 0.0);
+        }
+        let given = self.curve.propellant_burnt_kg(curve_s) / self.curve.propellant_mass_kg();
+        let (sin, cos) = libm::sincos(PI * given);
+        // cos and sin of k times the angle, k from 1.
+        let (mut sin_k, mut cos_k) = (sin, cos);
+        let (mut factor, mut more) = (1.0, 0.0);
+        for (k, amplitude) in (1..).zip(self.shape) {
+            factor += amplitude * cos_k;
+            more += amplitude * sin_k / (PI * f64::from(k));
+            (sin_k, cos_k) = (sin_k * cos + cos_k * sin, cos_k * cos - sin_k * sin);
+        }
+        (factor, more)
     }
 
     /// Propellant burnt up to a time, kg. After an early burn-out the unburnt rest is not counted.
     pub(crate) fn burnt_kg(&self, time_s: f64) -> f64 {
-        self.curve.propellant_burnt_kg(self.curve_time_s(time_s).min(self.out_after_s / self.burn_time_scale))
+        let curve_s = self.curve_time_s(time_s).min(self.out_after_s / self.burn_time_scale);
+        let more_kg = self.shape_at(curve_s).1 * self.curve.propellant_mass_kg();
+        self.curve.propellant_burnt_kg(curve_s) + more_kg
     }
 
     /// Propellant burnt for each newton second, kg: the mass flow divided by the thrust.

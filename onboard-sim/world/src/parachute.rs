@@ -26,6 +26,10 @@ impl Parachute {
         self.commanded_s.is_some()
     }
 
+    pub(crate) fn ejected_s(&self) -> Option<f64> {
+        self.commanded_s
+    }
+
     /// One step at an airspeed, m/s.
     pub(crate) fn step(&mut self, time_s: f64, airspeed_m_s: f64) {
         if self.commanded_s.is_some_and(|commanded_s| time_s - commanded_s >= self.data.ejection_delay_s) {

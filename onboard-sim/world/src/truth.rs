@@ -29,6 +29,45 @@ pub struct Truth {
     pub wind_towards_rad: f64,
     /// Gust intensity over that of the military standard; 0 is none.
     pub gust_scale: f64,
+    /// Exponent of the mean wind's power law over height.
+    pub wind_exponent: f64,
+    /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
+    pub wind_veer_rad_m: f64,
+    /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
+    /// where `s` is the fraction of the impulse already given. The impulse stays the same.
+    pub thrust_shape: [f64; SHAPE_TERMS],
+    /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
+    pub plume_body_loss: f64,
+    pub plume_fin_loss: f64,
+    /// Factors on the drag along the body, on the fins and on the drag across the body, each beside `drag_scale`.
+    pub body_drag_scale: f64,
+    pub fin_drag_scale: f64,
+    pub crossflow_scale: f64,
+    /// True moments of inertia over those of the data, beside `mass_scale`.
+    pub inertia_scale: f64,
+    /// Turn of the nozzle over the turn of its servo.
+    pub gimbal_gain: f64,
+    /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
+    pub gimbal_slop_rad: f64,
+    /// Misalignment of each fin against its servo, rad.
+    pub fin_offset_rad: [f64; 4],
+    /// Play between the fins' servos and the fins that the data do not know, rad.
+    pub fin_slop_rad: f64,
+    /// Rise of the ground, metre per metre along world x and y; its height at the pad is 0.
+    pub ground_rise: [f64; 2],
+}
+
+/// Terms in the shape of a thrust curve.
+pub const SHAPE_TERMS: usize = 5;
+
+/// Largest size of a term: the sum of all stays below 1, so that no thrust falls below zero.
+pub const SHAPE_MOST: f64 = 0.19;
+
+impl Truth {
+    /// Height of the ground below a place, m.
+    pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
+        self.ground_rise[0] * x_m + self.ground_rise[1] * y_m
+    }
 }
 
 impl Default for Truth {
@@ -45,6 +84,20 @@ impl Default for Truth {
             wind_m_s: 0.0,
             wind_towards_rad: 0.0,
             gust_scale: 1.0,
+            wind_exponent: crate::wind::EXPONENT,
+            wind_veer_rad_m: 0.0,
+            thrust_shape: [0.0; SHAPE_TERMS],
+            plume_body_loss: 0.0,
+            plume_fin_loss: 0.0,
+            body_drag_scale: 1.0,
+            fin_drag_scale: 1.0,
+            crossflow_scale: 1.0,
+            inertia_scale: 1.0,
+            gimbal_gain: 1.0,
+            gimbal_slop_rad: 0.0,
+            fin_offset_rad: [0.0; 4],
+            fin_slop_rad: 0.0,
+            ground_rise: [0.0; 2],
         }
     }
 }

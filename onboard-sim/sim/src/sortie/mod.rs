@@ -219,14 +219,20 @@ impl Sortie {
         } else {
             outside.requests
         };
+        let fed_back_rad = self.world.fins_feedback_rad();
+        let touched = self.computer.released_at_s().is_some() && self.world.touchdown().is_some();
+        let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
+            Some(sensors) => (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity()),
+            None => (fed_back_rad, touched, true),
+        };
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             feeling,
-            gimbal_rad: self.world.gimbal_rad(),
-            fins_rad: self.world.fins_rad(),
-            contact: self.computer.released_at_s().is_some() && self.world.touchdown().is_some(),
-            igniter_continuity: true,
+            gimbal_rad: self.world.gimbal_feedback_rad(),
+            fins_rad,
+            contact,
+            igniter_continuity,
             pin_out: outside.pin_out,
             log: outside.log,
             uplink: outside.uplink,

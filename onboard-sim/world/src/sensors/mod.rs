@@ -4,6 +4,7 @@
 //! one frame of the flight computer. Each sensor has its own stream of random numbers and keeps drawing while it is
 //! out, so a fault in one sensor does not change the noise of another.
 
+mod flaws;
 mod noise;
 mod params;
 mod start;
@@ -15,8 +16,11 @@ use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, ImuSample, Measuremen
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
+use self::flaws::{EJECTION_LASTS_S, Fate, Flaws};
 use self::noise::{Normal, Wander};
-pub use self::params::{BarometerParams, GnssParams, ImuParams, LidarParams, SensorParamError, SensorParams};
+pub use self::params::{
+    BarometerParams, GnssParams, ImuParams, LidarParams, SensorParamError, SensorParams, SwitchParams,
+};
 pub use self::start::believed_start;
 use crate::world::World;
 
@@ -33,9 +37,37 @@ pub struct SensorTruth {
     pub airspeed_m_s: f64,
     /// Height of the centre of gravity over the feet when upright, m.
     pub cg_over_feet_m: f64,
+    /// Angular acceleration, body axes, rad/s^2.
+    pub angular_acceleration_rad_s2: Vector3<f64>,
+    /// Height of the ground where the lidar's beam meets it, m.
+    pub ground_m: f64,
+    /// The motor burns.
+    pub burning: bool,
+    /// Time since the parachute was ejected, s.
+    pub ejected_for_s: Option<f64>,
 }
 
 impl SensorTruth {
+    /// The truth over level ground, without rotation's acceleration, exhaust or parachute: state, specific force, m/s^2,
+    /// airspeed, m/s, and the centre of gravity's height over the feet, m.
+    pub fn of_motion(
+        state: &RigidState,
+        specific_force_m_s2: &Vector3<f64>,
+        airspeed_m_s: f64,
+        cg_over_feet_m: f64,
+    ) -> Self {
+        Self {
+            state: *state,
+            specific_force_m_s2: *specific_force_m_s2,
+            airspeed_m_s,
+            cg_over_feet_m,
+            angular_acceleration_rad_s2: Vector3::zeros(),
+            ground_m: 0.0,
+            burning: false,
+            ejected_for_s: None,
+        }
+    }
+
     /// The truth of a world.
     pub fn of(world: &World) -> Self {
         Self {
@@ -43,6 +75,10 @@ impl SensorTruth {
             specific_force_m_s2: *world.specific_force_m_s2(),
             airspeed_m_s: world.air_velocity_m_s().norm(),
             cg_over_feet_m: world.cg_above_feet_m(),
+            angular_acceleration_rad_s2: *world.angular_acceleration_rad_s2(),
+            ground_m: world.ground_under_beam_m(),
+            burning: world.thrust_n() > 0.0,
+            ejected_for_s: world.parachute_ejected_s().map(|at_s| world.time_s() - at_s),
         }
     }
 }
@@ -94,6 +130,9 @@ pub struct Sensors {
     on_its_way: Option<(u32, GnssFix)>,
     rate_sum_rad_s: Vector3<f64>,
     force_sum_m_s2: Vector3<f64>,
+    flaws: Flaws,
+    /// Elapsed time at the first contact, ms.
+    contact_ms: Option<u32>,
 }
 
 impl Sensors {
@@ -137,6 +176,8 @@ impl Sensors {
             on_its_way: None,
             rate_sum_rad_s: Vector3::zeros(),
             force_sum_m_s2: Vector3::zeros(),
+            flaws: Flaws::draw(params, seed),
+            contact_ms: None,
         })
     }
 
@@ -149,20 +190,47 @@ impl Sensors {
     pub fn observe(&mut self, truth: &SensorTruth, faults: &SensorFaults) -> Option<Measurements> {
         self.elapsed_ms += 1;
         self.rate_sum_rad_s += truth.state.rate_rad_s;
-        self.force_sum_m_s2 += truth.specific_force_m_s2;
+        self.force_sum_m_s2 += self.force_at_unit_m_s2(truth);
         self.watch_satellites(truth, faults.gnss_out);
         if !self.elapsed_ms.is_multiple_of(FRAME_MS) {
             return None;
         }
         Some(Measurements {
-            imu: self.imu(faults),
+            imu: self.imu(truth.burning, faults),
             pressure_altitude_m: self.barometer(truth).filter(|_| !faults.barometer_out),
             gnss: self.arrived(),
             lidar_range_m: self.lidar(truth).filter(|_| !faults.lidar_out),
         })
     }
 
-    fn imu(&mut self, faults: &SensorFaults) -> ImuSample {
+    /// Fin openings as the feedback tells them, rad.
+    pub fn fins_rad(&self, fins_rad: &[f64; 4]) -> [f64; 4] {
+        core::array::from_fn(|fin| fins_rad[fin] + self.flaws.fin_feedback_rad[fin])
+    }
+
+    /// Whether the igniter's continuity is reported.
+    pub fn igniter_continuity(&self) -> bool {
+        !self.flaws.continuity_lost
+    }
+
+    /// Whether contact is reported, from whether there has been one.
+    pub fn contact(&mut self, touched: bool) -> bool {
+        if !touched {
+            return false;
+        }
+        let since_ms = *self.contact_ms.get_or_insert(self.elapsed_ms);
+        self.elapsed_ms - since_ms >= self.params.switches.contact_late_ms
+    }
+
+    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds.
+    fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
+        let (place, rate) = (&self.flaws.unit_m, &truth.state.rate_rad_s);
+        truth.specific_force_m_s2
+            + truth.angular_acceleration_rad_s2.cross(place)
+            + rate.cross(&rate.cross(place))
+    }
+
+    fn imu(&mut self, burning: bool, faults: &SensorFaults) -> ImuSample {
         let imu = &self.params.imu;
         let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
         // White noise of this density, averaged over a frame.
@@ -172,13 +240,20 @@ impl Sensors {
         let walk = imu.gyro_bias_walk_deg_s_sqrt_s.to_radians() * libm::sqrt(FRAME_S);
         self.errors.gyro_bias_rad_s += self.imu_noise.next3() * walk;
         let gyro_white = self.imu_noise.next3() * (imu.gyro_noise_deg_s_sqrt_hz.to_radians() * spread);
-        let gyro = mean(&mut self.rate_sum_rad_s)
+        let (shaken_rad_s, shaken_m_s2) =
+            if burning { self.flaws.vibration(&self.params) } else { (Vector3::zeros(), Vector3::zeros()) };
+        let gyro = self.flaws.unit_from_body * mean(&mut self.rate_sum_rad_s)
+            + shaken_rad_s
             + self.errors.gyro_bias_rad_s
             + faults.gyro_bias_step_rad_s
             + gyro_white;
 
         let force_white = self.imu_noise.next3() * (imu.accelerometer_noise_mg_sqrt_hz * milli_g * spread);
-        let force = mean(&mut self.force_sum_m_s2).component_mul(&self.accelerometer_scale)
+        let rectified_m_s2 = if burning { self.flaws.burning_bias_m_s2 } else { Vector3::zeros() };
+        let felt_m_s2 = self.flaws.unit_from_body * mean(&mut self.force_sum_m_s2);
+        let force = felt_m_s2.component_mul(&self.accelerometer_scale)
+            + rectified_m_s2
+            + shaken_m_s2
             + self.errors.accelerometer_bias_m_s2
             + faults.accelerometer_bias_step_m_s2
             + force_white;
@@ -199,8 +274,13 @@ impl Sensors {
         self.errors.barometer_offset_m += walk * self.barometer_noise.next();
         // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
         let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
+        let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * barometer.late_s;
+        let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };
+        let ejection_m = truth.ejected_for_s.map_or(0.0, |for_s| {
+            self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S)
+        });
         Some(
-            truth.state.position_m.z + self.errors.barometer_offset_m
+            then_m + self.errors.barometer_offset_m + plume_m + ejection_m
                 - self.errors.barometer_ram * speed_height_m
                 + barometer.noise_m * self.barometer_noise.next(),
         )
@@ -216,12 +296,16 @@ impl Sensors {
         }
         let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
         let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
-        let fix = GnssFix {
+        let mut fix = GnssFix {
             position_m: truth.state.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
             velocity_m_s: truth.state.velocity_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
-            valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S,
+            valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
         };
-        if !out {
+        let (fate, off_m) = self.flaws.of_fix(&self.params);
+        if fate == Fate::Outlier {
+            fix.position_m += off_m;
+        }
+        if !out && fate != Fate::Lost {
             self.on_its_way = Some((self.elapsed_ms + gnss.delay_ms, fix));
         }
     }
@@ -238,17 +322,26 @@ impl Sensors {
             return None;
         }
         let noise_m = lidar.noise_m * self.lidar_noise.next();
+        let (fate, anywhere) = self.flaws.of_range(&self.params);
         let tilt_rad = truth.state.tilt_rad();
         if tilt_rad > lidar.tilt_max_deg.to_radians() {
             return None;
         }
         // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
         // distance from it.
-        let slant_m = truth.state.position_m.z / libm::cos(tilt_rad);
+        let then_m = truth.state.position_m.z - truth.ground_m - truth.state.velocity_m_s.z * lidar.late_s;
+        let slant_m = then_m / libm::cos(tilt_rad);
         let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
         // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
         // with the square of the range.
         let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
-        (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m)
+        let blind = truth.burning
+            && truth.state.position_m.z - truth.ground_m - truth.cg_over_feet_m < lidar.blind_below_m;
+        match fate {
+            Fate::Lost => None,
+            _ if blind => None,
+            Fate::Outlier => Some(lidar.range_min_m + anywhere * (lidar.range_max_m - lidar.range_min_m)),
+            Fate::Arrives => (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m),
+        }
     }
 }

@@ -12,6 +12,8 @@ pub struct SensorParams {
     /// Satellite receiver.
     pub gnss: GnssParams,
     pub lidar: LidarParams,
+    /// Switches and feedback.
+    pub switches: SwitchParams,
 }
 
 /// Inertial measurement unit.
@@ -34,6 +36,16 @@ pub struct ImuParams {
     pub accelerometer_scale_share: f64,
     /// Largest specific force measured, g.
     pub accelerometer_range_g: f64,
+    /// Vibration while the motor burns, rms of one frame's sample, each axis, g.
+    pub vibration_g: f64,
+    /// Vibration while the motor burns, rms of one frame's sample, each axis, deg/s.
+    pub vibration_deg_s: f64,
+    /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
+    pub vibration_bias_mg: f64,
+    /// Misalignment of the unit in the vehicle, about each axis, degrees.
+    pub mounting_deg: f64,
+    /// Distance of the unit from the centre of gravity, each axis, m.
+    pub off_cg_m: f64,
 }
 
 /// Barometer.
@@ -50,6 +62,12 @@ pub struct BarometerParams {
     pub offset_walk_m_sqrt_s: f64,
     /// Ram coefficient: the pressure error divided by the dynamic pressure.
     pub ram_coefficient: f64,
+    /// Age of a sample that the flight computer takes for new, s.
+    pub late_s: f64,
+    /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
+    pub plume_m: f64,
+    /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out through the vents.
+    pub ejection_m: f64,
 }
 
 /// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
@@ -74,6 +92,13 @@ pub struct GnssParams {
     pub wander_correlation_s: f64,
     /// Time from the zeroing on the pad to the start of the simulation, s.
     pub zeroed_before_s: f64,
+    /// Error of the fixes' time tags, the same for all of a flight, s.
+    pub time_tag_s: f64,
+    /// Probability that a fix is lost.
+    pub dropout_share: f64,
+    /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
+    pub outlier_share: f64,
+    pub outlier_m: f64,
 }
 
 /// Lidar, looking backwards along the axis.
@@ -92,6 +117,26 @@ pub struct LidarParams {
     pub tilt_max_deg: f64,
     /// Its position along the axis, ahead of the feet, m.
     pub ahead_of_feet_m: f64,
+    /// Below this height of the feet there is no echo while the motor burns, m: dust.
+    pub blind_below_m: f64,
+    /// Age of a range that the flight computer takes for new, s.
+    pub late_s: f64,
+    /// Probability that a range is lost.
+    pub dropout_share: f64,
+    /// Probability that a range is an outlier: any value within the sensor's limits.
+    pub outlier_share: f64,
+}
+
+/// Switches and feedback: what tells the flight computer of contact, of the igniter and of the fins.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SwitchParams {
+    /// Time from the first contact until it is reported, ms.
+    pub contact_late_ms: u32,
+    /// Probability that the igniter's continuity is reported as lost, for all of a flight.
+    pub continuity_lost_share: f64,
+    /// Error of each fin's feedback, the same for all of a flight, degrees.
+    pub fin_feedback_deg: f64,
 }
 
 impl LidarParams {
@@ -112,6 +157,11 @@ impl Default for ImuParams {
             accelerometer_bias_mg: 3.0,
             accelerometer_scale_share: 0.001,
             accelerometer_range_g: 16.0,
+            vibration_g: 0.0,
+            vibration_deg_s: 0.0,
+            vibration_bias_mg: 0.0,
+            mounting_deg: 0.0,
+            off_cg_m: 0.0,
         }
     }
 }
@@ -124,6 +174,9 @@ impl Default for BarometerParams {
             offset_m: 0.3,
             offset_walk_m_sqrt_s: 0.03,
             ram_coefficient: 0.05,
+            late_s: 0.0,
+            plume_m: 0.0,
+            ejection_m: 0.0,
         }
     }
 }
@@ -140,6 +193,10 @@ impl Default for GnssParams {
             vertical_wander_m: 2.5,
             wander_correlation_s: 200.0,
             zeroed_before_s: 20.0,
+            time_tag_s: 0.0,
+            dropout_share: 0.0,
+            outlier_share: 0.0,
+            outlier_m: 0.0,
         }
     }
 }
@@ -153,6 +210,10 @@ impl Default for LidarParams {
             range_max_m: 12.0,
             tilt_max_deg: 45.0,
             ahead_of_feet_m: 0.15,
+            blind_below_m: 0.0,
+            late_s: 0.0,
+            dropout_share: 0.0,
+            outlier_share: 0.0,
         }
     }
 }
@@ -175,7 +236,7 @@ impl SensorParams {
     /// # Errors
     /// The first parameter that is out of range.
     pub fn validate(&self) -> Result<(), SensorParamError> {
-        let (imu, baro, gnss, lidar) = (&self.imu, &self.barometer, &self.gnss, &self.lidar);
+        let Self { imu, barometer: baro, gnss, lidar, switches } = self;
         let sigmas = [
             ("imu.gyro_noise_deg_s_sqrt_hz", imu.gyro_noise_deg_s_sqrt_hz),
             ("imu.gyro_bias_deg_s", imu.gyro_bias_deg_s),
@@ -183,6 +244,19 @@ impl SensorParams {
             ("imu.accelerometer_noise_mg_sqrt_hz", imu.accelerometer_noise_mg_sqrt_hz),
             ("imu.accelerometer_bias_mg", imu.accelerometer_bias_mg),
             ("imu.accelerometer_scale_share", imu.accelerometer_scale_share),
+            ("imu.vibration_g", imu.vibration_g),
+            ("imu.vibration_deg_s", imu.vibration_deg_s),
+            ("imu.vibration_bias_mg", imu.vibration_bias_mg),
+            ("imu.mounting_deg", imu.mounting_deg),
+            ("imu.off_cg_m", imu.off_cg_m),
+            ("barometer.late_s", baro.late_s),
+            ("barometer.plume_m", baro.plume_m),
+            ("barometer.ejection_m", baro.ejection_m),
+            ("gnss.time_tag_s", gnss.time_tag_s),
+            ("gnss.outlier_m", gnss.outlier_m),
+            ("lidar.blind_below_m", lidar.blind_below_m),
+            ("lidar.late_s", lidar.late_s),
+            ("switches.fin_feedback_deg", switches.fin_feedback_deg),
             ("barometer.noise_m", baro.noise_m),
             ("barometer.offset_m", baro.offset_m),
             ("barometer.offset_walk_m_sqrt_s", baro.offset_walk_m_sqrt_s),
@@ -211,6 +285,18 @@ impl SensorParams {
         for (field, found) in sizes {
             if !(found.is_finite() && found > 0.0) {
                 return Err(SensorParamError { field, found, accepted: "a finite number above 0" });
+            }
+        }
+        let shares = [
+            ("gnss.dropout_share", gnss.dropout_share),
+            ("gnss.outlier_share", gnss.outlier_share),
+            ("lidar.dropout_share", lidar.dropout_share),
+            ("lidar.outlier_share", lidar.outlier_share),
+            ("switches.continuity_lost_share", switches.continuity_lost_share),
+        ];
+        for (field, found) in shares {
+            if !(0.0..=1.0).contains(&found) {
+                return Err(SensorParamError { field, found, accepted: "0 to 1" });
             }
         }
         for (field, period_ms) in

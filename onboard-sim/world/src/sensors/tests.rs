@@ -5,12 +5,7 @@ use super::*;
 fn falling(speed_m_s: f64, height_m: f64) -> SensorTruth {
     let mut state = RigidState::upright(height_m);
     state.velocity_m_s.z = -speed_m_s;
-    SensorTruth {
-        state,
-        specific_force_m_s2: Vector3::new(9.8, 0.1, -0.2),
-        airspeed_m_s: speed_m_s,
-        cg_over_feet_m: 0.6,
-    }
+    SensorTruth::of_motion(&state, &Vector3::new(9.8, 0.1, -0.2), speed_m_s, 0.6)
 }
 
 fn frames(seed: u64, truth: &SensorTruth, faults: &SensorFaults, frames: usize) -> Vec<Measurements> {

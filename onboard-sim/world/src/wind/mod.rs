@@ -12,7 +12,7 @@ use gusts::Gusts;
 /// Reference height of the mean wind, m.
 pub const REFERENCE_HEIGHT_M: f64 = 10.0;
 /// Exponent of the power law.
-const EXPONENT: f64 = 1.0 / 7.0;
+pub const EXPONENT: f64 = 1.0 / 7.0;
 /// Below this height the mean wind is constant, m: the power law does not hold so close to the ground.
 const LOWEST_M: f64 = 0.5;
 /// Reference height of the wind in the gust standard: 20 ft, m.
@@ -22,6 +22,8 @@ const GUST_REFERENCE_HEIGHT_M: f64 = 6.096;
 #[derive(Debug, Clone)]
 pub struct Wind {
     reference_m_s: f64,
+    exponent: f64,
+    veer_rad_m: f64,
     along: Vector3<f64>,
     across: Vector3<f64>,
     gusts: Gusts,
@@ -33,14 +35,23 @@ impl Wind {
     /// rad), the gust intensity as a multiple of the standard's, and the seed of the gusts.
     pub fn new(reference_m_s: f64, towards_rad: f64, gust_scale: f64, seed: u64) -> Self {
         let (sin, cos) = libm::sincos(towards_rad);
-        let gust_wind_m_s = mean_m_s(reference_m_s, GUST_REFERENCE_HEIGHT_M);
+        let gust_wind_m_s = mean_m_s(reference_m_s, EXPONENT, GUST_REFERENCE_HEIGHT_M);
         Self {
             reference_m_s,
+            exponent: EXPONENT,
+            veer_rad_m: 0.0,
             along: Vector3::new(cos, sin, 0.0),
             across: Vector3::new(-sin, cos, 0.0),
             gusts: Gusts::new(gust_scale * gust_wind_m_s, seed),
             now_m_s: Vector3::zeros(),
         }
+    }
+
+    /// This wind with another exponent of the power law, and a direction that turns with the height over the reference
+    /// height, rad/m.
+    #[must_use]
+    pub fn over_height(self, exponent: f64, veer_rad_m: f64) -> Self {
+        Self { exponent, veer_rad_m, ..self }
     }
 
     /// This wind with the mean and the gust intensity of another wind; the gusts themselves continue.
@@ -50,7 +61,12 @@ impl Wind {
 
     /// Mean wind at a height above ground, in the world, m/s.
     pub fn mean_m_s(&self, height_m: f64) -> Vector3<f64> {
-        self.along * mean_m_s(self.reference_m_s, height_m)
+        let mean_m_s = mean_m_s(self.reference_m_s, self.exponent, height_m);
+        if self.veer_rad_m == 0.0 {
+            return self.along * mean_m_s;
+        }
+        let (sin, cos) = libm::sincos(self.veer_rad_m * (height_m.max(LOWEST_M) - REFERENCE_HEIGHT_M));
+        (self.along * cos + self.across * sin) * mean_m_s
     }
 
     /// Advances by a length of air, m, at a height above ground, m.
@@ -69,11 +85,11 @@ impl Wind {
     }
 }
 
-fn mean_m_s(reference_m_s: f64, height_m: f64) -> f64 {
+fn mean_m_s(reference_m_s: f64, exponent: f64, height_m: f64) -> f64 {
     if reference_m_s == 0.0 {
         return 0.0;
     }
-    reference_m_s * libm::pow(height_m.max(LOWEST_M) / REFERENCE_HEIGHT_M, EXPONENT)
+    reference_m_s * libm::pow(height_m.max(LOWEST_M) / REFERENCE_HEIGHT_M, exponent)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Builds a world from data, and refuses data that make no sense.
 
+use core::f64::consts::FRAC_PI_2;
+
 use flight::vehicle::airframe::BadValue;
 use flight::vehicle::airframe::{Airframe, MassModel};
 use flight::vehicle::rigid::RigidState;
@@ -9,10 +11,11 @@ use nalgebra::Vector3;
 use super::World;
 use crate::aero::Shape;
 use crate::ground::Ground;
+use crate::linkage::Linkage;
 use crate::motor::Motor;
 use crate::parachute::Parachute;
 use crate::servo::Servo;
-use crate::truth::Truth;
+use crate::truth::{SHAPE_MOST, Truth};
 use crate::wind::Wind;
 
 /// Why no world can be built from the data.
@@ -76,13 +79,19 @@ impl World {
         let limit_rad = airframe.gimbal.limit_rad();
         let gimbal = || Servo::new(&airframe.gimbal.servo, (-limit_rad, limit_rad), 0.0);
         let mut world = Self {
-            shape: Shape::new(airframe, truth.drag_scale),
+            shape: Shape::new(airframe, truth),
             motor: Motor::new(motor, truth),
             gimbal: [gimbal(), gimbal()],
             fins: fins_at(airframe, airframe.fins.closed_rad()),
+            gimbal_links: core::array::from_fn(|_| {
+                let far_rad = limit_rad * truth.gimbal_gain.max(1.0);
+                Linkage::new(truth.gimbal_gain, 0.0, truth.gimbal_slop_rad, (-far_rad, far_rad), 0.0)
+            }),
+            fin_links: fin_links_at(airframe, truth, airframe.fins.closed_rad()),
             parachute: Parachute::new(&airframe.parachute),
-            wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed),
-            ground: Ground::new(airframe),
+            wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)
+                .over_height(truth.wind_exponent, truth.wind_veer_rad_m),
+            ground: Ground::new(airframe, truth.ground_rise),
             steps: 0,
             state: *initial,
             mass: mass_model.at(0.0),
@@ -102,8 +111,15 @@ impl World {
     #[must_use]
     pub fn with_fins_at(mut self, opening_rad: f64) -> Self {
         self.fins = fins_at(&self.airframe, opening_rad);
+        self.fin_links = fin_links_at(&self.airframe, &self.truth, opening_rad);
         self
     }
+}
+
+fn fin_links_at(airframe: &Airframe, truth: &Truth, opening_rad: f64) -> [Linkage; 4] {
+    let stops_rad = (airframe.fins.closed_rad(), FRAC_PI_2.max(airframe.fins.open_rad()));
+    let at_rad = opening_rad.clamp(airframe.fins.closed_rad(), airframe.fins.open_rad());
+    truth.fin_offset_rad.map(|offset_rad| Linkage::new(1.0, offset_rad, truth.fin_slop_rad, stops_rad, at_rad))
 }
 
 fn fins_at(airframe: &Airframe, opening_rad: f64) -> [Servo; 4] {
@@ -125,12 +141,20 @@ fn check(truth: &Truth) -> Result<(), WorldError> {
         ("impulse_scale", truth.impulse_scale),
         ("burn_time_scale", truth.burn_time_scale),
         ("mass_scale", truth.mass_scale),
+        ("inertia_scale", truth.inertia_scale),
+        ("gimbal_gain", truth.gimbal_gain),
     ] {
         if !(0.1..=10.0).contains(&value) {
             return refuse(key, value, "0.1 to 10");
         }
     }
-    for (key, value) in [("drag_scale", truth.drag_scale), ("gust_scale", truth.gust_scale)] {
+    for (key, value) in [
+        ("drag_scale", truth.drag_scale),
+        ("gust_scale", truth.gust_scale),
+        ("body_drag_scale", truth.body_drag_scale),
+        ("fin_drag_scale", truth.fin_drag_scale),
+        ("crossflow_scale", truth.crossflow_scale),
+    ] {
         if !(0.0..=10.0).contains(&value) {
             return refuse(key, value, "0 to 10");
         }
@@ -143,6 +167,37 @@ fn check(truth: &Truth) -> Result<(), WorldError> {
     }
     if !truth.wind_towards_rad.is_finite() {
         return refuse("wind_towards_rad", truth.wind_towards_rad, "a finite number");
+    }
+    for (key, value) in [("plume_body_loss", truth.plume_body_loss), ("plume_fin_loss", truth.plume_fin_loss)] {
+        if !(-1.0..=1.0).contains(&value) {
+            return refuse(key, value, "-1 to 1");
+        }
+    }
+    for (key, value) in [("gimbal_slop_rad", truth.gimbal_slop_rad), ("fin_slop_rad", truth.fin_slop_rad)] {
+        if !(0.0..=0.5).contains(&value) {
+            return refuse(key, value, "0 to 0.5");
+        }
+    }
+    if !(0.0..=1.0).contains(&truth.wind_exponent) {
+        return refuse("wind_exponent", truth.wind_exponent, "0 to 1");
+    }
+    if !(-0.05..=0.05).contains(&truth.wind_veer_rad_m) {
+        return refuse("wind_veer_rad_m", truth.wind_veer_rad_m, "-0.05 to 0.05");
+    }
+    for value in truth.thrust_shape {
+        if value.is_nan() || value.abs() > SHAPE_MOST {
+            return refuse("thrust_shape", value, "-0.19 to 0.19");
+        }
+    }
+    for value in truth.fin_offset_rad {
+        if !(-0.5..=0.5).contains(&value) {
+            return refuse("fin_offset_rad", value, "-0.5 to 0.5");
+        }
+    }
+    for value in truth.ground_rise {
+        if !(-0.3..=0.3).contains(&value) {
+            return refuse("ground_rise", value, "-0.3 to 0.3");
+        }
     }
     for value in truth.thrust_misalignment_rad {
         if !(-0.5..=0.5).contains(&value) {

@@ -28,7 +28,8 @@ impl World {
 
     /// Height of the feet above the ground as if the vehicle were upright, m; zero at touchdown.
     pub fn height_m(&self) -> f64 {
-        self.state.position_m.z - self.cg_above_feet_m()
+        let place_m = &self.state.position_m;
+        place_m.z - self.truth.ground_m(place_m.x, place_m.y) - self.cg_above_feet_m()
     }
 
     /// Distance from the feet up to the centre of gravity, along the axis, m.
@@ -69,11 +70,21 @@ impl World {
 
     /// Gimbal angles of the nozzle (pitch, yaw) without the thrust's misalignment, rad.
     pub fn gimbal_rad(&self) -> [f64; 2] {
+        [0, 1].map(|axis: usize| self.gimbal_links[axis].rad())
+    }
+
+    /// Gimbal angles (pitch, yaw) as the servos' feedback tells them, rad.
+    pub fn gimbal_feedback_rad(&self) -> [f64; 2] {
         [0, 1].map(|axis: usize| self.gimbal[axis].load_rad())
     }
 
     /// Opening angles of the fins, rad.
     pub fn fins_rad(&self) -> [f64; 4] {
+        [0, 1, 2, 3].map(|fin: usize| self.fin_links[fin].rad())
+    }
+
+    /// Opening angles of the fins as the servos' feedback tells them, rad.
+    pub fn fins_feedback_rad(&self) -> [f64; 4] {
         [0, 1, 2, 3].map(|fin: usize| self.fins[fin].load_rad())
     }
 
@@ -95,6 +106,18 @@ impl World {
     /// Whether the parachute was ejected.
     pub fn parachute_ejected(&self) -> bool {
         self.parachute.ejected()
+    }
+
+    /// When the parachute was ejected, s.
+    pub fn parachute_ejected_s(&self) -> Option<f64> {
+        self.parachute.ejected_s()
+    }
+
+    /// Height of the ground where a beam backwards along the axis meets it, m; the slope is taken as small.
+    pub fn ground_under_beam_m(&self) -> f64 {
+        let (place_m, nose) = (&self.state.position_m, self.state.nose_in_world());
+        let per_m = place_m.z / nose.z.max(0.1);
+        self.truth.ground_m(place_m.x - nose.x * per_m, place_m.y - nose.y * per_m)
     }
 
     /// Fraction of the parachute that is open, 0 to 1.

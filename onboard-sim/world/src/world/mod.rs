@@ -19,9 +19,10 @@ use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
 
 use crate::STEP_S;
-use crate::aero::{Configuration, Flow, Load, Shape};
+use crate::aero::{Configuration, Flow, Load, Plume, Shape};
 use crate::body::{self, Inertia, Loads};
 use crate::fault::Fault;
+use crate::linkage::Linkage;
 use crate::ground::{Ground, Rest, RestOutcome, Touchdown};
 use crate::motor::Motor;
 use crate::parachute::Parachute;
@@ -57,6 +58,8 @@ pub struct World {
     motor: Motor,
     gimbal: [Servo; 2],
     fins: [Servo; 4],
+    gimbal_links: [Linkage; 2],
+    fin_links: [Linkage; 4],
     parachute: Parachute,
     wind: Wind,
     ground: Ground,
@@ -156,11 +159,15 @@ impl World {
     }
 
     fn command(&mut self, actuators: &Actuators, time_s: f64) {
-        for (servo, command_rad) in self.gimbal.iter_mut().zip(actuators.gimbal_rad) {
+        for ((servo, link), command_rad) in
+            self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(actuators.gimbal_rad)
+        {
             servo.step(command_rad);
+            link.step(servo.load_rad());
         }
-        for (servo, command_rad) in self.fins.iter_mut().zip(actuators.fins_rad) {
+        for ((servo, link), command_rad) in self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad) {
             servo.step(command_rad);
+            link.step(servo.load_rad());
         }
         if actuators.ignite {
             self.motor.ignite(time_s);
@@ -175,18 +182,36 @@ impl World {
         Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + Vector3::from(self.truth.cg_offset_m)
     }
 
+    /// The exhaust's effect on the drag. The jet points upstream and pushes the air aside: wholly when its thrust exceeds
+    /// the dynamic pressure on the base, and in proportion below that. The ratio is the usual one for jets against the
+    /// wind; that the effect is full at 1 is an assumption (this vehicle burns at about 15 until the tail-off).
+    fn plume(&self, time_s: f64, density_kg_m3: f64) -> Plume {
+        let thrust_n = self.motor.thrust_n(time_s);
+        if thrust_n <= 0.0 {
+            return Plume { body: 1.0, fins: 1.0 };
+        }
+        let pressure_pa = 0.5 * density_kg_m3 * self.air_velocity_m_s().norm_squared();
+        let on_base_n = pressure_pa * self.airframe.body.reference_area_m2;
+        let strength = if thrust_n > on_base_n { 1.0 } else { thrust_n / on_base_n };
+        Plume {
+            body: 1.0 - self.truth.plume_body_loss * strength,
+            fins: 1.0 - self.truth.plume_fin_loss * strength,
+        }
+    }
+
     fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
         let cg_m = self.cg_m();
         let air = Air::at_height_m(self.state.position_m.z);
         let [pitch_rad, yaw_rad] =
-            [0, 1].map(|axis: usize| self.gimbal[axis].load_rad() + self.truth.thrust_misalignment_rad[axis]);
+            [0, 1].map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
         let arm_m = cg_m.x;
         let acting = Acting {
             shape: &self.shape,
             configuration: Configuration {
-                fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fins[fin].load_rad())),
+                fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
                 parachute_area_m2: self.parachute.drag_area_m2(),
+                plume: self.plume(from_s + 0.5 * step_s, air.density_kg_m3),
                 cg_m,
             },
             wind_m_s: self.wind.now_m_s(),
@@ -202,8 +227,8 @@ impl World {
         };
         let inertia = Inertia {
             mass_kg: self.mass.mass_kg,
-            pitch_kg_m2: self.mass.pitch_inertia_kg_m2,
-            roll_kg_m2: self.mass.roll_inertia_kg_m2,
+            pitch_kg_m2: self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale,
+            roll_kg_m2: self.mass.roll_inertia_kg_m2 * self.truth.inertia_scale,
         };
         let (state, specific_force_m_s2) =
             body::rk4_step(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s);

@@ -110,12 +110,8 @@ impl Scene {
             state.velocity_m_s += gained;
             state.world_from_body = next;
             ms += 1;
-            let truth = SensorTruth {
-                state,
-                specific_force_m_s2,
-                airspeed_m_s: through_air_m_s.norm(),
-                cg_over_feet_m: CG_OVER_FEET_M,
-            };
+            let truth =
+                SensorTruth::of_motion(&state, &specific_force_m_s2, through_air_m_s.norm(), CG_OVER_FEET_M);
             let time_s = f64::from(ms) * MS_S;
             if let Some(measurements) = sensors.observe(&truth, &(self.faults)(time_s)) {
                 let vehicle = VehicleNow {

@@ -102,12 +102,7 @@ fn fly(seed: u64) -> Vec<Frame> {
     while world.height_m() > 0.3 && world.steps() < 40_000 {
         world.step(&actuators);
         let state = *world.state();
-        let seen = SensorTruth {
-            state,
-            specific_force_m_s2: *world.specific_force_m_s2(),
-            airspeed_m_s: world.air_velocity_m_s().norm(),
-            cg_over_feet_m: world.cg_above_feet_m(),
-        };
+        let seen = SensorTruth::of(&world);
         let Some(measurements) = sensors.observe(&seen, &SensorFaults::default()) else { continue };
         let time_s = world.time_s();
         let before = motor.ignition_s().map_or(0.0, |ignition_s| time_s - ignition_s);
