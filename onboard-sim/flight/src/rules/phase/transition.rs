@@ -71,8 +71,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }
         (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
-        // After the flight a person may put the pin back and pull it again. Without it a motor that was not lit is
-        // live.
+        // After the flight a person may put the pin back and pull it again. Without the pin, a motor that was not lit
+        // is live.
         (P::Touchdown | P::Safed, E::PinInserted) => {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }

@@ -311,7 +311,7 @@ fn any_event() -> impl Strategy<Value = Event> {
     prop::sample::select(every_event())
 }
 
-/// Events that lead on, so that random sequences reach the late phases too.
+/// Events that advance the flight, so that random sequences reach the late phases too.
 fn likely_event() -> impl Strategy<Value = Event> {
     let leading = with_arm(&[
         Event::StartRequested { countdown_s: 1.0 },
