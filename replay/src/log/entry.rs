@@ -31,11 +31,11 @@ pub struct StampedEntry {
 pub enum Entry {
     /// A controller tick.
     Tick(Box<v1::ControllerTick>),
-    /// What the flight computer was built from at power-up.
+    /// The data from which the flight computer was built at power-up.
     ComputerStart(Box<computer_v1::ComputerStart>),
     /// A frame of the flight computer, from power-up on.
     ComputerFrame(Box<computer_v1::ComputerFrame>),
-    /// The start record of the flight computer: what it believed at its release.
+    /// The start record of the flight computer: its estimate at its release.
     PilotStart(Box<flight_v1::PilotStart>),
     /// A frame of the flight computer from apogee to touchdown.
     PilotTick(Box<flight_v1::PilotTick>),

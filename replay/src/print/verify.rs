@@ -80,7 +80,7 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     Ok(())
 }
 
-/// What the whole flight computer did from power-up on, or that only its ticks were compared.
+/// Prints the comparison of the flight computer's frames from power-up on, or that only its ticks were compared.
 fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
     let Some(frames) = &report.frames else {
         let nothing = report.ticks_compared == 0;
@@ -99,7 +99,7 @@ fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()
     }
 }
 
-/// Said of a log whose flight computer cannot be run again from power-up on.
+/// The remark on a log whose flight computer cannot be run again from power-up on.
 const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
 
 /// The file and, if it holds several flights, the flight's number.
