@@ -1,7 +1,7 @@
 //! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
 //!
-//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]). Both are
-//! flown by the same flight computer. This module has the interface that the run loop uses; the radio takes a
+//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]).
+//! Both are flown by the same flight computer. This module has the interface that the run loop uses; the radio takes a
 //! [`Snapshot`], and the log takes records ([`log`](self::log)).
 //!
 //! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
@@ -153,8 +153,7 @@ impl Vehicle {
     }
 
     /// Advances by one frame, in which these requests are decided. `stopwatch` may be any clock: only differences of
-    /// its
-    /// values are used, to time the flight computer.
+    /// its values are used, to time the flight computer.
     pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> Frame {
         let outside = Outside {
             pin_out: self.pin_out,

@@ -1,6 +1,5 @@
 //! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit. Both
-//! vehicles
-//! use the same records.
+//! vehicles use the same records.
 
 use flight::computer::crew::{Answer, Asked, Ending, Request};
 use flight::computer::pilot::Sensed;

@@ -1,8 +1,7 @@
 //! Converts flights into log records and back, bit for bit.
 //!
 //! The flight code does not know the log, and the log does not know the flight code. Programs that write or replay a
-//! log
-//! use this crate.
+//! log use this crate.
 //!
 //! * [`computer`]: the flight computer's frames from power-up on, of both vehicles.
 //! * [`pilot`]: the frames of a rocket in space from its release on.

@@ -1,6 +1,5 @@
 //! A simulated flight from apogee as log records: the flight computer's input, estimate and output in every frame, and
-//! the
-//! truth. A replay runs the flight computer again from these records.
+//! the truth. A replay runs the flight computer again from these records.
 
 use std::collections::BTreeMap;
 

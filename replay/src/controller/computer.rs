@@ -28,8 +28,7 @@ pub enum StartError {
 }
 
 /// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order. Missing frames
-/// mean
-/// that the computer was restarted: it is restarted here, too.
+/// mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
     computer: Computer,
@@ -41,8 +40,7 @@ pub struct LoggedComputer {
 
 impl LoggedComputer {
     /// The flight computer that a log's frames came from, before its first frame. It is built from the text of the
-    /// profile
-    /// or mission and from the law that the run facts name.
+    /// profile or mission and from the law that the run facts name.
     ///
     /// # Errors
     /// This build cannot use the text, or a name is unknown.
@@ -74,8 +72,7 @@ impl LoggedComputer {
     }
 
     /// The landing controller's tick in the last frame, as a log has it except for the measured times; `None` if the
-    /// frame
-    /// had no tick, and for a rocket in space.
+    /// frame had no tick, and for a rocket in space.
     pub fn controller_tick(&self) -> Option<v1::ControllerTick> {
         let tick = self.last.as_ref()?.tick.as_ref()?;
         Some(tick_log::tick_to_log(&tick.input, &tick.output, tick.state_digest, 0.0, 0.0))

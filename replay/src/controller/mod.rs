@@ -2,8 +2,7 @@
 //!
 //! There are three: the whole flight computer ([`LoggedComputer`], every frame from power-up on), the controller of the
 //! planar landing ([`LoggedController`], ten ticks a second) and the pilot of a flight from apogee ([`LoggedPilot`],
-//! two
-//! hundred frames a second, some of which plan). Verification and evaluation are written for any [`Replayed`].
+//! two hundred frames a second, some of which plan). Verification and evaluation are written for any [`Replayed`].
 
 mod computer;
 mod pilot;
@@ -34,8 +33,7 @@ pub trait Replayed {
     fn moment(tick: &Self::Tick) -> Moment;
 
     /// Distance between the gimbal commands of two records, rad, and between their predicted touchdowns, m, if they
-    /// have
-    /// any.
+    /// have any.
     fn apart(a: &Self::Tick, b: &Self::Tick) -> (f64, Option<f64>);
 
     /// Runs a recorded tick again: the result has the recorded input and the new decision. Measured times are copied,

@@ -40,8 +40,7 @@ impl LoggedController {
     }
 
     /// The controller that a log's ticks came from, before its first tick. It is built from the profile and from the
-    /// changes
-    /// of settings in flight that the run facts name.
+    /// changes of settings in flight that the run facts name.
     ///
     /// # Errors
     /// The run facts name settings that this build does not have.

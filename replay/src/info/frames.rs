@@ -20,7 +20,6 @@ pub struct FrameFacts {
     pub lost: usize,
     /// The first lost range: no frame after it can be re-executed.
     pub first_lost: Option<Gap>,
-    /// Number of repetitions.
     pub repeated: u64,
     /// Whether the log has the computer's start record.
     pub start: bool,

@@ -47,7 +47,7 @@ pub enum Entry {
     Truth(Box<v1::PlantTruth>),
     /// The landing verdict.
     Verdict(Box<v1::LandingVerdict>),
-    /// What a ground station knew.
+    /// The values that a ground station knew.
     Telemetry(Box<v1::Telemetry>),
     /// A raw frame: see the record's own bytes.
     RawFrame,
@@ -56,10 +56,7 @@ pub enum Entry {
     /// An event, as text for people; many programs write such records.
     Event(Box<foxglove::messages::Log>),
     /// A record on one of our topics that this build cannot read.
-    Unreadable {
-        /// Why.
-        reason: String,
-    },
+    Unreadable { reason: String },
     /// Anything else: transforms and records of other programs.
     Other,
 }

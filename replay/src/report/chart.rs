@@ -23,7 +23,6 @@ pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// A chart.
 #[derive(Default)]
 pub(super) struct Chart {
     pub(super) title: String,

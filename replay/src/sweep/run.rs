@@ -18,7 +18,6 @@ const QUEUE: usize = 256;
 pub struct Progress {
     /// Jobs finished, including those of an earlier run.
     pub done: usize,
-    /// All jobs.
     pub jobs: usize,
 }
 

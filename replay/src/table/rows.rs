@@ -35,7 +35,6 @@ impl Cell {
     }
 }
 
-/// One row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Index of its table in [`TableReader::shapes`].

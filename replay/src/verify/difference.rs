@@ -94,8 +94,7 @@ impl Serialize for FieldValue {
 }
 
 /// Distance of two numbers in representable numbers: 0 for equal bits, 1 for neighbours; -0.0 and 0.0 are 1 apart.
-/// `None`
-/// if either is NaN.
+/// `None` if either is NaN.
 pub fn ulp_distance(a: f64, b: f64) -> Option<u64> {
     (!a.is_nan() && !b.is_nan()).then(|| rank(a).abs_diff(rank(b)))
 }
@@ -181,7 +180,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_distance_is_symmetric_and_nil_only_for_equal_bits(a: u64, b: u64) {
+        fn the_distance_is_symmetric_and_zero_only_for_equal_bits(a: u64, b: u64) {
             let (a, b) = (f64::from_bits(a), f64::from_bits(b));
             prop_assert_eq!(ulp_distance(a, b), ulp_distance(b, a));
             if let Some(distance) = ulp_distance(a, b) {
@@ -190,7 +189,7 @@ mod tests {
         }
 
         #[test]
-        fn any_two_nans_with_other_payloads_differ(a: u64, b: u64) {
+        fn nans_with_different_payloads_differ(a: u64, b: u64) {
             const NAN: u64 = 0x7ff8_0000_0000_0000;
             let tick = |bits: u64| {
                 let mut tick = v1::ControllerTick::default();
@@ -209,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_of_other_lengths_differ_in_length() {
+    fn lists_of_different_lengths_differ_in_length() {
         let mut longer = v1::ControllerTick::default();
         longer.output.fin_command_rad = vec![1.0, 2.0];
         let mut shorter = longer.clone();

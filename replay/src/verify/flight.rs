@@ -27,8 +27,7 @@ pub(super) struct FlightVerifier {
 
 impl FlightVerifier {
     /// A flight before its first record. `behind_another`: another flight comes before it in the log. `unreadable`: why
-    /// a
-    /// record that may have been its beginning could not be read.
+    /// a record that may have been its beginning could not be read.
     pub(super) fn new(behind_another: bool, unreadable: Option<String>) -> Self {
         Self {
             from_power_up: None,

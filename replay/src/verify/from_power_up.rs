@@ -1,9 +1,8 @@
 //! Runs a flight computer again from power-up on, and compares its frames and its ticks.
 //!
 //! A log holds the decision of a frame twice: in the frame itself, and in the tick of the pilot or of the landing
-//! controller,
-//! which the other tools read. Both are compared with the same run of the computer. They are matched by their numbers,
-//! because another tool may have sorted the records.
+//! controller, which the other tools read. Both are compared with the same run of the computer. They are matched by
+//! their numbers, because another tool may have sorted the records.
 
 use std::collections::BTreeMap;
 
@@ -124,8 +123,7 @@ impl FromPowerUp {
     }
 
     /// The compared ticks, the report on the frames, and why not all of them were compared. `whole`: the log was read
-    /// to
-    /// its end.
+    /// to its end.
     pub(super) fn finish(mut self, whole: bool) -> (Tally, FramesReport, Option<Obstacle>) {
         if whole {
             // A tick that was computed and is missing in the log, although a later tick is there.

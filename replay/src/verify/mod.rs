@@ -4,10 +4,8 @@
 //! compares every field of the output, and the digest of the memory, with the record. Measured times are not compared.
 //!
 //! A log of this release has every frame of the whole flight computer from power-up on, for both vehicles. The whole
-//! computer
-//! is then run again, so self-test, arming, countdown, gate and abort are compared as well. Older logs, and logs of
-//! flights
-//! that begin at their release, have only ticks from the release on, and the report says so.
+//! computer is then run again, so self-test, arming, countdown, gate and abort are compared as well. Older logs, and
+//! logs of flights that begin at their release, have only ticks from the release on, and the report says so.
 //!
 //! The controller remembers its plan, so a tick can be re-executed only if every tick before it can be. The comparison
 //! ends at a gap, and the report says so.
@@ -16,8 +14,7 @@
 //! identical, and a flight whose record ends before the flight did is reported as cut.
 //!
 //! For a divergence, the report says how it grows from tick to tick. If a whole file is verified, it also says whether
-//! the
-//! landing would end differently: only for this, the flight is simulated from the first tick that differs.
+//! the landing would end differently: only for this, the flight is simulated from the first tick that differs.
 
 mod consequence;
 mod difference;
@@ -72,8 +69,7 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 }
 
 /// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first tick comes before
-/// its
-/// profile.
+/// its profile.
 ///
 /// # Errors
 /// As [`verify`].

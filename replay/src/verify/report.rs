@@ -10,7 +10,7 @@ use super::unread::Unread;
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut};
 
-/// The answer.
+/// The result of a verification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verification {
@@ -85,10 +85,7 @@ pub enum Obstacle {
     TickWithoutFrame { tick: u64 },
     /// A record cannot be read.
     #[error("a record cannot be read: {reason}")]
-    Unreadable {
-        /// Why.
-        reason: String,
-    },
+    Unreadable { reason: String },
     /// A flight computer was released, and none of its frames follow.
     #[error("it has a record /pilot/start and no frame of the flight computer behind it")]
     NoFrames,
@@ -150,7 +147,7 @@ pub struct VerifyReport {
     pub file: String,
     /// The place of the flight, if the log holds several.
     pub flight: Option<FlightPlace>,
-    /// The answer.
+    /// The result of a verification.
     pub outcome: Verification,
     /// The frames of the flight computer from power-up on; `None` if the log has none, so that only its ticks were
     /// compared.

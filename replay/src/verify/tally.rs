@@ -41,8 +41,7 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Compares a record with the recomputed one. `apart` gives the distance of their gimbal commands, rad, and of
-    /// their
-    /// predicted touchdowns, m.
+    /// their predicted touchdowns, m.
     pub(super) fn compare<M: Message>(
         &mut self,
         moment: Moment,

@@ -87,7 +87,7 @@ fn a_comparison_exits_1_outside_its_tolerance() {
 }
 
 #[test]
-fn each_loop_says_which_it_is_and_unknown_names_exit_2() {
+fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
     let log = &NOMINAL.log;
     for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
         let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75"]));
@@ -141,7 +141,7 @@ fn an_unreadable_log_does_not_hide_the_others() {
 }
 
 #[test]
-fn a_tick_is_shown_and_one_that_is_not_there_exits_2() {
+fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     let (code, stdout, _) = run(replay("tick", &NOMINAL.log).arg("30"));
     assert_eq!(code, 0);
     for part in [

@@ -1,6 +1,5 @@
 //! Tests that the whole flight computer is run again from power-up on, for both vehicles: pin, arming, countdown, hold,
-//! abort,
-//! restart.
+//! abort, restart.
 
 use std::path::PathBuf;
 use std::time::Duration;

@@ -38,7 +38,7 @@ fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn nothing_that_is_there_is_overwritten_without_force() {
+fn no_existing_file_is_overwritten_without_force() {
     for (arguments, name) in writers() {
         let (directory, log) = copied(&WITH_FRAMES.log);
         let output = directory.path().join(name);

@@ -65,7 +65,6 @@ pub struct Plans {
     pub best_feasible: u64,
     /// The previous plan, shifted.
     pub shifted: u64,
-    /// The upright law.
     pub stabiliser: u64,
     pub solver_iterations: u64,
     /// Solves that did not converge.

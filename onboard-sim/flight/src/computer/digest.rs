@@ -7,8 +7,7 @@ use crate::guidance::controller::ControllerState;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
 
 /// The part of the phase table that decides in the air. Times of the vehicle's clock decide nothing there, nor do the
-/// pin
-/// and the arming, which a person may change on the ground.
+/// pin and the arming, which a person may change on the ground.
 struct InTheAir<'a>(&'a Computer);
 
 impl Remembers for InTheAir<'_> {

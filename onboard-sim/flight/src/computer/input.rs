@@ -7,7 +7,6 @@ use super::pilot::{PilotInput, Sensed};
 use super::plane::PlaneSensed;
 use crate::rules::arming::{PredictedLanding, Uplink};
 
-/// State of the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
     /// The log is being written, or the operator chose to fly without one.
@@ -81,8 +80,7 @@ pub struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// A frame in the air of a computer that was [released at once](Computer::released), made from its record in a
-    /// pilot's
-    /// log: no station is connected, and a recorded abort becomes a request.
+    /// pilot's log: no station is connected, and a recorded abort becomes a request.
     pub fn in_the_air(input: &PilotInput) -> Self {
         const ABORT: [Request; 1] =
             [Request { asked: Asked::Abort, uplink: Uplink::NotNeeded, station: None }];

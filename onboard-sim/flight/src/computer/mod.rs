@@ -1,8 +1,8 @@
 //! The flight computer: everything that decides on board, from power-up to safed.
 //!
-//! [`Computer::step`] is the only way forward: one [`Input`] a frame, one [`Output`] back, and the same inputs give the same
-//! outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing are all decided here,
-//! through one [phase table](crate::rules::phase).
+//! [`Computer::step`] is the only way to advance it: one [`Input`] a frame, one [`Output`] back, and the same inputs
+//! give the same outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing
+//! are all decided here, through one [phase table](crate::rules::phase).
 //!
 //! * [`table`]: the phase table as the computer uses it: each event goes through it once.
 //! * [`crew`], `requests`: the crew's requests, and the decision about each.
@@ -61,7 +61,7 @@ pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 pub const AT_REST_S: f64 = 1.0;
 
-/// When the vehicle was let go.
+/// When the vehicle was released.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Release {
     frame: u64,
@@ -289,8 +289,7 @@ impl Computer {
     }
 
     /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED depends on the
-    /// motor: it
-    /// may come much later, or never.
+    /// motor: it may come much later, or never.
     pub fn is_over(&self) -> bool {
         let mode = self.table.mode();
         let in_phase_s = self.table.time_s() - mode.entered_at_s;

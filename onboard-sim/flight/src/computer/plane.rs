@@ -1,8 +1,7 @@
 //! The landing paper's planar vehicle: a rig that holds it until its release, and a landing from there.
 //!
 //! A sample is several frames. On a sample, in this order: the actuators get the commands decided one sample earlier,
-//! the
-//! phases change, the controller runs, the ignition gate is checked. The motor is measured in every frame.
+//! the phases change, the controller runs, the ignition gate is checked. The motor is measured in every frame.
 
 use alloc::boxed::Box;
 use alloc::format;

@@ -1,6 +1,5 @@
 //! Starts of a flight computer: at power-up, at its release, at a moment of a recorded landing, and after a restart in
-//! the
-//! air; and changes of its settings.
+//! the air; and changes of its settings.
 
 use alloc::boxed::Box;
 
@@ -22,8 +21,7 @@ use crate::vehicle::rigid::RigidState;
 
 impl Computer {
     /// The computer of a rocket at power-up on its pad. No ascent is flown: `believed` is its estimate of the state at
-    /// the
-    /// release at apogee.
+    /// the release at apogee.
     pub fn in_space(mission: &Mission, law: Law, believed: &RigidState) -> Self {
         let space = Space::new(mission, law, believed);
         let closed_rad = mission.airframe.fins.closed_rad();

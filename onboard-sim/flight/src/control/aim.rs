@@ -66,7 +66,6 @@ pub fn turn_to_aim_rad(world_from_body: &UnitQuaternion<f64>, nose_in_world: &Ve
 pub struct AimGains {
     /// Natural frequency of the closed loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Its damping ratio.
     pub damping: f64,
     /// Time from a command to the motion it causes, s.
     pub latency_s: f64,

@@ -272,7 +272,7 @@ impl Sortie {
         }
     }
 
-    /// Whether the flight goes on: the vehicle is not at rest and the time limit has not passed.
+    /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
     }
@@ -356,7 +356,7 @@ impl Sortie {
         &self.radio
     }
 
-    /// What the flight computer believes about its state at apogee.
+    /// The flight computer's estimate of its state at apogee.
     pub fn believed_at_apogee(&self) -> &RigidState {
         &self.believed
     }

@@ -20,7 +20,7 @@ fn val_catalogue_impulse_of_the_builtin_motors() {
 }
 
 #[test]
-fn every_builtin_motor_parses_and_carries_its_origin() {
+fn every_builtin_motor_parses_and_states_its_origin() {
     for (name, text) in BUILTIN {
         let motor = builtin(name).unwrap();
         assert!(name.starts_with(motor.name().trim_end_matches('W')), "{name}: {}", motor.name());

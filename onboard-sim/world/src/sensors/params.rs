@@ -36,7 +36,6 @@ pub struct ImuParams {
     pub accelerometer_range_g: f64,
 }
 
-/// Barometer.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BarometerParams {
@@ -163,9 +162,7 @@ impl Default for LidarParams {
 pub struct SensorParamError {
     /// Section and field.
     pub field: &'static str,
-    /// The value found.
     pub found: f64,
-    /// What would be accepted.
     pub accepted: &'static str,
 }
 

@@ -38,9 +38,7 @@ pub enum WorldError {
     Truth {
         /// The parameter.
         key: &'static str,
-        /// The value found.
         found: f64,
-        /// What would be accepted.
         required: &'static str,
     },
     /// The initial state is not finite, or its attitude is not a rotation.

@@ -1,4 +1,4 @@
-//! The estimator with the modelled sensors: it is consistent, accurate enough for landing, and steady when sensors
+//! Tests the estimator with the modelled sensors: it is consistent, accurate enough for landing, and works when sensors
 //! fail.
 #![expect(clippy::expect_used, reason = "a test says what it expected")]
 
@@ -101,7 +101,7 @@ fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
 }
 
 #[test]
-fn the_two_heights_agree_at_ignition_and_show_a_jump_of_one() {
+fn the_two_heights_agree_at_ignition_and_show_a_jump_of_the_barometer() {
     let flights = &*HEALTHY;
     for frame in frames(flights, |frame| frame.time_s > 1.0) {
         let apart_m = frame.estimate.heights.disagreement_m().expect("two heights");

@@ -1,5 +1,5 @@
-//! The estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that knows
-//! the truth lights the motor and holds the vehicle upright.
+//! Tests the estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that
+//! knows the truth lights the motor and holds the vehicle upright.
 
 use std::sync::LazyLock;
 

@@ -1,13 +1,10 @@
 //! The motor and the fin opening that a plan assumes.
 //!
 //! Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is therefore made for a
-//! motor
-//! that is weaker than estimated, by the number of standard deviations that the mission sets as its caution. The motor
-//! must not be so weak that no landing is possible: such a plan would turn the vehicle across the air to brake, and
-//! spoil
-//! the landing for every stronger motor. So the plan takes the weakest of these motors that can still land from here.
-//! The
-//! fins are assumed as open as they would be with that motor, because they follow the motor's estimate.
+//! motor that is weaker than estimated, by the number of standard deviations that the mission sets as its caution. The
+//! motor must not be so weak that no landing is possible: such a plan would turn the vehicle across the air to brake,
+//! and spoil the landing for every stronger motor. So the plan takes the weakest of these motors that can still land
+//! from here. The fins are assumed as open as they would be with that motor, because they follow the motor's estimate.
 //!
 //! High in the band of feasible heights, a hard landing in a plan for a weak motor has another cause: the plan has not
 //! found a way to sink faster. There the motor as estimated is tried as well, because braking upright, which helps a

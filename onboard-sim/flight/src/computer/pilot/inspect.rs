@@ -24,9 +24,8 @@ impl Pilot {
     }
 
     /// The states of the plan being flown and the step between them, s, if there is a plan. They lie in the plane of
-    /// the
-    /// landing, in the frame that moves with the wind along that plane and coincided with the ground's when the plan
-    /// began.
+    /// the landing, in the frame that moves with the wind along that plane and coincided with the ground's when the
+    /// plan began.
     pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
         self.powered.planned()
     }
@@ -42,8 +41,7 @@ impl Pilot {
     }
 
     /// The landing planned in this frame, solved separately; `None` if none was planned. `before` is this pilot one
-    /// frame
-    /// earlier.
+    /// frame earlier.
     pub(crate) fn landing_planned(
         &self,
         before: &Self,

@@ -1,8 +1,8 @@
 //! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
 //!
 //! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms: estimate, watch
-//! the
-//! motor, move through the phases, point fins and gimbal. Every tenth frame it makes the outlook and plans the landing.
+//! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the outlook and plans the
+//! landing.
 
 mod assumed;
 mod digest;

@@ -33,8 +33,7 @@ pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_d
 }
 
 /// Where a vehicle would touch down without further steering, m, in the world's horizontal axes: from a place, m, with
-/// a
-/// velocity, m/s, and its feet at a height, m.
+/// a velocity, m/s, and its feet at a height, m.
 pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m: f64) -> Vector2<f64> {
     let to_ground_s = height_m.max(0.0) / (-velocity_m_s.z).max(FALL_MIN_M_S);
     (place_m + velocity_m_s * to_ground_s).xy()

@@ -9,10 +9,8 @@ impl Pilot {
     /// This pilot after a restart at `time_s`.
     ///
     /// Kept, as if in memory that survives a power loss: the knowledge of motor and drag, the last commands, and the
-    /// last
-    /// estimate. The estimate is extrapolated over the lost time with the last measured rates and forces, and gets the
-    /// same
-    /// uncertainty as at apogee. Estimator, outlook, plan and gimbal loop start afresh.
+    /// last estimate. The estimate is extrapolated over the lost time with the last measured rates and forces, and gets
+    /// the same uncertainty as at apogee. Estimator, outlook, plan and gimbal loop start afresh.
     #[must_use]
     pub fn restarted(&self, time_s: f64) -> Self {
         let mission = &self.known.mission;

@@ -25,8 +25,8 @@ pub(super) const FIN_THERE_RAD: f64 = 0.1;
 /// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
-/// Beyond this angle between nose and airflow, rad, the body's moment exceeds the one that closing some of the fins can
-/// set against it: all fins are opened then.
+/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
+/// fins can set against it: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
 /// Below this airspeed the air cannot turn the vehicle, m/s.
 const AIR_TURNS_M_S: f64 = 12.0;

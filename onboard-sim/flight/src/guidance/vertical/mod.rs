@@ -44,7 +44,6 @@ pub struct Column {
     /// Mass before ignition, kg.
     pub mass_at_ignition_kg: f64,
     pub gravity_m_s2: f64,
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
     /// Drag area of the body along its axis, m^2.
     pub body_drag_area_m2: f64,

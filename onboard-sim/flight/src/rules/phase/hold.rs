@@ -21,7 +21,6 @@ pub enum HoldCause {
 /// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hold {
-    /// Why.
     pub cause: HoldCause,
     /// When the countdown was held, vehicle time, s.
     pub at_s: f64,

@@ -7,7 +7,6 @@ use super::{Effect, Effects, Event, Hold, Interlocks, Mode, Motor, Phase, Refusa
 pub struct Transition {
     /// The mode afterwards; unchanged if refused.
     pub mode: Mode,
-    /// The effects.
     pub effects: Effects,
     /// The reason, if refused.
     pub refusal: Option<Refusal>,
