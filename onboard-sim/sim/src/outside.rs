@@ -40,7 +40,7 @@ pub trait Watch {
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer);
 }
 
-/// Nobody watches, and no clock runs.
+/// No observer and no clock.
 #[derive(Debug, Clone, Copy)]
 pub struct Unwatched;
 

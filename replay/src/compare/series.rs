@@ -71,7 +71,7 @@ pub struct Flown {
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
-    /// Number of values left out because their times are earlier than the one before.
+    /// Number of values left out because their times are earlier than the time before them.
     pub out_of_order: usize,
 }
 

@@ -55,7 +55,7 @@ pub enum EvaluateError {
     },
 }
 
-/// A tick: the recorded decision and the one with other settings.
+/// A tick: the recorded decision, and the decision with other settings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EvaluatedTick {
     pub tick: u64,

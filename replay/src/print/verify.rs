@@ -155,7 +155,7 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
     Ok(())
 }
 
-/// The first diverged tick, those 1, 2, 4, 8 and so on after it, the worst one and the last one.
+/// Prints the first diverged tick, the ticks 1, 2, 4, 8 and so on after it, the worst tick and the last tick.
 fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "how it grows (gimbal command, predicted touchdown, worst field):")?;
     let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());

@@ -5,7 +5,7 @@ use super::html::{escaped, put};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
-/// Height of a tall picture: it stands beside three others.
+/// Height of a tall picture, which is placed next to three others.
 const TALL: f64 = 800.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;

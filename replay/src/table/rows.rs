@@ -61,7 +61,7 @@ struct Known {
 }
 
 impl TableReader {
-    /// A reader that has seen nothing yet.
+    /// A reader before its first record.
     pub fn new() -> Self {
         Self::default()
     }

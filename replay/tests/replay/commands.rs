@@ -15,7 +15,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--junit"));
     assert_eq!(code, 1);
     assert!(stdout.contains("tests=\"2\" skipped=\"0\" failures=\"1\" errors=\"0\""), "{stdout}");
-    // The hand-flown log ends a hair below the ground, which the simulation does not.
+    // The hand-made log ends slightly below the ground; the simulation does not.
     assert!(stdout.contains("verdict: would CHANGE: recorded NOT LANDED"), "{stdout}");
     assert!(
         stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_command_rad"),

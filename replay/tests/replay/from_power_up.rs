@@ -86,7 +86,7 @@ impl Flown {
                 return flown;
             }
         }
-        panic!("still {:?}", vehicle.phase());
+        panic!("the flight has not ended: {:?}", vehicle.phase());
     }
 
     /// Records a frame as the run loop does.
@@ -149,7 +149,7 @@ impl Flown {
 }
 
 fn all_frames_identical(report: &VerifyReport) -> u64 {
-    let frames = report.frames.as_ref().expect("frames");
+    let frames = report.frames.as_ref().expect("a report on the frames");
     assert_eq!((frames.recorded, frames.different), (frames.compared, 0), "{report:?}");
     assert_eq!((report.ticks_recorded, report.ticks_different), (report.ticks_compared, 0), "{report:?}");
     assert_eq!(report.obstacle, None);

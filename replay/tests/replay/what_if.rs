@@ -246,7 +246,7 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
         let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
         bisect(&recording, &options).unwrap_err().to_string()
     };
-    // A key that the profile leaves out, and an unknown one.
+    // A key that the profile leaves out, and an unknown key.
     assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));
     let unknown = refused("nmpc.wieghts.w");
     assert!(unknown.contains("did you mean `nmpc.weights.w`?"), "{unknown}");

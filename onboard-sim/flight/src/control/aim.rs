@@ -261,7 +261,7 @@ mod tests {
         for _ in 0..800 {
             let command = aim_loop.command_rad(&attitude, &rate, turning, &Aim::upright(), 0.12);
             pipe.push_back(command);
-            let applied = pipe.pop_front().expect("filled");
+            let applied = pipe.pop_front().expect("the queue is never empty");
             let acceleration = Vector3::new(
                 0.0,
                 disturbance_rad_s2 - turning * libm::sin(applied[0]),

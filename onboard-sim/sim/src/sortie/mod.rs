@@ -239,7 +239,7 @@ impl Sortie {
         let mut output = self.computer.step(&input);
         let took = watch.now().saturating_sub(began);
         watch.decided(&input, &output, &self.computer);
-        // Nobody waits for an answer to an abort that the computer itself asked for.
+        // An abort from `abort` has no station that waits for its answer.
         output.answers.truncate(outside.requests.len());
         self.command(&output.commands);
         if output.released {
@@ -351,7 +351,7 @@ impl Sortie {
         self.injector.happened()
     }
 
-    /// The radio. In a campaign nobody is at its other end; in a live flight the ground is.
+    /// The radio. In a campaign there is no station; in a live flight the ground listens.
     pub fn radio(&self) -> &Radio {
         &self.radio
     }

@@ -53,7 +53,7 @@ fn height_rms_m(at: &[&Frame]) -> f64 {
 #[test]
 fn val_chi_square_the_error_matches_the_filters_covariance() {
     let flights = &*HEALTHY;
-    let shortest = flights.iter().map(Vec::len).min().expect("flights");
+    let shortest = flights.iter().map(Vec::len).min().expect("at least one flight");
     // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard deviation of 60, and
     // 99.9 % of it lies within 3.29 of them (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking
     // and Navigation", section 5.4).
@@ -92,7 +92,7 @@ fn the_estimate_is_accurate_enough_for_landing() {
 fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
     let lit: Vec<&Frame> =
-        flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("lit")).collect();
+        flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("a frame with the motor burning")).collect();
     for axis in 0..2 {
         let error_m_s = rms(&lit, |frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]);
         println!("wind at ignition: {error_m_s:.2} m/s");

@@ -8,7 +8,7 @@
 //!
 //! High in the band of feasible heights, a hard landing in a plan for a weak motor has another cause: the plan has not
 //! found a way to sink faster. There the motor as estimated is tried as well, because braking upright, which helps a
-//! vehicle that is too low, would make this one hover.
+//! vehicle that is too low, would make this vehicle hover.
 
 use super::known::{Burning, Known};
 use crate::estimation::estimator::Estimate;
@@ -29,7 +29,7 @@ struct Assumed<'a> {
 }
 
 impl Known {
-    /// The situations to plan with: the preferred one, and a fallback for the case that its plan lands hard.
+    /// The preferred situation to plan with, and a fallback for the case that its plan lands hard.
     pub(super) fn situations_to_plan<'a>(
         &'a self,
         estimate: &Estimate,

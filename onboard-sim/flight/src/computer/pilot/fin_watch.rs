@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn a_stuck_fin_is_found_although_the_command_sweeps_past_it() {
-        let found_s = found_after_s(2.3, 5.0).expect("found");
+        let found_s = found_after_s(2.3, 5.0).expect("the stuck fin is found");
         assert!((2.5..3.3).contains(&found_s), "{found_s}");
     }
 

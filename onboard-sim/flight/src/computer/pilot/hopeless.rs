@@ -66,7 +66,7 @@ mod tests {
 
     /// Height of the parachute's release in a fall, m, with or without fins that answer.
     fn released_m(fins_answer: bool) -> Option<f64> {
-        let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
+        let mission = crate::vehicles::mission::builtin("mk2").expect("a built-in mission").expect("a valid mission");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee());
         let (mut table, mut fins_rad) = (released(), [0.0; 4]);
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn the_parachute_is_released_in_time_only_if_the_fins_do_not_answer() {
         assert_eq!(released_m(true), None);
-        let released_m = released_m(false).expect("released");
+        let released_m = released_m(false).expect("the parachute is released");
         // 1.5 times the sum of one second's fall and 20 m of inflation, plus the feet's distance below the centre of
         // gravity.
         assert!((87.0..93.0).contains(&released_m), "{released_m}");

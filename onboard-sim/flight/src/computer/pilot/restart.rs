@@ -55,7 +55,7 @@ mod tests {
     fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
         pilot.step(&mut released(), &input(1, 0.0));
-        let mut estimate = pilot.estimate.expect("it has felt something");
+        let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);
         let found = pilot.restarted(estimate.time_s + 0.2).estimator.estimate().state.world_from_body;

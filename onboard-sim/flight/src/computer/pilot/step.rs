@@ -359,7 +359,7 @@ impl Pilot {
         let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
             && !mode.interlocks.landing_motor_inhibited;
         if !(steering || burning) {
-            // On the ground they stay where they are: no servo should move near people.
+            // On the ground they stay where they are: no servo needs to move there.
             let keep = matches!(mode.phase, Phase::Touchdown | Phase::Safed);
             return if keep { self.fins_rad } else { [fins.open_rad(); 4] };
         }
