@@ -244,8 +244,9 @@ mod tests {
         let mut state = falling();
         state.position_m.x = 60.0;
         let nose = gains().demand(&state, &situation(), true).nose_in_world;
-        state.world_from_body =
-            UnitQuaternion::rotation_between(&Vector3::z(), &nose).expect("the directions are not opposite") * upright();
+        state.world_from_body = UnitQuaternion::rotation_between(&Vector3::z(), &nose)
+            .expect("the directions are not opposite")
+            * upright();
         let demand = gains().demand(&state, &situation(), true);
         let lean_rad = 14.0_f64.to_radians();
         let weathercock_m3 = (0.0061 - 0.0622 * 0.05 * libm::sin(lean_rad)) * lean_rad;

@@ -91,8 +91,10 @@ fn the_estimate_is_accurate_enough_for_landing() {
 #[test]
 fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
-    let lit: Vec<&Frame> =
-        flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("a frame with the motor burning")).collect();
+    let lit: Vec<&Frame> = flights
+        .iter()
+        .map(|frames| frames.iter().find(|frame| frame.burning).expect("a frame with the motor burning"))
+        .collect();
     for axis in 0..2 {
         let error_m_s = rms(&lit, |frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]);
         println!("wind at ignition: {error_m_s:.2} m/s");

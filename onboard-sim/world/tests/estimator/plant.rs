@@ -164,7 +164,10 @@ static FLOWN: LazyLock<Vec<(Truth, Vec<Frame>)>> =
 /// Every flight's truth, with its first frame at this time after the thrust began.
 fn burning_for(since_s: f64) -> Vec<(&'static Truth, &'static Frame)> {
     let at = |frame: &&Frame| frame.since_thrust_s.is_some_and(|found_s| found_s >= since_s);
-    FLOWN.iter().map(|(truth, frames)| (truth, frames.iter().find(at).expect("a frame with the motor burning"))).collect()
+    FLOWN
+        .iter()
+        .map(|(truth, frames)| (truth, frames.iter().find(at).expect("a frame with the motor burning")))
+        .collect()
 }
 
 fn rms(

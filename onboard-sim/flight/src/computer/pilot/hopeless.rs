@@ -66,7 +66,8 @@ mod tests {
 
     /// Height of the parachute's release in a fall, m, with or without fins that answer.
     fn released_m(fins_answer: bool) -> Option<f64> {
-        let mission = crate::vehicles::mission::builtin("mk2").expect("a built-in mission").expect("a valid mission");
+        let mission =
+            crate::vehicles::mission::builtin("mk2").expect("a built-in mission").expect("a valid mission");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee());
         let (mut table, mut fins_rad) = (released(), [0.0; 4]);
