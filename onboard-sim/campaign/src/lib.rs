@@ -1,7 +1,7 @@
 //! Simulates thousands of flights on several threads and summarises how they end.
 //!
 //! * [`order`]: everything that a campaign's results depend on.
-//! * [`tally`]: one flight of a campaign, and what is counted during it.
+//! * [`tally`]: flies one flight of a campaign and collects the values of its row.
 //! * [`row`]: one flight as a row of a table.
 //! * [`run`]: flies the missing flights on several threads.
 //! * [`store`]: the directory of a campaign.

@@ -37,7 +37,7 @@ impl Order {
 /// Version of the directory's layout and of the columns.
 const FORMAT: u32 = 1;
 
-/// What the results in a directory were made from.
+/// The inputs from which the results in a directory were made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of the layout.

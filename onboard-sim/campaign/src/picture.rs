@@ -128,7 +128,7 @@ fn plain(value: f64) -> f64 {
     libm::round(value * 1e6) / 1e6
 }
 
-/// The marks differ in shape, too, so that they can be told apart in grey.
+/// The marks differ in shape, too, so that they can be distinguished in grey.
 fn scatter(rows: &[Row], title: &str, out: &mut String) -> fmt::Result {
     let places: Vec<(f64, f64, &Row)> = rows
         .iter()

@@ -58,7 +58,6 @@ pub struct Expectation {
     pub fault: &'static str,
     /// The expected outcome.
     pub expected: Expected,
-    /// Why.
     pub because: &'static str,
 }
 

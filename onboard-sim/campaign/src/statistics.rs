@@ -8,7 +8,6 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// A count of a total, with a 95 % confidence interval of the true fraction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Share {
-    /// The count.
     pub count: u64,
     /// The total.
     pub of: u64,

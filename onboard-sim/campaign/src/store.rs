@@ -39,7 +39,6 @@ pub enum StoreError {
     OtherOrder {
         /// The directory.
         path: PathBuf,
-        /// The first difference.
         difference: String,
     },
     /// A new campaign would overwrite an existing file.
@@ -54,9 +53,8 @@ pub enum StoreError {
     /// Some flights are missing.
     #[error("flights {from} to {to} are in none of the directories; fly the missing ones first")]
     Missing {
-        /// The first missing flight.
         from: u64,
-        /// The last missing flight.
+        /// The last missing flight; `from` is the first.
         to: u64,
     },
     /// Two directories have different results for the same flights.

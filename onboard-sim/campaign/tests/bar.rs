@@ -15,7 +15,7 @@ fn flown(dispersion: &str, controller: Controller, flights: u64) -> Vec<Row> {
 }
 
 #[test]
-fn regress_flights_without_dispersions_and_with_motor_scatter_alone_land_strictly() {
+fn regress_flights_without_dispersions_or_with_motor_scatter_only_land_strictly() {
     assert!(flown("none", Controller::Nmpc, 2).iter().all(|row| row.strict));
     assert!(flown("thrust-only", Controller::Nmpc, 10).iter().all(|row| row.strict));
 }

@@ -139,7 +139,7 @@ fn a_directory_of_another_order_or_in_use_is_refused_with_the_reason() {
     assert!(message.contains("text of the mission"), "{message}");
 }
 
-/// A directory with somebody else's files of the same names.
+/// A directory with files of the same names from another program.
 #[test]
 fn files_that_no_campaign_wrote_are_never_overwritten() {
     let order = order(1);

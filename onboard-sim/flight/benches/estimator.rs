@@ -25,7 +25,7 @@ const VEHICLE: VehicleNow = VehicleNow {
     lidar_behind_cg_m: 0.4,
 };
 
-/// A second of upright fall at a steady 39 m/s, low enough for the lidar. No other second takes longer.
+/// A second of upright fall at a steady 39 m/s, low enough for the lidar. It is the second with the most work.
 fn second() -> Vec<Measurements> {
     (1..=200_u32)
         .map(|frame| {

@@ -4,7 +4,7 @@
 //! It uses no clock, socket, file, thread or random source, and it needs no operating system. So a log of the inputs
 //! is enough to fly a flight again.
 //!
-//! The rooms, in reading order:
+//! The modules, in reading order:
 //!
 //! * [`vehicle`] describes the rocket, its motor, the air and a mission, as data.
 //! * [`estimation`] estimates from the sensors where the rocket is and how strong its motor is.

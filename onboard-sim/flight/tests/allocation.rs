@@ -10,7 +10,7 @@ use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Moto
 /// A disturbed landing with two ticks without an estimate and an abort at its end: every branch of a tick.
 #[test]
 fn powered_ticks_do_not_allocate() {
-    let profile = vehicles::profile::builtin("paper-calibrated").expect("built in");
+    let profile = vehicles::profile::builtin("paper-calibrated").expect("a built-in profile");
     let model = profile.planar_model();
     let mut controller = ControllerState::new(&ControllerConfig::from_profile(&profile));
     let mut input = ControllerInput {
@@ -41,7 +41,7 @@ fn powered_ticks_do_not_allocate() {
         let mut output = None;
         let allocated = allocation_counter::measure(|| output = Some(step(&mut controller, &told)));
         assert_eq!(allocated.count_total, 0, "tick {tick}");
-        let output = output.expect("measured");
+        let output = output.expect("a tick was run");
         levels.push(output.level);
         input.state = model.rk4_step(&input.state, input.gimbal_applied_rad, 33.3, 0.1);
         if tick % 7 == 3 {
@@ -71,7 +71,7 @@ impl Motor for Fading {
 
 #[test]
 fn warm_searches_for_the_final_time_do_not_allocate() {
-    let profile = vehicles::profile::builtin("paper-calibrated").expect("built in");
+    let profile = vehicles::profile::builtin("paper-calibrated").expect("a built-in profile");
     let mut problem = FreeTimeProblem {
         landing: landing_problem(&profile, profile.start.planar_state(), 0.0, 0, 1.0),
         intervals: 50,

@@ -51,7 +51,7 @@ struct Flight {
 }
 
 fn profile() -> Profile {
-    vehicles::profile::builtin("paper-calibrated").expect("built in")
+    vehicles::profile::builtin("paper-calibrated").expect("a built-in profile")
 }
 
 fn nominal() -> Scenario {

@@ -25,7 +25,6 @@ pub struct FinalBox {
     pub pitch_rate_deg_s: f64,
 }
 
-/// Limits of the solver.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverLimits {

@@ -10,7 +10,7 @@
 use super::{Solution, WarmStart};
 use crate::dynamics::PlanarState;
 
-/// A node this close to an old one, in intervals, counts as the same node.
+/// A node this close to an old node, in intervals, counts as the same node.
 const SAME_NODE: f64 = 1e-6;
 
 impl Solution {

@@ -20,7 +20,7 @@ use flight::vehicle::profile::Profile;
 use nmpc::{Problem, Solution, SolveStatus, WarmStart, Workspace, solve, solve_into};
 
 fn profile() -> Profile {
-    vehicles::profile::builtin("paper-calibrated").expect("built in")
+    vehicles::profile::builtin("paper-calibrated").expect("a built-in profile")
 }
 
 fn problem() -> Problem {

@@ -1,4 +1,4 @@
-//! What is uncertain about a flight, as data.
+//! The uncertain values of a flight, as data.
 
 use serde::Deserialize;
 use world::sensors::SensorParams;

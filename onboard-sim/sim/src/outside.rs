@@ -31,7 +31,7 @@ impl Outside<'_> {
     };
 }
 
-/// Someone who watches the flight computer at work.
+/// An observer of the flight computer.
 pub trait Watch {
     /// Any clock: only differences of it are used, to time the flight computer.
     fn now(&mut self) -> Duration;
@@ -40,7 +40,7 @@ pub trait Watch {
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer);
 }
 
-/// Nobody watches, and no clock runs.
+/// No observer and no clock.
 #[derive(Debug, Clone, Copy)]
 pub struct Unwatched;
 
@@ -57,7 +57,7 @@ impl Watch for Unwatched {
 pub struct Flown {
     /// What the flight computer decided; `None` while it is dead.
     pub output: Option<Output>,
-    /// How long that took, by the clock of whoever watches.
+    /// How long the decision took, by the observer's clock.
     pub took: Duration,
 }
 

@@ -10,10 +10,8 @@ use flight::guidance::baseline::Controller;
 /// Everything that a flight is made from. A log keeps the texts that the data were read from.
 #[derive(Debug, Clone)]
 pub struct Recipe {
-    /// The mission.
     pub mission: Mission,
     pub mission_toml: String,
-    /// The dispersions.
     pub dispersion: Dispersion,
     pub dispersion_name: String,
     pub dispersion_toml: String,

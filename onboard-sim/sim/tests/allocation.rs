@@ -1,4 +1,4 @@
-//! In the air the flight computer allocates nothing but the room of its first plans and the words it says.
+//! In the air the flight computer allocates only for the buffers of its first plans and for its messages.
 
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ impl Watch for Shadow {
 }
 
 #[test]
-fn after_its_first_plans_a_frame_in_which_nothing_is_said_does_not_allocate() {
+fn after_the_first_plans_a_frame_without_a_message_does_not_allocate() {
     let mut flight = Sortie::new(&Recipe::built_in("mk2", "field").unwrap(), 3).unwrap();
     let mut shadow =
         Shadow { computer: flight.computer().clone(), silent_frames: 0, plans: 0, allocating: Vec::new() };
@@ -45,7 +45,7 @@ fn after_its_first_plans_a_frame_in_which_nothing_is_said_does_not_allocate() {
         flight.step_with(&Outside::NOBODY, &mut shadow);
     }
     assert!(shadow.silent_frames > 2_000 && flight.outcome().legs);
-    // The solver's room and the two plans that it fills in turn are made by the first plans of a flight.
+    // The first plans of a flight allocate the solver's workspace and the two plans that it fills in turn.
     assert!(shadow.allocating.iter().all(|(_, plans, _)| *plans <= 2), "{:?}", shadow.allocating);
     assert!(shadow.plans > 20, "{}", shadow.plans);
 }

@@ -1,4 +1,4 @@
-//! What a vehicle reports as it goes.
+//! The events that a vehicle reports.
 
 use flight::computer::news::{News, Severity};
 use flight::computer::plane::PlanarTick;
@@ -7,7 +7,7 @@ use flight::rules::verdict::LandingVerdict;
 
 use sim::plane::plant::Impact;
 
-/// One tick of the planar vehicle's landing controller, and how long it took.
+/// One tick of the planar vehicle's landing controller, and its solve time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     pub tick: PlanarTick,
@@ -17,14 +17,12 @@ pub struct Tick {
     pub deadline_s: f64,
 }
 
-/// Something a vehicle reports.
+/// An event that a vehicle reports.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleEvent {
-    /// Words for the crew.
+    /// A message to the crew.
     Text {
-        /// How grave.
         severity: Severity,
-        /// The words.
         text: String,
     },
     PhaseChanged {
@@ -33,7 +31,7 @@ pub enum VehicleEvent {
     },
     /// The controller ran.
     Tick(Box<Tick>),
-    /// The flight computer from apogee ran a frame with a plan in it.
+    /// The pilot of a rocket in space planned in this frame.
     Planned {
         /// The frame's number, from apogee.
         frame: u64,
@@ -44,11 +42,11 @@ pub enum VehicleEvent {
         /// Allowed, s.
         deadline_s: f64,
     },
-    /// Touched down and judged.
+    /// The vehicle touched down and its landing was judged.
     Verdict {
         /// The contact that was judged.
         impact: Impact,
-        /// Limit by limit.
+        /// The verdict, limit by limit.
         verdict: Box<LandingVerdict>,
     },
 }

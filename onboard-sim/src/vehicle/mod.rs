@@ -1,10 +1,10 @@
-//! The simulated vehicle as it meets its crew: a flight that is stepped frame by frame, and what is told of it.
+//! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
 //!
-//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]). Both are
-//! flown by the same flight computer. What the run loop needs is here; the radio takes a [`Snapshot`] and the log its
-//! records ([`log`](self::log)).
+//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]).
+//! Both are flown by the same flight computer. This module has the interface that the run loop uses; the radio takes a
+//! [`Snapshot`], and the log takes records ([`log`](self::log)).
 //!
-//! Pure but for the stopwatch that its caller hands in to time the flight computer. Time is simulated.
+//! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
 
 mod events;
 mod ground;
@@ -37,10 +37,9 @@ pub use self::snapshot::{
 };
 use crate::streams::{FROM_APOGEE, STANDARD, Standard};
 
-/// Which flight of a rocket in space is flown.
+/// A flight of a rocket in space, by recipe and number.
 #[derive(Debug, Clone)]
 pub struct RocketFlight {
-    /// What it is made from.
     pub recipe: Recipe,
     pub number: u64,
 }
@@ -51,7 +50,7 @@ enum Flight {
     Plane(Box<PlanarFlight>),
 }
 
-/// A rocket in space, and what its sensors said last.
+/// A rocket in space, and the last values of its sensors.
 struct InSpace {
     sortie: Sortie,
     sensors: SensorWatch,
@@ -71,15 +70,15 @@ pub struct Vehicle {
     ground: Ground,
     /// How long the last tick of the planar vehicle took, s.
     tick_took_s: f64,
-    /// What the flight computer was given and decided in the last frame; `None` if it was dead.
+    /// Input and output of the flight computer in the last frame; `None` if it was dead.
     computer_frame: Option<Box<ComputerFrame>>,
-    /// How many frames it has decided.
+    /// How many frames the flight computer has decided.
     frames_decided: u64,
-    /// A frame that was recorded has what the rehearsal came to.
+    /// The result of the rehearsal is already in a recorded frame.
     rehearsed: bool,
 }
 
-/// Times the flight computer, and takes down what it was given and decided.
+/// Times the flight computer, and keeps its input and output.
 struct Watcher<'a> {
     stopwatch: &'a mut dyn FnMut() -> Duration,
     rehearsed_before: bool,
@@ -97,10 +96,10 @@ impl Watch for Watcher<'_> {
     }
 }
 
-/// What a frame has brought.
+/// The result of one frame.
 #[derive(Debug, Clone, Default)]
 pub struct Frame {
-    /// What has happened, in order.
+    /// Events, in order.
     pub events: Vec<VehicleEvent>,
     /// An answer to each request, in order; none while the flight computer is dead.
     pub answers: Vec<Answer>,
@@ -142,19 +141,19 @@ impl Vehicle {
         self.pin_out = pin_out;
     }
 
-    /// Tells the vehicle how its log fares.
+    /// Tells the vehicle the state of its log.
     pub fn set_log_state(&mut self, log: LogState) {
         self.log = log;
     }
 
-    /// Tells the vehicle how well it hears, and the station that armed it, if one did.
+    /// Tells the vehicle the quality of its uplink, and the station that armed it, if one did.
     pub fn set_uplink(&mut self, uplink: Uplink, commander: Option<Commander>) {
         self.uplink = uplink;
         self.commander = commander;
     }
 
-    /// Advances by one frame, in which these requests are decided. `stopwatch` is any clock; only differences of it are
-    /// used, to time the flight computer.
+    /// Advances by one frame, in which these requests are decided. `stopwatch` may be any clock: only differences of
+    /// its values are used, to time the flight computer.
     pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> Frame {
         let outside = Outside {
             pin_out: self.pin_out,
@@ -195,11 +194,11 @@ impl Vehicle {
                 space.sensors.take(measured, space.sortie.frame());
             }
         }
-        events.extend(self.told_by_the_simulation(released, took));
+        events.extend(self.events_of_the_simulation(released, took));
         Frame { events, answers }
     }
 
-    /// A frame of a rocket's pilot with a plan in it.
+    /// The event for a frame in which a rocket's pilot planned.
     fn planned(&mut self, took_s: f64) -> Option<VehicleEvent> {
         let Flight::Space(space) = &mut self.flight else { return None };
         space.took_s = took_s;
@@ -208,8 +207,9 @@ impl Vehicle {
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s })
     }
 
-    /// What only the simulation knows: where a flight begins, contact with the ground, a late output, the verdict.
-    fn told_by_the_simulation(&mut self, released: bool, took: Duration) -> Vec<VehicleEvent> {
+    /// Events that only the simulation knows: the start of the flight, contact with the ground, a late output, the
+    /// verdict.
+    fn events_of_the_simulation(&mut self, released: bool, took: Duration) -> Vec<VehicleEvent> {
         let mut said = Vec::new();
         match &self.flight {
             Flight::Space(space) if released => {
@@ -250,7 +250,6 @@ impl Vehicle {
         }
     }
 
-    /// Length of a frame, s.
     pub fn frame_s(&self) -> f64 {
         match &self.flight {
             Flight::Space(_) => flight::computer::FRAME_S,
@@ -280,17 +279,17 @@ impl Vehicle {
         self.mode().interlocks.abort_latched
     }
 
-    /// Whether nothing more will happen in this flight: it lies on the ground and is judged, or was aborted on the pad.
+    /// Whether the flight is over: the vehicle lies on the ground and is judged, or was aborted on the pad.
     pub fn is_over(&self) -> bool {
         self.ground.is_over(self.computer())
     }
 
-    /// The arming checks with the values found now.
+    /// The arming checks with the present values.
     pub fn arming_checks(&self) -> Vec<Check> {
         self.computer().arming_checks()
     }
 
-    /// Arming checks pass after this long, s, or never will. The rehearsal of a long flight takes its time.
+    /// Time within which the arming checks pass, s, if they ever do. The rehearsal of a long flight takes some seconds.
     pub fn ready_within_s(&self) -> f64 {
         match &self.flight {
             Flight::Space(_) => 10.0,
@@ -298,7 +297,7 @@ impl Vehicle {
         }
     }
 
-    /// Every message that is sent unasked.
+    /// Every message that is sent without a request.
     pub fn standard(&self) -> &'static [Standard] {
         match &self.flight {
             Flight::Space(_) => &FROM_APOGEE,
@@ -314,17 +313,19 @@ impl Vehicle {
         }
     }
 
-    /// The touchdown limits with the values found, once it is judged; of a rocket in space by what the legs take.
+    /// The touchdown limits with the values found, once the landing is judged; for a rocket in space, the limits of the
+    /// legs.
     pub fn judged(&self) -> Option<Judged> {
         self.ground.judged()
     }
 
-    /// The landing by the landing paper's Table 2, where [`Vehicle::judged`] goes by what the legs take.
+    /// The landing judged by the landing paper's Table 2; [`Vehicle::judged`] judges a rocket by the limits of the
+    /// legs.
     pub fn judged_by_table_2(&self) -> Option<Judged> {
         self.ground.judged_by_table_2()
     }
 
-    /// What the radio does to what is sent and heard.
+    /// The simulated radio: its silence and its delay.
     pub fn radio(&self) -> Radio {
         match &self.flight {
             Flight::Space(space) => {

@@ -1,5 +1,5 @@
-//! The flight computer's frames from power-up on, between its own types and the log's records, bit for bit. Both vehicles'
-//! frames are the same records.
+//! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit. Both
+//! vehicles use the same records.
 
 use flight::computer::crew::{Answer, Asked, Ending, Request};
 use flight::computer::pilot::Sensed;
@@ -13,7 +13,7 @@ use crate::pilot::{
 };
 use crate::{state_from_log, state_to_log};
 
-/// What can be asked for, by its number in the log.
+/// Requests, by their number in the log.
 const ASKED: [Asked; 5] = [Asked::Arm, Asked::Disarm, Asked::Start, Asked::Hold, Asked::Abort];
 
 /// A frame's input, read from a log.
@@ -25,14 +25,14 @@ pub struct LoggedInput {
 }
 
 impl LoggedInput {
-    /// As the flight computer takes it.
+    /// The input, as the flight computer takes it.
     pub fn input(&self) -> Input<'_> {
         Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
     }
 }
 
-/// A whole frame as a record; `computer` has just flown it. What the rehearsal came to is recorded in one frame only:
-/// `rehearsed_before` says that an earlier one has it.
+/// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded in one frame only:
+/// `rehearsed_before` says that an earlier frame has it.
 pub fn frame_to_log(
     input: &Input<'_>,
     output: &Output,
@@ -89,7 +89,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// A recorded input.
 ///
 /// # Errors
-/// It is not one of this build's.
+/// This build does not know some value of it.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLogError> {
     let frame = input.frame;
     let feeling = match (&input.measured, &input.known, &input.in_plane) {
@@ -189,7 +189,7 @@ fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
 }
 
 fn request_to_log(request: &Request) -> v1::Request {
-    // Every kind is in the list: a test holds that.
+    // Every kind is in the list; a test checks that.
     let asked = ASKED.iter().position(|known| *known == request.asked).unwrap_or(ASKED.len());
     v1::Request {
         asked: asked as u32,
@@ -290,7 +290,7 @@ mod tests {
             };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
-            // Once more, as bytes: floats that are not numbers are never equal to themselves.
+            // Compared as bytes as well, because a NaN never equals itself.
             prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_this_build_does_not_know_is_refused_by_its_frame() {
+    fn an_unknown_value_is_refused_with_the_number_of_its_frame() {
         let sensed = v1::PlaneSensed::default();
         let input = v1::ComputerInput {
             frame: 7,

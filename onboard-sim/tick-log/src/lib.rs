@@ -1,12 +1,12 @@
-//! Flights as log records, and back, without losing a bit.
+//! Converts flights into log records and back, bit for bit.
 //!
-//! The flight code knows nothing of logs and the log nothing of the flight code. Whoever writes or replays a log uses this
-//! crate.
+//! The flight code does not know the log, and the log does not know the flight code. Programs that write or replay a
+//! log use this crate.
 //!
 //! * [`computer`]: the flight computer's frames from power-up on, of both vehicles.
 //! * [`pilot`]: the frames of a rocket in space from its release on.
-//! * here: the ticks of the planar vehicle's landing controller, and its plant.
-//! * [`sortie`]: a simulated flight of a rocket as records, with the truth beside it.
+//! * This module: the ticks of the planar vehicle's landing controller, and its plant.
+//! * [`sortie`]: a simulated flight of a rocket as records, with the truth.
 
 pub mod computer;
 pub mod pilot;
@@ -66,7 +66,7 @@ pub fn input_to_log(input: &ControllerInput) -> v1::ControllerInput {
         gimbal_applied_rad: input.gimbal_applied_rad,
         thrust_scale: input.thrust_scale,
         degraded: input.degraded,
-        // Absent where it does not: a tick of an earlier flight is then written again as it was, byte for byte.
+        // Absent if false, so that a tick of an earlier flight is written again byte for byte.
         lands_here: input.lands_here.then_some(true),
         deadline_missed: input.deadline_missed,
     }
@@ -75,7 +75,7 @@ pub fn input_to_log(input: &ControllerInput) -> v1::ControllerInput {
 /// A recorded input.
 ///
 /// # Errors
-/// The phase is not one of this build's.
+/// This build does not know the phase.
 pub fn input_from_log(input: &v1::ControllerInput) -> Result<ControllerInput, TickLogError> {
     let unknown = TickLogError::UnknownPhase { tick: input.tick, phase: input.phase };
     let phase = u8::try_from(input.phase).ok().and_then(Phase::from_index).ok_or(unknown)?;
@@ -88,7 +88,7 @@ pub fn input_from_log(input: &v1::ControllerInput) -> Result<ControllerInput, Ti
         gimbal_applied_rad: input.gimbal_applied_rad,
         thrust_scale: input.thrust_scale,
         degraded: input.degraded,
-        // Earlier flights did not: an abort under thrust flew upright, which `degraded` says.
+        // In earlier flights the field is absent: after an abort under thrust they flew upright, as `degraded` says.
         lands_here: input.lands_here.unwrap_or(false),
         deadline_missed: input.deadline_missed,
     })
@@ -138,7 +138,7 @@ pub fn tick_to_log(
     }
 }
 
-/// A landing verdict as a record: the state at contact and how each limit was kept.
+/// A landing verdict as a record: the state at contact, and each limit with its result.
 pub fn verdict_to_log(time_s: f64, state: &PlanarState, verdict: &LandingVerdict) -> v1::LandingVerdict {
     let limits = verdict.results.iter().map(|result| v1::LimitResult {
         name: result.name.to_owned(),
@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// Before there was such a thing as landing here, an abort under thrust flew upright.
+    /// In earlier releases an abort under thrust flew upright instead of landing on the ground below.
     #[test]
     fn an_input_of_an_earlier_flight_does_not_land_here() {
         let earlier = v1::ControllerInput { degraded: true, ..v1::ControllerInput::default() };

@@ -1,4 +1,4 @@
-//! Frames of the flight computer between its own types and the log's records, bit for bit.
+//! Converts the pilot's frames between its own types and log records, bit for bit.
 
 use flight::computer::pilot::{PilotInput, PilotOutput, Sensed};
 use flight::estimation::estimator::{
@@ -17,11 +17,11 @@ pub enum PilotLogError {
     #[error("frame {frame}: {what} {found} is unknown; this build knows 0 to {most}")]
     Unknown {
         frame: u64,
-        /// What it is a number of.
+        /// The meaning of the number.
         what: &'static str,
         /// The number.
         found: u32,
-        /// The largest that is known.
+        /// The largest known number.
         most: usize,
     },
     /// A list has the wrong length.
@@ -29,9 +29,9 @@ pub enum PilotLogError {
     Length {
         frame: u64,
         what: &'static str,
-        /// How many there are.
+        /// The length found.
         found: usize,
-        /// How many there should be.
+        /// The length that it should have.
         should: usize,
     },
     /// Neither measurements nor a known state, or both.
@@ -77,7 +77,7 @@ pub fn state_from_log(state: &v1::RigidState) -> RigidState {
     RigidState {
         position_m: vector_from_log(&state.position_m),
         velocity_m_s: vector_from_log(&state.velocity_m_s),
-        // Of length 1 as it was written; normalising again could change a bit.
+        // It had length 1 when it was written; normalising it again could change a bit.
         world_from_body: UnitQuaternion::new_unchecked(Quaternion::new(
             attitude.w, attitude.x, attitude.y, attitude.z,
         )),
@@ -150,10 +150,10 @@ pub fn estimate_to_log(estimate: &Estimate) -> v1::Estimate {
     }
 }
 
-/// A recorded estimate, of a frame.
+/// The recorded estimate of a frame.
 ///
 /// # Errors
-/// Its health is not one of this build's.
+/// This build does not know its health.
 pub fn estimate_from_log(estimate: &v1::Estimate, frame: u64) -> Result<Estimate, PilotLogError> {
     let sigmas = &estimate.sigmas;
     let found = estimate.health;
@@ -207,7 +207,7 @@ pub fn input_to_log(input: &PilotInput) -> v1::PilotInput {
 /// A recorded input.
 ///
 /// # Errors
-/// It is not one of this build's.
+/// This build does not know some value of it.
 pub fn input_from_log(input: &v1::PilotInput) -> Result<PilotInput, PilotLogError> {
     let frame = input.frame;
     let sensed = match (&input.measured, &input.known) {
@@ -238,10 +238,10 @@ pub fn output_to_log(output: &PilotOutput) -> v1::PilotOutput {
     }
 }
 
-/// A recorded output, of a frame.
+/// The recorded output of a frame.
 ///
 /// # Errors
-/// It is not one of this build's.
+/// This build does not know some value of it.
 pub fn output_from_log(output: &v1::PilotOutput, frame: u64) -> Result<PilotOutput, PilotLogError> {
     let unknown = |what, found, known: usize| PilotLogError::Unknown { frame, what, found, most: known - 1 };
     let phase = u8::try_from(output.phase).ok().and_then(Phase::from_index);
@@ -372,7 +372,7 @@ mod tests {
             let read = v1::PilotTick::decode(bytes.as_slice()).unwrap();
             let (input_read, output_read) =
                 (input_from_log(&read.input).unwrap(), output_from_log(&read.output, frame).unwrap());
-            // Once more, as bytes: floats that are not numbers are never equal to themselves.
+            // Compared as bytes as well, because a NaN never equals itself.
             prop_assert_eq!(tick_to_log(&input_read, &output_read, frame).encode_to_vec(), bytes);
             prop_assert_eq!(input_read.time_s.to_bits(), input.time_s.to_bits());
             prop_assert_eq!(input_read.frame, input.frame);
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn what_this_build_does_not_know_is_refused_by_its_number() {
+    fn an_unknown_value_is_refused_with_its_number() {
         let output = v1::PilotOutput {
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],

@@ -1,5 +1,5 @@
-//! A simulated flight from apogee as log records: what the flight computer was given, believed and decided in every
-//! frame, and the truth beside it. A replay flies the flight computer again from these.
+//! A simulated flight from apogee as log records: the flight computer's input, estimate and output in every frame, and
+//! the truth. A replay runs the flight computer again from these records.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use world::Touchdown;
 
 use crate::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
 
-/// The header of such a log.
+/// The header of the log of a simulated flight.
 pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
     let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
     let run = [
@@ -40,12 +40,12 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
     }
 }
 
-/// What comes before the first frame. Times in the records count from apogee.
+/// The record before the first frame. Times in the records count from apogee.
 pub fn start(flight: &Sortie) -> Record {
     Record::PilotStart(Box::new(pilot_start(flight)))
 }
 
-/// What the flight computer believes at its release, and its settings that the text of its mission does not contain.
+/// The flight computer's estimate at its release, and its settings that the text of its mission does not contain.
 pub fn pilot_start(flight: &Sortie) -> PilotStart {
     let mission = flight.mission();
     PilotStart {
@@ -56,7 +56,7 @@ pub fn pilot_start(flight: &Sortie) -> PilotStart {
     }
 }
 
-/// The frame that was just flown; the truth alone while the flight computer is dead.
+/// The records of the frame that was just flown; only the truth while the flight computer is dead.
 pub fn frame(flight: &Sortie) -> Vec<Record> {
     let mut records = Vec::with_capacity(3);
     if let Some((input, output)) = flight.computer().piloted().filter(|_| !flight.computer_is_dead()) {
@@ -90,15 +90,16 @@ fn truth(flight: &Sortie) -> TruthSample {
     }
 }
 
-/// A flight of a campaign has no day: its log begins at the epoch, so that the same flight gives the same log.
+/// The header for a flight of a campaign. It has no date: its log begins at the epoch, so that the same flight always
+/// gives the same log.
 pub fn campaign_header(recipe: &Recipe, number: u64) -> LogHeader {
     header("onboard-sim campaign", recipe, number, 0)
 }
 
-/// The dispersions of a log: by its scenario's text, or of a log without one the built-in that its run facts name.
+/// The dispersions of a log: from the text of its scenario, or else the built-in set that its run facts name.
 ///
 /// # Errors
-/// The text is no set of dispersions, or no built-in has the name.
+/// The text is not a set of dispersions, or no built-in set has the name.
 pub fn dispersion_of(
     run: &BTreeMap<String, String>,
     scenario_toml: Option<&str>,
@@ -129,8 +130,8 @@ pub fn frame_and_phase(flight: &Sortie, phase: Phase) -> Vec<Record> {
     records
 }
 
-/// The verdict on a flight that is over, by what its legs take; `None` if it did not come down. What else went wrong
-/// (a parachute, a fall over) is a limit of its own that allows nothing.
+/// The verdict on a finished flight, by the limits of its legs; `None` if it did not come down. Any other failure (a
+/// parachute, tipping over) is an additional limit that allows nothing.
 pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
@@ -169,7 +170,7 @@ fn in_world_plane(flight: &Sortie, touchdown: &Touchdown) -> flight::vehicle::dy
     Plane::choose(&nil, &nil, &nil).project(&touchdown.state, feet_below_cg_m, 0.0)
 }
 
-/// Who flew the landing burn of a recorded flight; the pilot itself if the log does not say.
+/// The controller that flew the landing burn of a recorded flight; the pilot itself if the log does not say.
 pub fn controller_of(run: &BTreeMap<String, String>) -> Option<Controller> {
     run.get("controller").map_or(Some(Controller::Nmpc), |name| name.parse().ok())
 }

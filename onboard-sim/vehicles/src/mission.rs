@@ -47,7 +47,6 @@ pub enum MissionError {
     Countdown {
         /// Where the text came from.
         origin: String,
-        /// The value found.
         found: f64,
     },
     /// The pad's place is out of range.
@@ -57,7 +56,6 @@ pub enum MissionError {
         origin: String,
         /// The key, with its section.
         key: &'static str,
-        /// The value found.
         found: f64,
         /// The accepted range, in words.
         required: &'static str,

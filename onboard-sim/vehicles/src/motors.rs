@@ -1,4 +1,4 @@
-//! The motors that come with the program, by name. Each file carries its origin in its header.
+//! The motors that come with the program, by name. Each file states its origin in its header.
 
 use flight::vehicle::thrust_curve::ThrustCurve;
 

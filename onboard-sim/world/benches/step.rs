@@ -14,11 +14,11 @@ fn main() {
 }
 
 fn windy(height_m: f64) -> World {
-    let airframe = vehicles::airframe::builtin("mk2").expect("built in");
-    let motor = motors::builtin(&airframe.motor).expect("built in");
+    let airframe = vehicles::airframe::builtin("mk2").expect("a built-in airframe");
+    let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
     World::new(&airframe, &motor, &truth, &RigidState::upright(height_m), 1)
-        .expect("sound")
+        .expect("a valid world")
         .with_fins_at(FRAC_PI_2)
 }
 

@@ -85,7 +85,10 @@ impl Shape {
         let strip_m = body.length_m / STRIPS as f64;
         Self {
             axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient * truth.body_drag_scale,
-            strip_area_m2: body.crossflow_drag_coefficient * body.diameter_m * strip_m * truth.crossflow_scale,
+            strip_area_m2: body.crossflow_drag_coefficient
+                * body.diameter_m
+                * strip_m
+                * truth.crossflow_scale,
             strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
             fins: airframe.fin_model(),
             fin_station_m: airframe.fins.station_m,

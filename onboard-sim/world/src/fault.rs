@@ -30,7 +30,6 @@ pub enum Fault {
         /// Rate, as a fraction of the rate without the fault.
         scale: f64,
     },
-    /// One fin is stuck.
     FinStuck {
         /// The fin, 0 to 3; another number has no effect.
         fin: usize,

@@ -13,7 +13,13 @@ pub(crate) struct Linkage {
 
 impl Linkage {
     /// A linkage at rest with its servo at an angle, rad. Play and misalignment move nothing past the stops.
-    pub(crate) fn new(gain: f64, offset_rad: f64, slop_rad: f64, stops_rad: (f64, f64), servo_rad: f64) -> Self {
+    pub(crate) fn new(
+        gain: f64,
+        offset_rad: f64,
+        slop_rad: f64,
+        stops_rad: (f64, f64),
+        servo_rad: f64,
+    ) -> Self {
         Self { gain, offset_rad, half_slop_rad: 0.5 * slop_rad, stops_rad, moved_rad: gain * servo_rad }
     }
 
@@ -25,7 +31,8 @@ impl Linkage {
     /// Follows the servo.
     pub(crate) fn step(&mut self, servo_rad: f64) {
         let driven_rad = self.gain * servo_rad;
-        self.moved_rad = self.moved_rad.clamp(driven_rad - self.half_slop_rad, driven_rad + self.half_slop_rad);
+        self.moved_rad =
+            self.moved_rad.clamp(driven_rad - self.half_slop_rad, driven_rad + self.half_slop_rad);
     }
 
     /// Angle of what it moves, rad.

@@ -7,7 +7,7 @@ use crate::STEP_S;
 /// Steps that the delay line holds: an airframe's servo delay is 0.1 s at most.
 const LINE_STEPS: usize = 128;
 
-/// One servo and what it moves. Angles in rad.
+/// One servo and its load. Angles in rad.
 #[derive(Debug, Clone)]
 pub(crate) struct Servo {
     line_rad: [f64; LINE_STEPS],

@@ -21,7 +21,7 @@ pub struct Truth {
     pub mass_scale: f64,
     /// True aerodynamic force over the model's.
     pub drag_scale: f64,
-    /// Offset of the true centre of gravity from the nominal one, in body axes (x towards the nose), m.
+    /// Offset of the true from the nominal centre of gravity, in body axes (x towards the nose), m.
     pub cg_offset_m: [f64; 3],
     /// Mean wind 10 m above the ground, m/s.
     pub wind_m_s: f64,

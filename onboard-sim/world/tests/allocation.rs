@@ -9,10 +9,11 @@ use world::{Actuators, Truth, World};
 
 #[test]
 fn steps_do_not_allocate() {
-    let airframe = vehicles::airframe::builtin("mk2").expect("built in");
-    let motor = motors::builtin(&airframe.motor).expect("built in");
+    let airframe = vehicles::airframe::builtin("mk2").expect("a built-in airframe");
+    let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
-    let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(60.0), 1).expect("sound");
+    let mut world =
+        World::new(&airframe, &motor, &truth, &RigidState::upright(60.0), 1).expect("a valid world");
     let open = Actuators { fins_rad: [FRAC_PI_2; 4], ..Actuators::default() };
     let allocated = allocation_counter::measure(|| {
         world.advance(&open, 500);

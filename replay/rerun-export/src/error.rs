@@ -21,13 +21,13 @@ pub enum ExportError {
     #[error("{}: cannot be written", path.display())]
     Write {
         path: PathBuf,
-        /// What the system said.
+        /// Error from the operating system.
         source: std::io::Error,
     },
     /// Rerun cannot encode the recording or write it to its file.
     #[error("the recording cannot be encoded or written: {reason}")]
     Encode {
-        /// What Rerun said.
+        /// Error from Rerun.
         reason: String,
     },
     /// Rerun refuses a record.

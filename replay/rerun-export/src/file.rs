@@ -34,7 +34,7 @@ pub fn export_file(log_path: &Path, rrd_path: &Path, overwrite: Overwrite) -> Re
     #[cfg(unix)]
     let unfinished = {
         use std::os::unix::fs::PermissionsExt as _;
-        // As for any new file: the user's mask decides. Alone, only the owner could read it.
+        // Apply the user's umask as for any new file; a temporary file would be readable by its owner only.
         unfinished.permissions(std::fs::Permissions::from_mode(0o666))
     };
     let unfinished = unfinished.tempfile_in(folder).map_err(cannot_write)?;

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn standing_still_adds_nothing_but_the_last_place() {
+    fn standing_still_adds_only_the_last_position() {
         let mut path = FlownPath::new();
         assert_eq!(path.push([0.0; 3]), None);
         assert_eq!(path.push([0.0, 0.0, 0.001]), None);

@@ -10,7 +10,7 @@ use crate::survey::Survey;
 /// compared.
 pub(crate) const APPLICATION: &str = "touchdown";
 
-/// The recording's identity: a log gives the same one every time, and two runs never share one.
+/// The recording's identity: always the same for the same log, and different for different runs.
 pub(crate) fn builder(log_name: &str, survey: &Survey) -> RecordingStreamBuilder {
     let stem = Path::new(log_name).file_stem().map_or(log_name.into(), |stem| stem.to_string_lossy());
     let start_ns = survey.start_unix_ns();

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rocket_in_space_is_where_and_how_its_state_says() {
+    fn a_rocket_in_space_has_the_position_and_attitude_of_its_state() {
         let half = f64::sqrt(0.5);
         let state = RigidState {
             position_m: Vector3 { x: 1.0, y: -2.0, z: 30.0 },
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_keeps_its_order_and_leaves_out_what_is_no_number() {
+    fn a_path_keeps_its_order_and_leaves_out_states_that_are_not_numbers() {
         let states = [(0.0, 15.0), (f64::NAN, 10.0), (-1.0, 0.0)].map(|(x_m, z_m)| PlanarState {
             x_m,
             z_m,

@@ -34,7 +34,7 @@ impl<W: Write + Send + 'static> RrdWriter<W> {
         )
         .map_err(encode_error)?;
         let output = Arc::new(Mutex::new(Output { encoder: Some(encoder), failure: None }));
-        // Few, large chunks, because nobody watches while this is written.
+        // A few large chunks, because no viewer is connected while this is written.
         let batches =
             ChunkBatcherConfig { flush_tick: Duration::from_hours(1), ..ChunkBatcherConfig::DEFAULT };
         let (_, store, properties, batches, hooks, _) = builder.batcher_config(batches).into_args();

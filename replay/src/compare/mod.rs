@@ -46,7 +46,6 @@ pub enum CompareError {
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The baseline.
     pub baseline: String,
     /// The other flight.
     pub other: String,

@@ -34,7 +34,6 @@ const NO_SIGNAL_TABLES: [&str; 2] = ["computer_start", "computer_frame"];
 pub struct Series {
     /// Vehicle times in ascending order, s.
     pub times_s: Vec<f64>,
-    /// The value at each.
     pub values: Vec<f64>,
     /// Whether the values are whole numbers, which are held between samples.
     pub whole: bool,
@@ -72,7 +71,7 @@ pub struct Flown {
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
-    /// Number of values left out because their times are earlier than the one before.
+    /// Number of values left out because their times are earlier than the time before them.
     pub out_of_order: usize,
 }
 
@@ -80,7 +79,7 @@ impl Flown {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read, holds several flights or is longer than any.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut anchors = Anchors::default();
         let mut verdict = None;

@@ -3,7 +3,7 @@
 //! ```toml
 //! verdict = true          # the verdicts must agree; the default
 //! missing = 0             # signals of the baseline that the other may lack; none if left out
-//! added = 0               # signals that the other may have besides; none if left out
+//! added = 0               # additional signals that the other may have; none if left out
 //! samples_missing = 0.01  # share of a signal's samples that the other may lack; none if left out
 //! samples_added = 0.01    # share of the other's samples that the baseline may lack; none if left out
 //! damaged = true          # damaged logs, and logs that end before their flight did, may be compared; not if left out
@@ -13,7 +13,7 @@
 //! max = 0.05
 //!
 //! [signals."controller_tick.output.*"]
-//! max = 1e-9              # the longest pattern that fits a signal holds
+//! max = 1e-9              # of several patterns that fit a signal, the longest applies
 //! ```
 
 use std::collections::BTreeMap;
@@ -65,24 +65,18 @@ pub enum ToleranceError {
     /// Neither flight has the signal.
     #[error("tolerance of `{given}`: neither flight has such a signal; the nearest is `{nearest}`")]
     Unknown {
-        /// What was given.
         given: String,
         /// The signal with the most similar name.
         nearest: String,
     },
     /// A share outside 0 to 1.
     #[error("{given} = {found}: must be a share from 0 to 1")]
-    Share {
-        given: String,
-        /// What was found.
-        found: f64,
-    },
+    Share { given: String, found: f64 },
     /// A limit that no signal can meet.
     #[error("tolerance of `{given}`: {found} must be a number, 0 or more")]
     Value {
         /// The signal.
         given: String,
-        /// What was found.
         found: f64,
     },
 }
@@ -206,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longest_pattern_holds() {
+    fn the_longest_matching_pattern_applies() {
         let text = "[signals.\"a.*\"]\nmax = 1.0\n[signals.\"a.b\"]\nmax = 2.0\n";
         let tolerances = Tolerances::from_toml(text, "t.toml").unwrap();
         assert_eq!(tolerances.of("a.b").unwrap().max, Some(2.0));

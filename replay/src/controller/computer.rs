@@ -1,4 +1,4 @@
-//! The whole flight computer, from power-up on. One path for both vehicles.
+//! The whole flight computer, from power-up on; the same code for both vehicles.
 
 use std::collections::BTreeMap;
 
@@ -27,8 +27,8 @@ pub enum StartError {
     NoVehicle,
 }
 
-/// A flight computer that is fed from a log, from power-up on. Frames must come in order. Missing frames mean that the
-/// computer was restarted: it is restarted here too.
+/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order. Missing frames
+/// mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
     computer: Computer,
@@ -39,11 +39,11 @@ pub struct LoggedComputer {
 }
 
 impl LoggedComputer {
-    /// The flight computer that a log's frames came from, before its first frame: of the text of its profile or mission, and
-    /// of the law that its run facts name.
+    /// The flight computer that a log's frames came from, before its first frame. It is built from the text of the
+    /// profile or mission and from the law that the run facts name.
     ///
     /// # Errors
-    /// The text is none of this build, or a name is unknown.
+    /// This build cannot use the text, or a name is unknown.
     pub fn recorded(
         toml: &str,
         start: &computer_v1::ComputerStart,
@@ -65,14 +65,14 @@ impl LoggedComputer {
         Ok(Self { computer, next: None, rehearsed: false, last: None })
     }
 
-    /// The pilot's part of the last frame, as a log has it; `None` on the pad, and of the planar vehicle.
+    /// The pilot's part of the last frame, as a log has it; `None` on the pad and for the planar vehicle.
     pub fn pilot_tick(&self) -> Option<flight_v1::PilotTick> {
         let (input, output) = self.computer.piloted()?;
         Some(tick_log::pilot::tick_to_log(input, output, self.computer.flight_digest()))
     }
 
-    /// The landing controller's tick in the last frame, as a log has it but for its measured times; `None` if none fell into
-    /// it, and of a rocket in space.
+    /// The landing controller's tick in the last frame, as a log has it except for the measured times; `None` if the
+    /// frame had no tick, and for a rocket in space.
     pub fn controller_tick(&self) -> Option<v1::ControllerTick> {
         let tick = self.last.as_ref()?.tick.as_ref()?;
         Some(tick_log::tick_to_log(&tick.input, &tick.output, tick.state_digest, 0.0, 0.0))
@@ -108,7 +108,7 @@ impl Replayed for LoggedComputer {
                 return Err(FrameError::Order { frame: number, after: next - 1 });
             }
             if number > next {
-                // It was dead meanwhile, and came back at the end of the frame before this.
+                // It was dead in the missing frames and restarted at the end of the frame before this one.
                 self.computer.restart(flight_time_s(number - 1));
             }
         }

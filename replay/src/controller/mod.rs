@@ -1,8 +1,8 @@
 //! The controller that a log's ticks came from, run again on their inputs.
 //!
-//! There are two: that of the planar landing ([`LoggedController`], ten ticks a second) and the flight computer of a flight
-//! from apogee ([`LoggedPilot`], two hundred frames a second, of which some plan). This is the one place that knows which
-//! kind wrote a log's ticks; verification and evaluation are written for any [`Replayed`].
+//! There are three: the whole flight computer ([`LoggedComputer`], every frame from power-up on), the controller of the
+//! planar landing ([`LoggedController`], ten ticks a second) and the pilot of a flight from apogee ([`LoggedPilot`],
+//! two hundred frames a second, some of which plan). Verification and evaluation are written for any [`Replayed`].
 
 mod computer;
 mod pilot;
@@ -19,9 +19,9 @@ use prost::Message;
 use prost_reflect::MessageDescriptor;
 use serde::Serialize;
 
-/// A controller that can be fed from a log; ticks must come in order, from the first one on.
+/// A controller that can be run on the ticks of a log; ticks must come in order, from the first tick on.
 pub trait Replayed {
-    /// Its record in a log.
+    /// The record of a tick in a log.
     type Tick: Message;
     /// Why a tick cannot be run again.
     type Error: std::error::Error + 'static;
@@ -29,21 +29,22 @@ pub trait Replayed {
     /// Describes the record's fields.
     fn descriptor() -> Option<MessageDescriptor>;
 
-    /// Which tick a record is of.
+    /// The tick that a record belongs to.
     fn moment(tick: &Self::Tick) -> Moment;
 
-    /// How far gimbal commands, rad, and, where a record has them, predicted touchdowns, m, are apart.
+    /// Distance between the gimbal commands of two records, rad, and between their predicted touchdowns, m, if they
+    /// have any.
     fn apart(a: &Self::Tick, b: &Self::Tick) -> (f64, Option<f64>);
 
-    /// Runs a recorded tick again: its input, and what is decided now. Measured times are copied, since they were
-    /// not decided.
+    /// Runs a recorded tick again: the result has the recorded input and the new decision. Measured times are copied,
+    /// because they were not decided.
     ///
     /// # Errors
     /// The recorded input cannot be given to this build's controller.
     fn run_again(&mut self, tick: &Self::Tick) -> Result<Self::Tick, Self::Error>;
 }
 
-/// A computer whose decisions can be told in short.
+/// A computer whose decisions can be summarised.
 pub trait Decides: Replayed {
     /// A summary of a tick's decision; `self` has just run that tick.
     fn decided(&self, tick: &Self::Tick) -> Decided;
@@ -59,23 +60,23 @@ pub struct Moment {
     pub phase: &'static str,
 }
 
-/// What a tick decides, in short.
+/// Summary of a tick's decision.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Decided {
     /// Gimbal command, rad: one angle, or pitch and yaw.
     pub gimbal_rad: Vec<f64>,
     /// Fin commands, rad.
     pub fins_rad: Vec<f64>,
-    /// The phase: given to the planar landing's controller, decided by a flight computer.
+    /// The phase: an input of the planar landing's controller, a decision of a flight computer.
     pub phase: &'static str,
-    /// What decided the gimbal.
+    /// The control level that decided the gimbal command.
     pub level: &'static str,
     /// Cost of the last plan.
     pub cost: f64,
-    /// Iterations of its solve.
+    /// Iterations of the last plan's solve.
     pub iterations: u32,
-    /// Whether the plan's end keeps every touchdown limit (planar landing) or all that was asked of it (flight computer);
-    /// `None` without a plan.
+    /// Whether the end of the plan keeps every touchdown limit (planar landing) or meets every condition (flight
+    /// computer); `None` without a plan.
     pub plan_lands: Option<bool>,
 }
 

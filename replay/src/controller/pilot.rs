@@ -17,36 +17,36 @@ use super::{Decided, Decides, Moment, Replayed, phase_name};
 use crate::log::pilot_descriptor;
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
 
-/// The log's run fact with the settings that a flight flown again changed on its way, one a line.
+/// Run fact of a re-flown flight's log: the settings that changed in flight, one on each line.
 pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
 /// The number of the first frame.
 const FIRST_FRAME: u64 = 1;
 
-/// The log's run facts with the law of the landing burn of a flight flown again, and the frame from which on it flew.
+/// Run facts of a re-flown flight's log: the law of the landing burn, and the first frame that it flew.
 pub(crate) const REFLOWN_BY: &str = "reflown_by";
 pub(crate) const REFLOWN_AT: &str = "reflown_at_tick";
 
-/// A flight computer being fed from a log; frames must come in order. Missing ones are what a restarted computer leaves:
-/// it is restarted here too.
+/// A pilot that is run on the frames of a log; frames must come in order. Missing frames mean that the computer was
+/// restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct LoggedPilot {
     computer: Computer,
     schedule: Schedule<Mission>,
-    /// A flight that was flown again may have changed to another law in this frame.
+    /// The frame in which a re-flown flight changed to another law, and that law.
     other_law: Option<(u64, Controller)>,
     next: u64,
-    /// Digests of another schema are not of the same things: what was recorded is taken over.
+    /// If false, the recorded digests are copied: digests of another schema cover other fields.
     compares_digests: bool,
 }
 
 /// Why a frame was not run again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// Its input has no meaning in this build.
+    /// This build does not know some value of its input.
     #[error(transparent)]
     Input(#[from] PilotLogError),
-    /// It was there already, or comes too late.
+    /// It is a repetition, or it is out of order.
     #[error("frame {frame} comes after frame {after}: nothing behind it was compared")]
     Order {
         /// Its number.
@@ -56,20 +56,20 @@ pub enum FrameError {
     },
 }
 
-/// The settings that a log says were changed in its flight.
+/// The settings that, according to a log, were changed in its flight.
 ///
 /// # Errors
-/// They are no settings.
+/// A line is not a setting.
 pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>, SettingError> {
     run.get(SETTINGS_IN_FLIGHT).map_or_else(|| Ok(Vec::new()), |text| text.lines().map(str::parse).collect())
 }
 
 impl LoggedPilot {
-    /// The flight computer that a log's frames came from, before its first frame: of its mission, of the laws and the changes
-    /// of settings that its run facts name, and of other settings on top.
+    /// The pilot that a log's frames came from, before its first frame. It is built from the mission, from the laws and
+    /// changes of settings that the run facts name, and from the `other` settings, which apply last.
     ///
     /// # Errors
-    /// The text is no mission of this build, or a name is unknown.
+    /// This build cannot use the text as a mission, or a name is unknown.
     pub fn recorded(
         mission_toml: &str,
         start: &flight_v1::PilotStart,
@@ -89,13 +89,13 @@ impl LoggedPilot {
         Ok(Self { computer, schedule, other_law, next: FIRST_FRAME, compares_digests: true })
     }
 
-    /// The same for a log of another schema, whose digests are not of the same things and are not compared.
+    /// The same pilot for a log of another schema, whose digests cover other fields and are not compared.
     #[must_use]
     pub fn without_digests(self) -> Self {
         Self { compares_digests: false, ..self }
     }
 
-    /// The missions that hold one after the other: as it was let go, then with the settings.
+    /// The missions over time: first the mission as at the release, then with the settings.
     pub(crate) fn schedule(
         mission_toml: &str,
         start: &flight_v1::PilotStart,
@@ -114,7 +114,7 @@ impl LoggedPilot {
         })
     }
 
-    /// What flies in the flight computer.
+    /// The pilot in the flight computer.
     ///
     /// # Panics
     /// Never: the computer of a rocket in space has a pilot.
@@ -125,14 +125,14 @@ impl LoggedPilot {
     /// Runs one frame.
     ///
     /// # Errors
-    /// It is out of order.
+    /// The frame is out of order.
     pub fn step(&mut self, input: &PilotInput) -> Result<PilotOutput, FrameError> {
         self.make_ready(input)?;
         self.computer.step(&Input::in_the_air(input));
         Ok(self.decided_now())
     }
 
-    /// Runs one frame, and solves the landing that it plans alone; see [`Computer::step_inspected`].
+    /// Runs one frame, and solves the landing that it plans separately; see [`Computer::step_inspected`].
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -150,19 +150,19 @@ impl LoggedPilot {
         piloted.map_or_else(|| unreachable!("a frame was flown"), |(_, output)| *output)
     }
 
-    /// A number for what it remembers.
+    /// The digest of the pilot's memory.
     pub fn digest(&self) -> u64 {
         self.computer.flight_digest()
     }
 
-    /// Restarts and changes of settings that come before a frame.
+    /// Applies the restarts and the changes of settings that come before a frame.
     fn make_ready(&mut self, input: &PilotInput) -> Result<(), FrameError> {
         let frame = input.frame;
         if frame < self.next {
             return Err(FrameError::Order { frame, after: self.next - 1 });
         }
         if frame > self.next {
-            // It was dead meanwhile, and came back at the end of the frame before this.
+            // It was dead in the missing frames and restarted at the end of the frame before this one.
             self.computer.restart(flight_time_s(frame - 1));
         }
         self.next = frame.saturating_add(1);

@@ -16,7 +16,7 @@ use super::{Decided, Decides, Moment, Replayed, phase_name, settings_in_flight};
 use crate::log::tick_descriptor;
 use crate::settings::{Schedule, SettingError};
 
-/// A controller being fed from a log; ticks must come in order, from the first one on.
+/// A controller that is run on the ticks of a log; ticks must come in order, from the first tick on.
 #[derive(Debug, Clone)]
 pub struct LoggedController {
     state: ControllerState,
@@ -39,8 +39,8 @@ impl LoggedController {
         Self { schedule: Some(schedule.clone()), ..Self::new(schedule.base()) }
     }
 
-    /// The controller that a log's ticks came from, before its first tick: of its profile, and of the settings that its run
-    /// facts say were changed in flight.
+    /// The controller that a log's ticks came from, before its first tick. It is built from the profile and from the
+    /// changes of settings in flight that the run facts name.
     ///
     /// # Errors
     /// The run facts name settings that this build does not have.
@@ -56,7 +56,7 @@ impl LoggedController {
         Ok(Self::scheduled(&Schedule::new(profile_toml, &in_flight)?))
     }
 
-    /// The same, judging its plans by other limits than its own.
+    /// The same controller, whose plans are judged by other limits than its own.
     #[must_use]
     pub fn judged_by(self, limits: TouchdownLimits) -> Self {
         Self { limits, ..self }
@@ -72,12 +72,12 @@ impl LoggedController {
         step(&mut self.state, input)
     }
 
-    /// The changes of settings that are still to come; of a controller that has a schedule.
+    /// The changes of settings still to come; `None` for a controller without a schedule.
     pub(crate) fn schedule(&self) -> Option<Schedule<Profile>> {
         self.schedule.clone()
     }
 
-    /// What it remembers.
+    /// The controller's memory.
     pub fn state(&self) -> &ControllerState {
         &self.state
     }

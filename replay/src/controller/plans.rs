@@ -1,4 +1,5 @@
-//! The landings that a flight computer plans. They are not in its log; run again, it makes them again.
+//! The landings that a flight computer plans. They are not in its log, but running the computer again gives the same
+//! plans.
 
 use flight::computer::pilot::Pilot;
 use flight::guidance::controller::ControlLevel;
@@ -6,16 +7,15 @@ use flight::guidance::powered::Plane;
 use flight::vehicle::dynamics::PlanarState;
 use nalgebra::Vector3;
 
-/// Tells the plans made in a frame from those that are flown on; frames must come in order.
+/// Tells a new plan from an earlier plan that is still being flown; frames must come in order.
 #[derive(Debug, Clone, Default)]
 pub struct NewPlans {
     flown: Vec<PlanarState>,
 }
 
 impl NewPlans {
-    /// The plan that a flight computer made in the frame it has just run, at whose end `level` decided: states through
-    /// the air in the plane of the landing, and the time from one to the next, s. `None` if it flies on by an earlier
-    /// plan or by none.
+    /// The plan that a flight computer made in the frame it has just run, in which `level` decided: states relative to
+    /// the air in the plane of the landing, and the time between them, s. `None` if it flies an earlier plan or none.
     pub fn made<'p>(&mut self, pilot: &'p Pilot, level: u32) -> Option<(&'p [PlanarState], f64)> {
         let planned = level != u32::from(ControlLevel::Idle.index());
         let (states, step_s) =
@@ -25,8 +25,8 @@ impl NewPlans {
     }
 }
 
-/// The places of the centre of gravity, m, that a plan just made leads through: x, y, z of the world. They begin where the
-/// flight computer believes to be; across the plane of the landing nothing is planned.
+/// The path of the centre of gravity in a plan just made, m: x, y, z of the world. It begins at the estimated position;
+/// motion across the plane of the landing is not planned.
 pub fn path_in_world_m(pilot: &Pilot, states: &[PlanarState], step_s: f64) -> Vec<[f64; 3]> {
     let (Some(plane), Some(estimate), Some(first)) = (pilot.plane(), pilot.estimate(), states.first()) else {
         return Vec::new();

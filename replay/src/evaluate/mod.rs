@@ -16,7 +16,7 @@ use crate::settings::{Schedule, Setting, SettingError};
 
 /// Sections that the planar landing's controller never sees.
 const NOT_THE_CONTROLLERS: [&str; 4] = ["plant.", "dispersion.", "arming.", "gate."];
-/// Sections that a flight computer never sees: the limits of the verdict, and what was drawn at random.
+/// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 3] = ["touchdown_limits.", "leg_limits.", "truth."];
 
 /// Why a flight cannot be evaluated.
@@ -55,7 +55,7 @@ pub enum EvaluateError {
     },
 }
 
-/// A tick: the recorded decision and the one with other settings.
+/// A tick: the recorded decision, and the decision with other settings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EvaluatedTick {
     pub tick: u64,

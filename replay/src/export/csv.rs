@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_and_text_is_quoted_only_where_it_must_be() {
+    fn numbers_read_back_and_text_is_quoted_only_where_necessary() {
         for number in [0.1, -0.0, 1e300, f64::MIN_POSITIVE, 3.0] {
             assert_eq!(text_of(&Cell::Float(number)).parse::<f64>().unwrap().to_bits(), number.to_bits());
         }

@@ -44,7 +44,6 @@ pub enum ExportError {
         name: String,
         /// What the log has.
         found: String,
-        /// What would be accepted.
         wanted: String,
     },
 }

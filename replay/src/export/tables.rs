@@ -13,7 +13,6 @@ use crate::log::FlightLog;
 use crate::output::{Destination, NewFile};
 use crate::table::{Row, TableReader, TableShape};
 
-/// A format for tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableFormat {
     /// Comma-separated values (RFC 4180), numbers in the shortest form that reads back as the same.

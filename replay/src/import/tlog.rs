@@ -63,7 +63,6 @@ pub struct ImportedTlog {
     pub telemetry: u64,
 }
 
-/// Progress of an import.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImportProgress {
     /// Bytes read.

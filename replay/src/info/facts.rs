@@ -59,7 +59,6 @@ pub struct SchemaFacts {
 pub struct Grade {
     /// How much.
     pub level: GradeLevel,
-    /// Why.
     pub reason: String,
 }
 
@@ -156,7 +155,6 @@ pub struct Span {
     pub first_ns: u64,
     /// Latest log time, ns since the Unix epoch.
     pub last_ns: u64,
-    /// Duration, s.
     pub duration_s: f64,
 }
 

@@ -20,7 +20,6 @@ pub struct FrameFacts {
     pub lost: usize,
     /// The first lost range: no frame after it can be re-executed.
     pub first_lost: Option<Gap>,
-    /// Number of repetitions.
     pub repeated: u64,
     /// Whether the log has the computer's start record.
     pub start: bool,
@@ -88,7 +87,7 @@ impl Grade {
         }
     }
 
-    /// The grade of frames that can be executed again, up to the first lost ones.
+    /// The grade of a log whose frames can be executed again up to the first loss.
     fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
         let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
         let level = GradeLevel::BitExact;

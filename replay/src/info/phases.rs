@@ -6,7 +6,6 @@ use serde::Serialize;
 /// Limit on the phase changes kept; a flight has about ten.
 const SPANS_KEPT: usize = 200;
 
-/// A source of the phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhaseSource {

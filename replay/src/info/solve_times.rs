@@ -10,7 +10,6 @@ const TIMES_KEPT: usize = 1_000_000;
 pub struct SolveTimes {
     /// Number of measurements.
     pub count: u64,
-    /// Median, s.
     pub median_s: f64,
     /// 99th percentile, s.
     pub p99_s: f64,
@@ -66,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_of_the_nearest_rank() {
+    fn percentiles_use_the_nearest_rank() {
         let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
         for (percent, expected) in [(50, 50.0), (99, 99.0), (100, 100.0)] {
             assert_eq!(percentile(&hundred, percent).to_bits(), f64::to_bits(expected));

@@ -27,7 +27,6 @@ pub struct TickFacts {
     pub first_time_s: f64,
     /// Vehicle time of the last in the file, s.
     pub last_time_s: f64,
-    /// Number of repetitions.
     pub repeated: u64,
     /// Number of missing ticks between the first and the last.
     pub missing: u64,

@@ -31,11 +31,11 @@ pub struct StampedEntry {
 pub enum Entry {
     /// A controller tick.
     Tick(Box<v1::ControllerTick>),
-    /// What the flight computer was built from at power-up.
+    /// The data from which the flight computer was built at power-up.
     ComputerStart(Box<computer_v1::ComputerStart>),
     /// A frame of the flight computer, from power-up on.
     ComputerFrame(Box<computer_v1::ComputerFrame>),
-    /// The start record of the flight computer: what it believed at its release.
+    /// The start record of the flight computer: its estimate at its release.
     PilotStart(Box<flight_v1::PilotStart>),
     /// A frame of the flight computer from apogee to touchdown.
     PilotTick(Box<flight_v1::PilotTick>),
@@ -47,7 +47,7 @@ pub enum Entry {
     Truth(Box<v1::PlantTruth>),
     /// The landing verdict.
     Verdict(Box<v1::LandingVerdict>),
-    /// What a ground station knew.
+    /// The values that a ground station knew.
     Telemetry(Box<v1::Telemetry>),
     /// A raw frame: see the record's own bytes.
     RawFrame,
@@ -56,10 +56,7 @@ pub enum Entry {
     /// An event, as text for people; many programs write such records.
     Event(Box<foxglove::messages::Log>),
     /// A record on one of our topics that this build cannot read.
-    Unreadable {
-        /// Why.
-        reason: String,
-    },
+    Unreadable { reason: String },
     /// Anything else: transforms and records of other programs.
     Other,
 }

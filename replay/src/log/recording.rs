@@ -69,7 +69,6 @@ pub enum RecordingError {
     SeveralFlights {
         /// The file.
         name: String,
-        /// How many.
         flights: usize,
     },
     /// The log has no profile to build the controller from.
@@ -83,7 +82,6 @@ pub enum RecordingError {
     ProfileUnusable {
         /// The file.
         name: String,
-        /// What is wrong.
         reason: String,
     },
 }
@@ -93,7 +91,7 @@ pub enum RecordingError {
 pub struct Recording {
     /// The file.
     pub name: String,
-    /// What the log says about itself.
+    /// Metadata and attachments of the log.
     pub head: Head,
     /// Every tick, by number, without its plan.
     pub ticks: Vec<v1::ControllerTick>,
@@ -111,7 +109,7 @@ pub struct Recording {
     pub world: Vec<flight_v1::TruthSample>,
     /// The simulated plant, in file order.
     pub truth: Vec<v1::PlantTruth>,
-    /// What a ground station knew, in file order.
+    /// The values that a ground station knew, in file order.
     pub telemetry: Vec<v1::Telemetry>,
     /// Events, with log time in seconds after the first record.
     pub events: Vec<(f64, EventRecord)>,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use protocol::log::v1::ControllerTick;
 
-/// How many ticks may wait for one that comes later in the file. At 10 Hz this is far more than a recorder's queue can
-/// reorder; a tick that is still missing then counts as lost.
+/// How many ticks may wait for a tick that comes later in the file. At 10 Hz this is far more than a recorder's queue
+/// can reorder; a tick that is still missing then counts as lost.
 const WINDOW_TICKS: usize = 256;
 
 /// The number of the first tick a controller runs.
@@ -16,7 +16,7 @@ const FIRST_TICK: u64 = 0;
 pub enum Ordered {
     /// The next tick.
     Tick(Box<ControllerTick>),
-    /// Ticks are missing before the next one there is.
+    /// Ticks are missing before the next tick in the log.
     Missing {
         /// The first missing tick.
         from: u64,

@@ -42,7 +42,6 @@ impl TickRanges {
         Some((*self.runs.first_key_value()?.0, *self.runs.last_key_value()?.1))
     }
 
-    /// Number of repetitions.
     pub fn repeated(&self) -> u64 {
         self.repeated
     }

@@ -80,7 +80,7 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     Ok(())
 }
 
-/// What the whole flight computer did from power-up on, or that only its ticks were compared.
+/// Prints the comparison of the flight computer's frames from power-up on, or that only its ticks were compared.
 fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
     let Some(frames) = &report.frames else {
         let nothing = report.ticks_compared == 0;
@@ -99,7 +99,7 @@ fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()
     }
 }
 
-/// Said of a log whose flight computer cannot be run again from power-up on.
+/// The remark on a log whose flight computer cannot be run again from power-up on.
 const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
 
 /// The file and, if it holds several flights, the flight's number.
@@ -155,7 +155,7 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
     Ok(())
 }
 
-/// The first diverged tick, those 1, 2, 4, 8 and so on after it, the worst one and the last one.
+/// Prints the first diverged tick, the ticks 1, 2, 4, 8 and so on after it, the worst tick and the last tick.
 fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "how it grows (gimbal command, predicted touchdown, worst field):")?;
     let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());

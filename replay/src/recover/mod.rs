@@ -47,7 +47,6 @@ pub struct Lost {
     pub bytes: u64,
     /// The times of its messages, s after the first message of the log; `None` if the file does not tell.
     pub span_s: Option<(f64, f64)>,
-    /// What is wrong.
     pub reason: String,
 }
 

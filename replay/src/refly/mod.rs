@@ -49,7 +49,7 @@ pub enum Law {
     AsRecorded,
     /// The upright law alone; for planar landings only.
     Stabiliser,
-    /// The pilot itself; this one and those below are for flights from apogee only.
+    /// The pilot itself. This law and the laws below are for flights from apogee only.
     Nmpc,
     /// Ignition and fins at times fixed in advance.
     OpenLoop,
@@ -83,7 +83,7 @@ pub struct ReflyOptions {
     pub plant_settings: Vec<Setting>,
     /// The controller that flies.
     pub law: Law,
-    /// Seed of the plant's dispersions instead of the recorded one.
+    /// Seed of the plant's dispersions instead of the recorded seed.
     pub seed: Option<u64>,
 }
 
@@ -194,7 +194,7 @@ pub struct ReflyReport {
     pub commands_recorded: usize,
     /// Of those, how many commanded the same gimbal angle, bit for bit.
     pub commands_identical: usize,
-    /// The largest difference of a gimbal command from the recorded one of the same tick, rad.
+    /// The largest difference of a gimbal command from the recorded command of the same tick, rad.
     pub gimbal_difference_max_rad: f64,
 }
 

@@ -33,7 +33,7 @@ impl<'a> Prepared<'a> {
         self.recording
     }
 
-    /// Flies it again; the start must be the one it was prepared for.
+    /// Flies the flight again from the start it was prepared for; `options` must have the same start.
     ///
     /// # Errors
     /// See [`ReflyError`].

@@ -40,7 +40,7 @@ pub struct ReflownFlight {
     pub truth: Vec<v1::PlantTruth>,
     /// All records of a flight from apogee, with vehicle times, s.
     pub records: Vec<(f64, Record)>,
-    /// Facts that its log adds to those of the recorded one.
+    /// Facts that its log has in addition to those of the recorded flight.
     pub run: BTreeMap<String, String>,
     /// The landing verdict; `None` if it did not come down.
     pub verdict: Option<v1::LandingVerdict>,

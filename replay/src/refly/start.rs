@@ -30,11 +30,10 @@ pub enum From {
     /// The simulated plant's, where the log has it; else the estimate.
     #[default]
     Truth,
-    /// What the controller believed.
+    /// The controller's estimate.
     Estimate,
 }
 
-/// The state at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
     /// The first tick flown again.

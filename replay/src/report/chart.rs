@@ -5,7 +5,7 @@ use super::html::{escaped, put};
 
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 260.0;
-/// Height of a tall picture: it stands beside three others.
+/// Height of a tall picture, which is placed next to three others.
 const TALL: f64 = 800.0;
 const LEFT: f64 = 56.0;
 const RIGHT: f64 = 14.0;
@@ -23,7 +23,6 @@ pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-/// A chart.
 #[derive(Default)]
 pub(super) struct Chart {
     pub(super) title: String,

@@ -84,9 +84,9 @@ pub(super) struct GimbalAxis {
 /// Data that only a flight from apogee has.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FromApogee {
-    /// Impulse and burn time over the certified ones, as estimated at the end.
+    /// Impulse and burn time divided by their certified values, as estimated at the end.
     pub(super) inferred_scales: Option<(f64, f64)>,
-    /// True impulse over the certified one.
+    /// True impulse divided by the certified impulse.
     pub(super) true_impulse_scale: Option<f64>,
 }
 

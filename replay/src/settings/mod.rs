@@ -41,31 +41,20 @@ pub enum SettingError {
     Law(#[from] UnknownController),
     /// Not of the form `path=value`.
     #[error("setting `{given}`: must be path=value or path=value@seconds, as in nmpc.weights.w=90@6.5")]
-    Form {
-        /// What was given.
-        given: String,
-    },
+    Form { given: String },
     /// The key is unknown.
     #[error("no setting `{given}`: did you mean `{nearest}`?")]
     Unknown {
-        /// What was given.
         given: String,
         /// The most similar known name.
         nearest: String,
     },
     /// The path names a section, not a key.
     #[error("`{given}` is a section; its settings are {}", keys.join(", "))]
-    Section {
-        /// What was given.
-        given: String,
-        keys: Vec<String>,
-    },
+    Section { given: String, keys: Vec<String> },
     /// A fraction for a key that takes whole numbers.
     #[error("setting `{given}`: must be a whole number")]
-    NotWhole {
-        /// What was given.
-        given: String,
-    },
+    NotWhole { given: String },
     /// The log's profile or a settings file is not TOML.
     #[error("{origin}: {reason}")]
     Toml {
@@ -76,11 +65,7 @@ pub enum SettingError {
     },
     /// The mission or the truth is invalid with the settings.
     #[error("with {settings}: {reason}")]
-    Mission {
-        settings: String,
-        /// What is wrong.
-        reason: String,
-    },
+    Mission { settings: String, reason: String },
     /// The profile is invalid with the settings.
     #[error("with {settings}: {source}")]
     Profile {

@@ -44,7 +44,6 @@ pub struct FlightOutcome {
     pub margin: Option<f64>,
 }
 
-/// The outcomes at one point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointOutcome {
     /// Its number among the points.

@@ -18,7 +18,6 @@ const QUEUE: usize = 256;
 pub struct Progress {
     /// Jobs finished, including those of an earlier run.
     pub done: usize,
-    /// All jobs.
     pub jobs: usize,
 }
 
@@ -76,7 +75,7 @@ pub fn sweep(
                 }
                 Err(error) => {
                     stop.store(true, Ordering::Relaxed);
-                    // Of several errors, the one of the lowest-numbered job is reported, whatever the timing.
+                    // Of several errors, the error of the lowest-numbered job is reported, whatever the timing.
                     if failed.as_ref().is_none_or(|(earlier, _)| job < *earlier) {
                         failed = Some((job, error));
                     }
@@ -131,7 +130,7 @@ fn prepare<'a>(
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
         joined.flatten().collect()
     });
-    // Of several errors, the one of the first flight is reported, whatever the timing.
+    // Of several errors, the error of the first flight is reported, whatever the timing.
     let prepared = prepared.into_iter().map(|(place, flight)| Ok((place, flight?)));
     prepared
         .collect::<Result<_, ReflyError>>()

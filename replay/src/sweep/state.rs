@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_state_is_continued_bit_for_bit_and_another_sweeps_is_refused() {
+    fn a_state_is_continued_bit_for_bit_and_the_state_of_another_sweep_is_refused() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("sweep.jsonl");
         let outcome = FlightOutcome { landed: true, margin: Some(0.1 + 0.2) };

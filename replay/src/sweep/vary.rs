@@ -41,16 +41,10 @@ pub enum VaryError {
     #[error(
         "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in nmpc.weights.w=50:110:7"
     )]
-    Form {
-        /// What was given.
-        given: String,
-    },
+    Form { given: String },
     /// Too many points.
     #[error("{points} points; at most {POINTS_MAX} are allowed in one sweep")]
-    TooMany {
-        /// How many.
-        points: usize,
-    },
+    TooMany { points: usize },
     /// Random points need a range, not a list.
     #[error("{path}: random points need a range PATH=FROM:TO, not a list")]
     NoRange {

@@ -35,7 +35,6 @@ impl Cell {
     }
 }
 
-/// One row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Index of its table in [`TableReader::shapes`].
@@ -62,7 +61,7 @@ struct Known {
 }
 
 impl TableReader {
-    /// A reader that has seen nothing yet.
+    /// A reader before its first record.
     pub fn new() -> Self {
         Self::default()
     }

@@ -106,7 +106,7 @@ pub struct TickReport {
     pub warm: Option<Solved>,
     /// The same problem with a cold start.
     pub cold: Option<Solved>,
-    /// The nearest tick that solves a landing; this one if it does, `None` if none does.
+    /// The nearest tick that solves a landing: this tick if it does, `None` if no tick does.
     pub nearest_solved: Option<u64>,
     /// Limits and conditions that the warm plan touches.
     pub active: Vec<ActiveConstraint>,

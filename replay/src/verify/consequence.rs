@@ -1,4 +1,4 @@
-//! Whether a divergence would change how the flight ended.
+//! Whether a divergence would change the outcome of the flight.
 
 use serde::Serialize;
 
@@ -6,24 +6,24 @@ use crate::info::VerdictFacts;
 use crate::log::Recording;
 use crate::refly::{ReflyOptions, StartAt, refly};
 
-/// Whether this build's controller, flying on from the first tick that differs, would land differently. This is the
-/// closed loop, unlike the comparison itself.
+/// Whether this build's controller would land differently if it flew from the first tick that differs. This is closed
+/// loop, unlike the comparison itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Consequence {
     /// The tick from which the flight was flown again.
     pub from_tick: u64,
     /// The recorded verdict.
     pub recorded: Option<VerdictFacts>,
-    /// The verdict of this build's controller; `None` if it does not come down.
+    /// The verdict with this build's controller; `None` if the vehicle does not come down.
     pub reflown: Option<VerdictFacts>,
-    /// Whether landed became not landed or the other way round; `None` if that is not known.
+    /// Whether the verdict changed between landed and not landed; `None` if unknown.
     pub changed: Option<bool>,
-    /// Why nothing was flown again.
+    /// Why the flight was not flown again.
     pub obstacle: Option<String>,
 }
 
 impl Consequence {
-    /// Flies on from a tick, or from the beginning of the landing if that comes later.
+    /// Flies from a tick, or from the beginning of the landing if that comes later.
     pub(super) fn of(recording: &Recording, first_divergence: u64) -> Self {
         let at = |start| refly(recording, &ReflyOptions { start, ..ReflyOptions::default() });
         let flown = at(StartAt::Landing).and_then(|landing| {

@@ -1,4 +1,4 @@
-//! Which fields of two records differ, by bits.
+//! Finds the fields in which two records differ, bit for bit.
 
 use std::fmt;
 
@@ -8,13 +8,13 @@ use serde::{Serialize, Serializer};
 /// A field in which a recorded and a recomputed tick differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldDifference {
-    /// Where, as in `output.plan.states[3].u_m_s`.
+    /// Path of the field, as in `output.plan.states[3].u_m_s`.
     pub path: String,
-    /// What the log says.
+    /// The value in the log.
     pub recorded: FieldValue,
-    /// What was computed now.
+    /// The value computed now.
     pub recomputed: FieldValue,
-    /// How many representable numbers lie between the two, for numbers that have an order.
+    /// Distance of the two in representable numbers; `None` if they have no order.
     pub ulps: Option<u64>,
 }
 
@@ -29,7 +29,7 @@ pub enum FieldValue {
     Flag(bool),
     /// The list ends before this element.
     Absent,
-    /// Nothing this comparison has a name for.
+    /// A content that this comparison does not know.
     Opaque,
 }
 
@@ -44,7 +44,7 @@ impl FieldValue {
         }
     }
 
-    /// The bit pattern, for what is compared by bits.
+    /// The bit pattern, for a value that is compared by bits.
     pub fn bits(&self) -> Option<u64> {
         match self {
             Self::Float(number) => Some(number.to_bits()),
@@ -79,7 +79,7 @@ impl fmt::Display for FieldValue {
     }
 }
 
-/// As text, since JSON has no NaN, no infinity and in many readers no -0.0; the bits beside it.
+/// As text and bits, because JSON has no NaN and no infinity, and many readers have no -0.0.
 impl Serialize for FieldValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -93,8 +93,8 @@ impl Serialize for FieldValue {
     }
 }
 
-/// How many representable numbers lie between two, 0 for equal bits; -0.0 and 0.0 are 1 apart. `None` if either is
-/// not a number.
+/// Distance of two numbers in representable numbers: 0 for equal bits, 1 for neighbours; -0.0 and 0.0 are 1 apart.
+/// `None` if either is NaN.
 pub fn ulp_distance(a: f64, b: f64) -> Option<u64> {
     (!a.is_nan() && !b.is_nan()).then(|| rank(a).abs_diff(rank(b)))
 }
@@ -106,7 +106,7 @@ fn rank(number: f64) -> u64 {
     if bits & SIGN == 0 { bits | SIGN } else { !bits }
 }
 
-/// Every field in which two encoded records of a kind differ, in the record's order.
+/// Every field in which two encoded records of the same kind differ, in the record's order.
 pub fn differences(
     descriptor: Option<&MessageDescriptor>,
     recorded: &[u8],
@@ -118,7 +118,7 @@ pub fn differences(
         compare_messages("", &a, &b, &mut found);
     }
     if found.is_empty() && recorded != recomputed {
-        // Other bytes and no field to blame must not pass for equal.
+        // Records with different bytes must not count as equal, even if no field differs.
         found.push(difference("(record)".to_owned(), FieldValue::Opaque, FieldValue::Opaque));
     }
     found
@@ -180,7 +180,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_distance_is_symmetric_and_nil_only_for_equal_bits(a: u64, b: u64) {
+        fn the_distance_is_symmetric_and_zero_only_for_equal_bits(a: u64, b: u64) {
             let (a, b) = (f64::from_bits(a), f64::from_bits(b));
             prop_assert_eq!(ulp_distance(a, b), ulp_distance(b, a));
             if let Some(distance) = ulp_distance(a, b) {
@@ -189,7 +189,7 @@ mod tests {
         }
 
         #[test]
-        fn any_two_nans_with_other_payloads_differ(a: u64, b: u64) {
+        fn nans_with_different_payloads_differ(a: u64, b: u64) {
             const NAN: u64 = 0x7ff8_0000_0000_0000;
             let tick = |bits: u64| {
                 let mut tick = v1::ControllerTick::default();
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_of_other_lengths_differ_in_length() {
+    fn lists_of_different_lengths_differ_in_length() {
         let mut longer = v1::ControllerTick::default();
         longer.output.fin_command_rad = vec![1.0, 2.0];
         let mut shorter = longer.clone();

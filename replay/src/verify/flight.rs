@@ -1,4 +1,4 @@
-//! One flight of a log, run again as its records come.
+//! Verifies one flight of a log, record by record.
 
 use std::io::Read;
 
@@ -12,7 +12,7 @@ use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, Ordered, Sta
 
 /// One flight being verified.
 pub(super) struct FlightVerifier {
-    /// The whole flight computer, if the log has its power-up.
+    /// The whole flight computer, if the log begins at its power-up.
     from_power_up: Option<FromPowerUp>,
     digests_compared: bool,
     order: TickOrder,
@@ -26,8 +26,8 @@ pub(super) struct FlightVerifier {
 }
 
 impl FlightVerifier {
-    /// Before its first record; `behind_another` if another flight stands before it in the log, `unreadable` if a record
-    /// could not be read that may have been its beginning.
+    /// A flight before its first record. `behind_another`: another flight comes before it in the log. `unreadable`: why
+    /// a record that may have been its beginning could not be read.
     pub(super) fn new(behind_another: bool, unreadable: Option<String>) -> Self {
         Self {
             from_power_up: None,
@@ -78,7 +78,7 @@ impl FlightVerifier {
                     computer.take_tick(Tick::Space(tick));
                 }
             }
-            // Where frames before the release are lost, the pilot is still run again from here.
+            // The pilot needs no run of its own. If frames before the release were lost, it is run again from here.
             Entry::PilotStart(_) if self.from_power_up.as_ref().is_some_and(FromPowerUp::is_unbroken) => {}
             Entry::Tick(tick) => {
                 self.ticks += 1;
@@ -133,7 +133,7 @@ impl FlightVerifier {
         Ok(())
     }
 
-    /// Compares every tick whose turn it is.
+    /// Compares every tick that is next in order.
     fn advance(&mut self, at_end: bool) {
         let Some(verifier) = &mut self.verifier else {
             return;
@@ -171,13 +171,13 @@ impl FlightVerifier {
         }
         let compared = tally.ticks + frames.as_ref().map_or(0, |frames| frames.compared);
         let obstacle = match (self.obstacle, self.unreadable) {
-            // An unreadable tick leaves a gap; what made it unreadable says more than the gap.
+            // An unreadable tick leaves a gap; the reason why it is unreadable says more than the gap.
             (
                 None
                 | Some(Obstacle::Gap { .. } | Obstacle::FramesLost { .. } | Obstacle::BeginningMissing { .. }),
                 Some(reason),
             ) => Some(Obstacle::Unreadable { reason }),
-            // Where nothing was compared nothing is identical.
+            // If nothing was compared, the result must not be "identical".
             (None, None) if compared == 0 && let_go => Some(Obstacle::NoFrames),
             (None, None) if compared == 0 => Some(Obstacle::NoTicks),
             (obstacle, _) => obstacle,

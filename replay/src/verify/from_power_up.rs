@@ -1,8 +1,8 @@
-//! A flight computer run again from power-up on, and the ticks that its log has beside its frames.
+//! Runs a flight computer again from power-up on, and compares its frames and its ticks.
 //!
-//! A log holds what a frame decided twice: as the frame itself, and as the pilot's or the landing controller's tick, which the
-//! other tools read. Both are compared with the same run of the computer. They belong together by their numbers, so that a
-//! tool may have sorted the records.
+//! A log holds the decision of a frame twice: in the frame itself, and in the tick of the pilot or of the landing
+//! controller, which the other tools read. Both are compared with the same run of the computer. They are matched by
+//! their numbers, because another tool may have sorted the records.
 
 use std::collections::BTreeMap;
 
@@ -36,9 +36,9 @@ pub(super) struct FromPowerUp {
     order: FrameOrder,
     recorded: u64,
     ticks: Tally,
-    /// Ticks that were made again, and their records have not come yet.
+    /// Ticks that were computed again and whose records have not been read yet.
     made: BTreeMap<u64, Tick>,
-    /// Recorded ticks whose frames have not come yet.
+    /// Recorded ticks whose frames have not been read yet.
     waiting: BTreeMap<u64, Tick>,
     last_compared: Option<u64>,
     obstacle: Option<Obstacle>,
@@ -63,7 +63,7 @@ impl FromPowerUp {
         self.obstacle.is_none()
     }
 
-    /// Takes a frame; `sequence` is its record's number within its channel.
+    /// Takes a frame; `sequence` is the sequence number of its record in the channel.
     pub(super) fn take_frame(&mut self, frame: &computer_v1::ComputerFrame, sequence: u32) {
         self.recorded += 1;
         let lost = self.order.note(frame.input.frame, sequence);
@@ -109,7 +109,7 @@ impl FromPowerUp {
         self.last_compared = self.last_compared.max(Some(recorded.number()));
         match (recorded, made) {
             (Tick::Plane(recorded), Tick::Plane(mut made)) => {
-                // Measured, not decided.
+                // These times are measured, not decided.
                 (made.solve_time_s, made.deadline_s) = (recorded.solve_time_s, recorded.deadline_s);
                 compare::<LoggedController>(&mut self.ticks, recorded, &made);
             }
@@ -122,10 +122,11 @@ impl FromPowerUp {
         }
     }
 
-    /// The ticks compared, the frames compared, and why not all of them were. `whole`: the log was read to its end.
+    /// The compared ticks, the report on the frames, and why not all of them were compared. `whole`: the log was read
+    /// to its end.
     pub(super) fn finish(mut self, whole: bool) -> (Tally, FramesReport, Option<Obstacle>) {
         if whole {
-            // A tick that was made and is not in the log, though a later one is.
+            // A tick that was computed and is missing in the log, although a later tick is there.
             let lost = self.made.keys().find(|tick| self.last_compared > Some(**tick));
             let alone = self.waiting.keys().next();
             let missing = lost.map(|tick| Obstacle::TickLost { tick: *tick });

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Differing ticks kept one by one.
+/// Most differing ticks that are kept.
 const STEPS_KEPT: usize = 200;
 
 /// One differing tick.
@@ -12,22 +12,22 @@ pub struct GrowthStep {
     pub tick: u64,
     /// Vehicle time, s.
     pub time_s: f64,
-    /// How many of its fields differ.
+    /// Number of fields that differ.
     pub fields_different: usize,
-    /// How far the gimbal commands are apart, rad.
+    /// Difference of the gimbal commands, rad.
     pub gimbal_rad: f64,
-    /// How far the predicted touchdowns are apart, m; `None` if the record has none.
+    /// Distance of the predicted touchdowns, m; `None` if the record has none.
     pub touchdown_m: Option<f64>,
-    /// The most representable numbers that lie between two values of one field.
+    /// The largest distance of the two values of a field, in representable numbers.
     pub worst_ulps: Option<u64>,
 }
 
 /// How a divergence grows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Growth {
-    /// The first differing ticks, one by one.
+    /// The first differing ticks.
     pub steps: Vec<GrowthStep>,
-    /// The tick whose gimbal commands are farthest apart.
+    /// The tick with the largest difference of the gimbal commands.
     pub peak: Option<GrowthStep>,
     /// The last differing tick.
     pub last: Option<GrowthStep>,
@@ -39,7 +39,7 @@ impl Growth {
         if self.steps.len() < STEPS_KEPT {
             self.steps.push(step);
         }
-        // A difference that is not a number is the largest there is.
+        // A difference that is NaN counts as the largest.
         let exceeds = |peak: &GrowthStep| step.gimbal_rad.is_nan() || step.gimbal_rad > peak.gimbal_rad;
         if self.peak.as_ref().is_none_or(exceeds) {
             self.peak = Some(step);

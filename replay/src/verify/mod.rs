@@ -1,21 +1,20 @@
-//! Does the controller decide again, bit for bit, what it decided then?
+//! Checks whether the controller makes the recorded decisions again, bit for bit.
 //!
-//! [`verify`] builds the controller from the profile in the log, feeds it every recorded input in tick order and
-//! compares every field of what it decides (and the digest of what it remembers) with the record. Measured times
-//! are not compared.
+//! [`verify`] builds the controller from the profile in the log and runs it on every recorded input in tick order. It
+//! compares every field of the output, and the digest of the memory, with the record. Measured times are not compared.
 //!
-//! A log of this release has every frame of the whole flight computer from power-up on, for both vehicles. Then the computer
-//! itself is run again: self-test, arming, countdown, gate and abort are compared as well. Older logs, and logs of flights that
-//! begin at their release, have its ticks alone, from the release on, and the report says so.
+//! A log of this release has every frame of the whole flight computer from power-up on, for both vehicles. The whole
+//! computer is then run again, so self-test, arming, countdown, gate and abort are compared as well. Older logs, and
+//! logs of flights that begin at their release, have only ticks from the release on, and the report says so.
 //!
-//! The controller remembers its plan, so a tick can be re-executed only if every tick before it can: at a gap the
-//! comparison ends, and the report says so.
+//! The controller remembers its plan, so a tick can be re-executed only if every tick before it can be. The comparison
+//! ends at a gap, and the report says so.
 //!
-//! A log may hold several flights, joined by other tools: each has a report of its own. A flight of which nothing was
-//! compared is never identical, and one whose record ends before the flight did is said to be cut.
+//! A log joined by other tools may hold several flights; each has its own report. A flight without comparisons is never
+//! identical, and a flight whose record ends before the flight did is reported as cut.
 //!
-//! Of a divergence the report says how it grows from tick to tick, and, when a whole file is verified, whether the
-//! landing would end otherwise: for that alone the flight is flown on in simulation from the first tick that differs.
+//! For a divergence, the report says how it grows from tick to tick. If a whole file is verified, it also says whether
+//! the landing would end differently: only for this, the flight is simulated from the first tick that differs.
 
 mod consequence;
 mod difference;
@@ -43,14 +42,14 @@ use report::FileFacts;
 
 use crate::log::{Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
 
-/// Verifies a log file: a report on each of its flights, and one of a file without any.
+/// Verifies a log file: one report on each of its flights, or one report if it has none.
 ///
 /// # Errors
 /// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
 pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut reports = verify_log(&mut log, || {
-        // Another tool may have moved the attachments behind the messages.
+        // Another tool may have moved the attachments to the end of the file, after the messages.
         let mut whole = FlightLog::open(path)?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
@@ -59,7 +58,7 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     for report in reports.iter_mut().filter(|report| report.damage.is_some()) {
         report.unread = Some(Unread::of(path, read, log.last_log_time_ns()));
     }
-    // A log too long to fly on from, or of several flights, has been compared all the same.
+    // A log that is too long to be flown again, or has several flights, has still been compared.
     if let [report] = reports.as_mut_slice()
         && let Some(first) = &report.first_divergence
         && let Ok(recording) = Recording::open(path)
@@ -69,8 +68,8 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     Ok(reports)
 }
 
-/// Verifies a log that is being read. `whole_head` is asked for the log's whole head if its first tick comes
-/// before its profile.
+/// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first tick comes before
+/// its profile.
 ///
 /// # Errors
 /// As [`verify`].
@@ -80,7 +79,7 @@ pub fn verify_log<R: Read>(
 ) -> Result<Vec<VerifyReport>, LogError> {
     let mut flights = Flights::default();
     let mut computers: Vec<FlightVerifier> = Vec::new();
-    // What cannot be read before the first flight may have been its beginning.
+    // An unreadable record before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
         if flights.note(&stamped.entry) {
@@ -102,7 +101,7 @@ pub fn verify_log<R: Read>(
     for (place, computer) in computers.into_iter().enumerate() {
         let flight = (of > 1).then_some(FlightPlace { number: place + 1, of });
         let cut = flights.found().get(place).and_then(LoggedFlight::cut);
-        // The reading ended in the last flight.
+        // Damage ends the reading, so it belongs to the last flight.
         let damage = log.damage().filter(|_| place + 1 == of).map(ToString::to_string);
         let facts =
             FileFacts { file: log.name().to_owned(), flight, cut, damage, build: log.head().compare_build() };

@@ -1,4 +1,4 @@
-//! What a verification found.
+//! The report of a verification.
 
 use serde::Serialize;
 use tick_log::TickLogError;
@@ -10,17 +10,17 @@ use super::unread::Unread;
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut};
 
-/// The answer.
+/// The result of a verification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verification {
-    /// There are ticks, and every one of a whole flight is identical.
+    /// The flight is whole, has ticks, and every tick is identical.
     Identical,
-    /// Every tick is identical that could be read of a damaged log, or of a flight whose record ends before it did.
+    /// The log is damaged or ends before its flight did, and every tick that could be read is identical.
     IdenticalReadablePart,
     /// Some tick differs.
     Diverged,
-    /// Some tick could not be re-executed, and none that could differs.
+    /// Some tick could not be re-executed, and all others are identical.
     NotReplayable,
 }
 
@@ -35,10 +35,10 @@ pub enum Obstacle {
     /// No profile in the log.
     #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile,
-    /// The profile in the log is not one of this build.
+    /// This build cannot use the profile in the log.
     #[error("its profile cannot be used by this build: {reason}")]
     ProfileUnreadable {
-        /// What is wrong with it.
+        /// What is wrong with the profile.
         reason: String,
     },
     /// The log does not begin with the first tick.
@@ -46,7 +46,7 @@ pub enum Obstacle {
         "it begins with tick {first}, and the ticks before it are missing: what the controller remembered then is unknown"
     )]
     BeginningMissing {
-        /// The first tick there is.
+        /// The first tick in the log.
         first: u64,
     },
     /// Ticks are missing.
@@ -56,10 +56,10 @@ pub enum Obstacle {
     Gap {
         /// The last tick before the gap.
         after: u64,
-        /// The first behind it.
+        /// The first tick after the gap.
         before: u64,
     },
-    /// A tick is there twice.
+    /// A tick is recorded twice.
     #[error(
         "tick {tick} is recorded twice, as if two controllers had written: nothing behind it was compared"
     )]
@@ -77,40 +77,37 @@ pub enum Obstacle {
         /// The first after it.
         before: u64,
     },
-    /// A tick was made and is not in the log.
+    /// A tick was computed and is not in the log.
     #[error("the flight computer made tick {tick}, and the log has lost its record")]
     TickLost { tick: u64 },
-    /// A tick that no frame of the flight computer made.
+    /// A recorded tick belongs to no frame of the flight computer.
     #[error("tick {tick} belongs to no frame of the flight computer that was run again")]
     TickWithoutFrame { tick: u64 },
     /// A record cannot be read.
     #[error("a record cannot be read: {reason}")]
-    Unreadable {
-        /// Why.
-        reason: String,
-    },
-    /// A flight computer was let go, and nothing of it follows.
+    Unreadable { reason: String },
+    /// A flight computer was released, and none of its frames follow.
     #[error("it has a record /pilot/start and no frame of the flight computer behind it")]
     NoFrames,
-    /// Frames of a flight computer, and nothing that says how it was let go.
+    /// There are frames of a flight computer, and no record of its release.
     #[error("it has frames of the flight computer and no record /pilot/start before them to begin from")]
     NoStart,
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
     Frame(#[from] FrameError),
-    /// An input has no meaning in this build.
+    /// This build does not know some value of an input.
     #[error("{0}")]
     Input(#[from] TickLogError),
 }
 
-/// As its words.
+/// As text.
 impl Serialize for Obstacle {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
 }
 
-/// The flight computer's frames, compared.
+/// Result of comparing the flight computer's frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FramesReport {
     /// Frames that could be read.
@@ -125,16 +122,16 @@ pub struct FramesReport {
     pub until_s: Option<f64>,
 }
 
-/// Which flight of a log that holds several.
+/// The place of a flight in a log that holds several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct FlightPlace {
-    /// Its number, from 1 on.
+    /// Its number, from 1.
     pub number: usize,
-    /// How many there are.
+    /// Number of flights.
     pub of: usize,
 }
 
-/// What is known of a flight's record besides its ticks.
+/// Facts about a flight's record besides its ticks.
 pub(super) struct FileFacts {
     pub(super) file: String,
     pub(super) flight: Option<FlightPlace>,
@@ -143,18 +140,19 @@ pub(super) struct FileFacts {
     pub(super) build: BuildComparison,
 }
 
-/// What a verification found of one flight.
+/// The report on one flight.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerifyReport {
     /// The log.
     pub file: String,
-    /// Which of its flights, if it holds several.
+    /// The place of the flight, if the log holds several.
     pub flight: Option<FlightPlace>,
-    /// The answer.
+    /// The result of a verification.
     pub outcome: Verification,
-    /// The frames of the flight computer from power-up on; `None` if the log has none: then only its ticks were compared.
+    /// The frames of the flight computer from power-up on; `None` if the log has none, so that only its ticks were
+    /// compared.
     pub frames: Option<FramesReport>,
-    /// Whether digests of what the computer remembered were compared as well. Those of another schema are not.
+    /// Whether digests of the computer's memory were compared as well. Digests of another schema are not compared.
     pub digests_compared: bool,
     /// Ticks that could be read.
     pub ticks_recorded: u64,
@@ -173,17 +171,17 @@ pub struct VerifyReport {
     pub first_divergence: Option<Divergence>,
     /// How the divergence grows.
     pub growth: Option<Growth>,
-    /// Whether the landing would end otherwise; of whole files only.
+    /// Whether the landing would end differently; only for whole files.
     pub consequence: Option<Consequence>,
     /// Why not every tick was compared.
     pub obstacle: Option<Obstacle>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
-    /// What ended the reading of the log early.
+    /// Why the log could not be read to its end.
     pub damage: Option<String>,
-    /// What was not read because of that; of files only.
+    /// The part that was not read because of the damage; only for files.
     pub unread: Option<Unread>,
-    /// The build that wrote the log against this one.
+    /// Comparison of the build that wrote the log with this one.
     pub build: BuildComparison,
 }
 

@@ -1,4 +1,4 @@
-//! Records compared, whatever kind they are of.
+//! Compares records of any kind and counts the differences.
 
 use prost::Message;
 use prost_reflect::MessageDescriptor;
@@ -8,7 +8,7 @@ use super::difference::{FieldDifference, differences};
 use super::growth::{Growth, GrowthStep};
 use crate::controller::Moment;
 
-/// Fields of the first diverged tick that are kept.
+/// Most differing fields that are kept of the first diverged tick.
 const FIELDS_KEPT: usize = 32;
 
 /// A tick that differs.
@@ -19,13 +19,13 @@ pub struct Divergence {
     /// Vehicle time, s.
     pub time_s: f64,
     pub phase: &'static str,
-    /// How many of its fields differ.
+    /// Number of fields that differ.
     pub fields_different: usize,
-    /// Those fields, in the record's order; the first few if there are many.
+    /// The differing fields, in the record's order; only the first of them if there are many.
     pub fields: Vec<FieldDifference>,
 }
 
-/// What has been compared so far.
+/// The comparisons so far.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
     pub(super) ticks: u64,
@@ -40,8 +40,8 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Compares a record with what was computed again. `apart` says how far gimbal commands, rad, and predicted
-    /// touchdowns, m, are apart.
+    /// Compares a record with the recomputed one. `apart` gives the distance of their gimbal commands, rad, and of
+    /// their predicted touchdowns, m.
     pub(super) fn compare<M: Message>(
         &mut self,
         moment: Moment,

@@ -1,4 +1,4 @@
-//! What a damaged log still says about the part of it that could not be read.
+//! Facts about the unread part of a damaged log, from the end of the file.
 
 use std::path::Path;
 
@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use crate::log::summary_of;
 
-/// What was not read of a damaged log.
+/// The unread part of a damaged log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Unread {
-    /// Ticks or frames that were not read, and how many the whole file has; `None` if its end does not tell.
+    /// Ticks or frames that were not read, and their number in the whole file; `None` if the end of the file does not
+    /// say.
     pub ticks: Option<(u64, u64)>,
-    /// From the last record read to the last of the file, s.
+    /// Time from the last record read to the last record of the file, s.
     pub seconds: Option<f64>,
 }
 

@@ -1,11 +1,11 @@
-//! A controller, fed from a log.
+//! Runs a controller on the ticks of a log and compares the results.
 
 use prost_reflect::MessageDescriptor;
 
 use super::tally::Tally;
 use crate::controller::Replayed;
 
-/// Re-executes ticks and compares them; ticks must come in order, from the first one on.
+/// Re-executes ticks and compares them; ticks must come in order, from the first tick on.
 #[derive(Debug)]
 pub struct Verifier<C> {
     controller: C,

@@ -11,7 +11,7 @@ use crate::flown::{self, Recipe, only, write_log};
 use crate::from_apogee;
 
 #[test]
-fn from_apogee_an_aborted_flight_verifies_and_flies_the_same_again() {
+fn an_aborted_flight_from_apogee_verifies_and_is_reflown_identically() {
     let aborted = from_apogee::fly(&["abort@powered+0..3"]);
     let recording = Recording::open(&aborted.log).unwrap();
     assert_eq!(recording.frames.iter().filter(|tick| tick.input.abort).count(), 1);

@@ -234,7 +234,7 @@ fn every_plan_solved_again_is_the_flown_one() {
 }
 
 #[test]
-fn a_sweep_does_not_depend_on_jobs() {
+fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs() {
     let flights = [recording(), crate::simulated::NOMINAL.recording()];
     let points = grid(&[], &["truth.impulse_scale=0.8:1.0:3".parse().unwrap()]).unwrap();
     let fly = |flights: &[Recording], count: usize| {

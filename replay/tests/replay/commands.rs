@@ -15,7 +15,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--junit"));
     assert_eq!(code, 1);
     assert!(stdout.contains("tests=\"2\" skipped=\"0\" failures=\"1\" errors=\"0\""), "{stdout}");
-    // The hand-flown log ends a hair below the ground, which the simulation does not.
+    // The hand-made log ends slightly below the ground; the simulation does not.
     assert!(stdout.contains("verdict: would CHANGE: recorded NOT LANDED"), "{stdout}");
     assert!(
         stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_command_rad"),
@@ -87,7 +87,7 @@ fn a_comparison_exits_1_outside_its_tolerance() {
 }
 
 #[test]
-fn each_loop_says_which_it_is_and_unknown_names_exit_2() {
+fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
     let log = &NOMINAL.log;
     for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
         let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75"]));
@@ -141,7 +141,7 @@ fn an_unreadable_log_does_not_hide_the_others() {
 }
 
 #[test]
-fn a_tick_is_shown_and_one_that_is_not_there_exits_2() {
+fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     let (code, stdout, _) = run(replay("tick", &NOMINAL.log).arg("30"));
     assert_eq!(code, 0);
     for part in [

@@ -115,7 +115,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
 
     /// Whichever bit of the data is flipped: either the file is refused, or the log is known to be damaged and every
-    /// tick handed out is a true one.
+    /// tick that is read is an original tick.
     #[test]
     fn no_flipped_bit_goes_unnoticed(place in 0..data_end(), bit in 0_u32..8) {
         let mut bytes = WHOLE.bytes.clone();

@@ -1,6 +1,6 @@
-//! Logs of earlier releases still open and verify, and what cannot be run again of them is said.
+//! Logs of earlier releases still open and verify, and the report says which parts cannot be run again.
 //!
-//! The files were recorded by this project before its logs named a schema, and keep of their topics what a replay reads.
+//! This project recorded the files before its logs named a schema. They contain only the topics that a replay reads.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ fn log(name: &str) -> PathBuf {
 }
 
 #[test]
-fn what_they_decided_is_decided_again_bit_for_bit() {
+fn the_recorded_decisions_are_made_again_bit_for_bit() {
     for (name, ticks, digests) in [("planar-schema-1.mcap", 68, true), ("mk2-schema-1.mcap", 3_132, false)] {
         let report = verify(&log(name)).unwrap().remove(0);
         assert_eq!(report.outcome, Verification::Identical, "{report:?}");

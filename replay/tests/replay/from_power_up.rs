@@ -1,4 +1,5 @@
-//! The whole flight computer is run again from power-up on, for both vehicles: pin, arming, countdown, hold, abort, restart.
+//! Tests that the whole flight computer is run again from power-up on, for both vehicles: pin, arming, countdown, hold,
+//! abort, restart.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,10 +18,10 @@ use sim::plane::{DeadlinePolicy, PlanarFlight};
 use sim::recipe::Recipe;
 use tempfile::TempDir;
 
-/// Frames of either vehicle that last longer than any flight.
+/// More frames than any flight of either vehicle has.
 const LONGEST: u64 = 20_000;
 
-/// What reaches the vehicle in one frame.
+/// The inputs from the crew in one frame.
 #[derive(Debug, Clone)]
 struct Reached {
     frame: u64,
@@ -35,7 +36,7 @@ fn asked(frame: u64, asked: Asked) -> Reached {
     Reached { frame, request, uplink: Uplink::NotNeeded, commander_age_s: None, pin_out: true }
 }
 
-/// A crew that arms, starts, and changes nothing more.
+/// A crew that arms, starts, and does nothing else.
 fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
 }
@@ -85,10 +86,10 @@ impl Flown {
                 return flown;
             }
         }
-        panic!("still {:?}", vehicle.phase());
+        panic!("the flight has not ended: {:?}", vehicle.phase());
     }
 
-    /// As the run loop records it.
+    /// Records a frame as the run loop does.
     fn record(&mut self, vehicle: &Vehicle, events: &[VehicleEvent]) {
         let time_ns = (1e9 * vehicle.time_s()) as u64;
         let mut keep = |record| self.records.push((record, time_ns));
@@ -130,7 +131,7 @@ impl Flown {
         self.verified_with(|_| true, |_| ())
     }
 
-    /// Verified after records were left out, or changed.
+    /// The report on the flight after records were left out or changed.
     fn verified_with(&self, kept: impl Fn(&Record) -> bool, change: impl Fn(&mut Record)) -> VerifyReport {
         let records = self.records.iter().filter(|(record, _)| kept(record)).cloned();
         let path = self.written(records.map(|(mut record, time_ns)| {
@@ -148,7 +149,7 @@ impl Flown {
 }
 
 fn all_frames_identical(report: &VerifyReport) -> u64 {
-    let frames = report.frames.as_ref().expect("frames");
+    let frames = report.frames.as_ref().expect("a report on the frames");
     assert_eq!((frames.recorded, frames.different), (frames.compared, 0), "{report:?}");
     assert_eq!((report.ticks_recorded, report.ticks_different), (report.ticks_compared, 0), "{report:?}");
     assert_eq!(report.obstacle, None);
@@ -163,7 +164,7 @@ fn frame_of(record: &Record) -> Option<u64> {
 }
 
 #[test]
-fn both_vehicles_verify_from_power_up_to_safed_by_one_path() {
+fn both_vehicles_verify_from_power_up_to_safed() {
     for flown in [Flown::in_plane(&armed_and_started(100)), Flown::in_space(&armed_and_started(1_200), &[])] {
         assert!(flown.phases.starts_with(&[Phase::PadIdle, Phase::PadArmed]), "{:?}", flown.phases);
         assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
@@ -188,7 +189,7 @@ fn an_abort_in_the_countdown_and_one_in_the_air_verify() {
 }
 
 #[test]
-fn a_computer_that_dies_in_the_air_and_comes_back_verifies() {
+fn a_restart_of_the_computer_in_the_air_verifies() {
     let flown = Flown::in_space(&armed_and_started(1_200), &["reboot:0.3@descent"]);
     let numbers: Vec<u64> = flown.records.iter().filter_map(|(record, _)| frame_of(record)).collect();
     let dead = numbers.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
@@ -197,7 +198,7 @@ fn a_computer_that_dies_in_the_air_and_comes_back_verifies() {
 }
 
 #[test]
-fn a_request_that_is_left_out_of_a_log_is_missed_in_its_frame() {
+fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
     let flown = Flown::in_plane(&armed_and_started(100));
     let report = flown.verified_with(
         |_| true,
@@ -216,9 +217,9 @@ fn a_request_that_is_left_out_of_a_log_is_missed_in_its_frame() {
 }
 
 #[test]
-fn where_frames_on_the_pad_are_lost_the_pilot_is_still_run_again_from_its_release() {
+fn if_frames_on_the_pad_are_lost_the_pilot_is_still_verified_from_its_release() {
     let flown = Flown::in_space(&armed_and_started(1_200), &[]);
-    // Left out by the writer's number: as a damaged chunk leaves them out.
+    // Left out by the writer's sequence number, as if a chunk were damaged.
     let path = flown.written(flown.records.iter().cloned());
     let whole = flown.folder.path().join("gap.mcap");
     without_frames(&path, &whole, 500..510);
@@ -229,7 +230,7 @@ fn where_frames_on_the_pad_are_lost_the_pilot_is_still_run_again_from_its_releas
     assert!(report.ticks_compared > 2_000);
 }
 
-/// Copies a log without the records of `/computer/frame` whose numbers within their channel are left out.
+/// Copies a log without the records of `/computer/frame` that have these sequence numbers in their channel.
 fn without_frames(from: &std::path::Path, to: &std::path::Path, left_out: std::ops::Range<u32>) {
     let bytes = std::fs::read(from).unwrap();
     let mut writer = mcap::Writer::new(std::fs::File::create(to).unwrap()).unwrap();
@@ -249,14 +250,14 @@ fn without_frames(from: &std::path::Path, to: &std::path::Path, left_out: std::o
 }
 
 #[test]
-fn a_tick_that_was_made_and_is_not_in_the_log_is_told() {
+fn a_tick_missing_in_the_log_is_reported() {
     let flown = Flown::in_plane(&armed_and_started(100));
     let lost = |record: &Record| !matches!(record, Record::ControllerTick(tick) if tick.input.tick == 40);
     assert_eq!(flown.verified_with(lost, |_| ()).obstacle, Some(Obstacle::TickLost { tick: 40 }));
 }
 
 #[test]
-fn a_vehicle_that_never_left_its_pad_verifies_and_is_no_whole_flight() {
+fn a_vehicle_that_never_left_its_pad_verifies_and_counts_as_cut() {
     let flown = Flown::in_space(&[asked(0, Asked::Hold)], &[]);
     let report = flown.verified();
     assert_eq!(report.outcome, Verification::IdenticalReadablePart);
@@ -310,7 +311,7 @@ proptest! {
         prop_assert_eq!(all_frames_identical(&flown.verified()), flown.frames());
     }
 
-    /// A damaged or forged log is answered, not obeyed: any number may stand in it.
+    /// Any number may be in a damaged or forged log: there is a report, and no panic.
     #[test]
     fn nonsense_is_answered(
         at in 0_usize..3_000,
@@ -343,7 +344,7 @@ proptest! {
     }
 }
 
-/// Short on the pad, so that nonsense has a flight to spoil.
+/// With a short time on the pad, so that the nonsense falls into the flight.
 static PLANE: std::sync::LazyLock<Flown> =
     std::sync::LazyLock::new(|| Flown::in_plane(&armed_and_started(100)));
 static SPACE: std::sync::LazyLock<Flown> =

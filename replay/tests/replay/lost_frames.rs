@@ -69,7 +69,7 @@ fn a_tick_after_the_loss_is_refused() {
 }
 
 #[test]
-fn the_grade_says_how_far_it_goes() {
+fn the_grade_says_up_to_which_frame_the_log_can_be_run_again() {
     let (after, before, last) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
     let grade = info(&RECOVERED).unwrap().grade;
     assert_eq!(grade.level, GradeLevel::BitExact);
@@ -91,7 +91,7 @@ fn a_flight_is_flown_again_across_the_loss() {
 }
 
 #[test]
-fn the_report_says_how_far_it_goes() {
+fn the_report_says_up_to_which_frame_the_log_can_be_run_again() {
     let (after, ..) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
     let page = report(&RECOVERED).unwrap().html;
     assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");

@@ -38,7 +38,7 @@ fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn nothing_that_is_there_is_overwritten_without_force() {
+fn no_existing_file_is_overwritten_without_force() {
     for (arguments, name) in writers() {
         let (directory, log) = copied(&WITH_FRAMES.log);
         let output = directory.path().join(name);
@@ -112,7 +112,7 @@ fn tables_and_imports_overwrite_nothing_either() {
     assert_eq!(code, 0, "{stderr}");
 }
 
-/// A page with the default name does not replace one that was edited.
+/// A page with the default name does not replace a page that was edited.
 #[test]
 fn a_report_twice_needs_force() {
     let (_directory, log) = copied(&NOMINAL.log);

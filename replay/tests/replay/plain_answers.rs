@@ -13,7 +13,7 @@ use crate::from_apogee::LANDED;
 use crate::simulated::{NOMINAL, WITH_FRAMES};
 
 #[test]
-fn a_planar_landing_has_no_wind_and_says_so() {
+fn a_wind_setting_on_a_planar_landing_is_refused_with_the_reason() {
     let recording = NOMINAL.recording();
     for given in ["truth.wind_m_s=4", "plant.wind_m_s=4", "wind=4"] {
         let refusal = refly(&recording, &with_plant(&[given])).unwrap_err().to_string();
@@ -83,7 +83,7 @@ fn a_cut_log_is_compared_up_to_its_end() {
 }
 
 #[test]
-fn a_tick_that_solves_nothing_names_one_that_does() {
+fn a_tick_without_a_solve_names_the_nearest_tick_with_one() {
     let (code, stdout, _) = run(replay("tick", &NOMINAL.log).arg("0"));
     assert!(
         code == 0 && stdout.contains("this tick solves no landing; the nearest that does is "),

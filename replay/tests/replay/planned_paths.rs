@@ -14,7 +14,7 @@ fn apart_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// Each path begins at the estimated position of the rocket, and the last one ends at its touchdown.
+/// Each path begins at the estimated position of the rocket, and the last path ends at its touchdown.
 #[test]
 fn val_flown_paths_begin_at_the_rocket_and_the_last_ends_at_its_touchdown() {
     let recording = MK2.recording();

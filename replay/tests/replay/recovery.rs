@@ -79,7 +79,7 @@ fn after_a_broken_record_the_summary_locates_the_next_chunk() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
 
-    /// Whatever is broken: no panic, and every tick kept is a true one.
+    /// Whatever is broken: no panic, and every tick kept is an original tick.
     #[test]
     fn nothing_false_is_recovered(
         place in 8..WHOLE.bytes.len(),

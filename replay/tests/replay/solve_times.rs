@@ -11,7 +11,7 @@ use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
 #[test]
-fn a_flown_rockets_solve_times_are_those_of_its_log() {
+fn the_solve_times_of_a_flown_rocket_are_read_from_its_log() {
     let recording = MK2.recording();
     let mut times_s: Vec<f64> = recording.timings.iter().map(|timing| timing.solve_time_s).collect();
     assert!(times_s.len() > 50 && times_s.iter().all(|time_s| *time_s > 0.0), "{times_s:?}");

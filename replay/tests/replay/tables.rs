@@ -36,7 +36,7 @@ fn a_flight_equals_itself_in_every_signal() {
 
 /// A flight shifted in time is the same flight, aligned on an event; on time alone it is not.
 #[test]
-fn a_shifted_flight_is_found_again_by_its_events() {
+fn a_shifted_flight_equals_itself_when_aligned_on_an_event() {
     let a = flown(&NOMINAL);
     let mut b = a.clone();
     for series in b.signals.values_mut() {
@@ -91,7 +91,7 @@ fn a_known_difference_has_its_rms_its_maximum_and_its_time() {
 }
 
 #[test]
-fn other_verdicts_fail_unless_they_are_tolerated() {
+fn different_verdicts_fail_unless_they_are_tolerated() {
     let recording = NOMINAL.recording();
     let options = ReflyOptions {
         plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],

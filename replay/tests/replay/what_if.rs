@@ -175,7 +175,7 @@ fn flights() -> Vec<Recording> {
 }
 
 #[test]
-fn a_sweep_does_not_depend_on_jobs_and_goes_on_where_it_stopped() {
+fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs_or_on_a_stop() {
     let flights = flights();
     let vary = ["nmpc.weights.w=50:110:3".parse().unwrap()];
     let plant = ["plant.thrust_scale=0.98,1.0".parse().unwrap()];
@@ -246,7 +246,7 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
         let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
         bisect(&recording, &options).unwrap_err().to_string()
     };
-    // A key that the profile leaves out, and an unknown one.
+    // A key that the profile leaves out, and an unknown key.
     assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));
     let unknown = refused("nmpc.wieghts.w");
     assert!(unknown.contains("did you mean `nmpc.weights.w`?"), "{unknown}");

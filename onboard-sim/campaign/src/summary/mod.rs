@@ -46,7 +46,7 @@ pub struct Summary {
     /// Plans by control level, and the work of the solver.
     pub plans: Plans,
     pub distributions: Vec<Distribution>,
-    /// Drawn quantities, the one that costs most landings first.
+    /// Drawn quantities, beginning with the one that costs most landings.
     pub sensitivity: Vec<Sensitivity>,
 }
 
@@ -65,7 +65,6 @@ pub struct Plans {
     pub best_feasible: u64,
     /// The previous plan, shifted.
     pub shifted: u64,
-    /// The upright law.
     pub stabiliser: u64,
     pub solver_iterations: u64,
     /// Solves that did not converge.
@@ -80,7 +79,7 @@ pub struct Distribution {
     /// Flights that have a value.
     pub flights: u64,
     pub least: f64,
-    /// Percentiles 5, 25, 50, 75, 95 and 99.
+    /// 5th percentile.
     pub p5: f64,
     /// 25th percentile.
     pub p25: f64,

@@ -1,4 +1,4 @@
-//! What an abort would do now, in terms of what becomes of the vehicle.
+//! The consequence for the vehicle if the crew aborted now.
 
 use super::{Computer, Vehicle};
 use crate::guidance::controller::ControlLevel;
@@ -24,12 +24,12 @@ pub enum AbortEffect {
     },
     /// The motor burns and has no cut-off: land on the ground below instead of at the pad.
     LandHere,
-    /// The same, where no plan can be had: hold upright.
+    /// As `LandHere`, but no plan is available: hold upright.
     UprightOnly,
 }
 
 impl Computer {
-    /// The abort as it would be meant now, by what the last frame has found.
+    /// The event that an abort would be now, from the findings of the last frame.
     pub(super) fn abort_event(&self) -> Event {
         match &self.vehicle {
             Vehicle::Plane(plane) => plane.abort_event(&self.table, self.igniter_continuity),
@@ -40,7 +40,7 @@ impl Computer {
         }
     }
 
-    /// Whether a plan to land can be had under thrust; true as long as nobody has tried.
+    /// Whether a landing under thrust can be planned; true until the first attempt.
     fn plans_a_landing(&self) -> bool {
         match &self.vehicle {
             Vehicle::Plane(plane) => plane.plans_a_landing(),
@@ -56,12 +56,13 @@ impl Computer {
         }
     }
 
-    /// What an abort would do. The phase table itself is asked, so that the words beside the abort key are what it would do.
+    /// What an abort would do now. The phase table itself is asked, so the text beside the abort key cannot differ from
+    /// it.
     pub fn abort_effect(&self) -> AbortEffect {
         let mode = self.table.mode();
         let next = transition(mode, self.abort_event(), self.table.time_s());
         let does = |effect| next.effects.contains(effect);
-        // To be sure, more rather than less; 254 is the most that is told, 255 would be "unknown".
+        // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean "unknown".
         let impact = || AbortEffect::Impact { m_s: libm::ceil(self.impact_m_s()).clamp(0.0, 254.0) as u8 };
         match () {
             () if next.refusal.is_some() => AbortEffect::None,

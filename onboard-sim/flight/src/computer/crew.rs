@@ -9,7 +9,6 @@ use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal};
 use super::news::Severity;
 use super::table::PhaseTable;
 
-/// What can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
     Arm,
@@ -23,11 +22,10 @@ pub enum Asked {
     Abort,
 }
 
-/// A request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     pub asked: Asked,
-    /// How well the station that asks is heard. [`Uplink::NotNeeded`] for the vehicle's own programme.
+    /// How well the requesting station is heard. [`Uplink::NotNeeded`] for the vehicle's own programme.
     pub uplink: Uplink,
     /// MAVLink system and component of the station; `None` for the vehicle's own programme.
     pub station: Option<(u8, u8)>,
@@ -43,13 +41,13 @@ impl Request {
 /// How a request ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// Done, or already so.
+    /// Done, or already in that state.
     Accepted,
-    /// Not now: the reason can be mended.
+    /// Not now: the cause can be fixed.
     NotNow,
     /// Not in this phase or state.
     Denied,
-    /// Understood and impossible.
+    /// Understood, but impossible.
     Failed,
 }
 
@@ -64,7 +62,8 @@ impl Answer {
     pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
 }
 
-/// Whether what is asked for is so already. A repeated request is accepted: it must not frighten the crew.
+/// Whether the vehicle is already in the requested state. A repeated request is accepted: a refusal would alarm the
+/// crew.
 pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
     let locks = mode.interlocks;
     match asked {
@@ -74,12 +73,12 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
         }
         Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
         Asked::Hold => mode.hold.is_some(),
-        // Repeated, an abort may mean more than the first time: the phase table decides.
+        // A second abort may do more than the first: the phase table decides.
         Asked::Abort => false,
     }
 }
 
-/// The event that a request is. `abort` is the abort as it would be meant now.
+/// The event for a request. `abort` is the event that an abort would be now.
 pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: Event) -> Event {
     match asked {
         Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
@@ -90,7 +89,7 @@ pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: 
     }
 }
 
-/// The answer to a request whose event the table has refused; the crew is told why.
+/// The answer to a request whose event the table has refused; the crew is told the reason.
 pub(super) fn refused(
     table: &mut PhaseTable,
     asked: Asked,
@@ -98,7 +97,8 @@ pub(super) fn refused(
     refusal: Refusal,
     checks: &[Check],
 ) -> Answer {
-    // Its first answer may have been lost: under the parachute and on the ground, too, an abort that is latched is so.
+    // The first answer may have been lost: a latched abort is accepted again, also under the parachute and on the
+    // ground.
     let latched = asked == Asked::Abort && table.mode().interlocks.abort_latched;
     if latched || refusal == Refusal::AlreadyAborted {
         return Answer::ACCEPTED;

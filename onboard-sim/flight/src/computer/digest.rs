@@ -1,4 +1,4 @@
-//! Numbers for what the flight computer remembers: all of it, and what of it decides in the air.
+//! Digests of the flight computer's memory: of all of it, and of the part that decides in the air.
 
 use super::self_test::SelfTest;
 use super::{Commands, Computer, LogState, Release, Vehicle};
@@ -6,8 +6,8 @@ use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::guidance::controller::ControllerState;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
 
-/// What of the phase table decides in the air. Times of the vehicle's clock decide nothing there, nor do the pin and the
-/// arming, which a person may change on the ground.
+/// The part of the phase table that decides in the air. Times of the vehicle's clock decide nothing there, nor do the
+/// pin and the arming, which a person may change on the ground.
 struct InTheAir<'a>(&'a Computer);
 
 impl Remembers for InTheAir<'_> {
@@ -105,7 +105,7 @@ impl Remembers for Vehicle {
     }
 }
 
-/// Everything. Time, frame and uplink come with each input; limits and the length of the countdown never change.
+/// The whole memory. Time, frame and uplink come with each input; limits and the length of the countdown never change.
 struct Whole<'a>(&'a Computer);
 
 impl Remembers for Whole<'_> {
@@ -144,15 +144,15 @@ impl Remembers for Whole<'_> {
 }
 
 impl Computer {
-    /// A number that differs whenever anything differs that the computer remembers, from power-up on.
+    /// A number that changes with anything that the computer remembers, from power-up on.
     pub fn digest(&self) -> u64 {
         Memory::digest_of(&Whole(self))
     }
 
-    /// A number that differs whenever what decides in the air differs, to compare a replay with a log.
+    /// A number that changes with anything that decides in the air, to compare a replay with a log.
     ///
-    /// What the mission says is not remembered but known, and the room that a solve works in holds nothing that the next
-    /// one reads.
+    /// The mission is left out because it is constant, and a solve's workspace because the next solve reads nothing of
+    /// it.
     pub fn flight_digest(&self) -> u64 {
         Memory::digest_of(&InTheAir(self))
     }

@@ -1,4 +1,4 @@
-//! What a frame of the flight computer depends on besides what it remembers.
+//! The input of one frame of the flight computer: everything it depends on besides its memory.
 
 use alloc::string::String;
 
@@ -7,7 +7,6 @@ use super::pilot::{PilotInput, Sensed};
 use super::plane::PlaneSensed;
 use crate::rules::arming::{PredictedLanding, Uplink};
 
-/// How the log fares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
     /// The log is being written, or the operator chose to fly without one.
@@ -21,18 +20,18 @@ impl LogState {
     pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
-/// What a rehearsal of the landing came to. Whoever simulates the flight computer rehearses: it takes a world.
+/// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rehearsed {
-    /// It found plans, and landed within what the legs take.
+    /// It found plans, and landed within the limits of the legs.
     pub warm: bool,
-    /// In words.
+    /// The result in words.
     pub found: String,
     /// Its touchdown; `None` if it did not come down.
     pub landing: Option<PredictedLanding>,
 }
 
-/// What the sensors say.
+/// The sensor readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "plain data, one a frame")]
 pub enum Feeling {
@@ -50,7 +49,7 @@ pub struct Commander {
     pub age_s: f64,
 }
 
-/// Everything that a frame depends on besides what the computer remembers.
+/// Everything that a frame depends on besides the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Input<'a> {
     /// Number of the frame since power-up.
@@ -67,21 +66,21 @@ pub struct Input<'a> {
     pub igniter_continuity: bool,
     pub pin_out: bool,
     pub log: LogState,
-    /// How well the station is heard that is heard best.
+    /// The uplink of the station that is heard best.
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
-    /// What was asked for since the last frame, in order.
+    /// Requests since the last frame, in order.
     pub requests: &'a [Request],
-    /// What the rehearsal came to, once it is over. The planar vehicle rehearses on board.
+    /// Result of the rehearsal, once it is over. The planar vehicle rehearses on board.
     pub rehearsed: Option<&'a Rehearsed>,
     /// The planar vehicle's last tick came too late to be applied.
     pub late: bool,
 }
 
 impl Input<'_> {
-    /// A frame in the air of a computer that was [released at once](Computer::released), by what a pilot's log holds of it:
-    /// nobody watches, and a recorded abort is asked for.
+    /// A frame in the air of a computer that was [released at once](Computer::released), made from its record in a
+    /// pilot's log: no station is connected, and a recorded abort becomes a request.
     pub fn in_the_air(input: &PilotInput) -> Self {
         const ABORT: [Request; 1] =
             [Request { asked: Asked::Abort, uplink: Uplink::NotNeeded, station: None }];

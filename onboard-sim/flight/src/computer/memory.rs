@@ -1,8 +1,8 @@
-//! A number for what a flight computer remembers, by bits.
+//! A digest of a flight computer's memory, bit by bit.
 //!
-//! Everything that decides the future goes in, in a fixed order; what cannot, stays out by name: constants of the
-//! mission, and room that is written before it is read. [`remembers!`] takes a type apart field by field, so a field
-//! that is added to it and named on neither side does not compile.
+//! Everything that decides the future goes in, in a fixed order. Fields that cannot decide it are left out by name:
+//! constants of the mission, and workspace that is written before it is read. [`remembers!`] lists a type's fields, so
+//! a new field that is named on neither side does not compile.
 
 use alloc::vec::Vec;
 
@@ -11,7 +11,7 @@ use core::hash::Hasher as _;
 use nalgebra::{ArrayStorage, Const, Matrix, UnitQuaternion};
 use twox_hash::XxHash64;
 
-/// The hash that is being taken: XXH64, of words in little-endian order.
+/// The hash being computed: XXH64, of words in little-endian order.
 pub(crate) struct Memory(XxHash64);
 
 impl Memory {
@@ -26,9 +26,9 @@ impl Memory {
     }
 }
 
-/// What has a memory that decides the future.
+/// A type with memory that decides the future.
 pub(crate) trait Remembers {
-    /// Puts all of it into the hash.
+    /// Adds all of the memory to the hash.
     fn remember(&self, memory: &mut Memory);
 }
 
@@ -55,7 +55,8 @@ impl Remembers for usize {
     }
 }
 
-/// A list is its length and its elements, so that two lists in a row cannot trade places.
+/// A list is hashed as its length and its elements, so that an element cannot move from one list into the next
+/// unnoticed.
 impl<T: Remembers> Remembers for [T] {
     fn remember(&self, memory: &mut Memory) {
         self.len().remember(memory);
@@ -118,7 +119,7 @@ impl Remembers for UnitQuaternion<f64> {
     }
 }
 
-/// [`Remembers`] for a struct: the fields it remembers, and behind `but` those that decide nothing or never change.
+/// [`Remembers`] for a struct: the fields it remembers, and after `but` those that decide nothing or never change.
 macro_rules! remembers {
     ($type:ty { $($field:ident),* $(,)? } $(but { $($left_out:ident),* $(,)? })?) => {
         impl $crate::computer::memory::Remembers for $type {
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_that_is_remembered_tells() {
+    fn every_bit_of_the_memory_changes_the_digest() {
         let digest = Memory::digest_of(&sample());
         let other_constant = Sample { constant: sample().constant + 6.0, ..sample() };
         assert_eq!(Memory::digest_of(&other_constant), digest);

@@ -1,18 +1,18 @@
 //! The flight computer: everything that decides on board, from power-up to safed.
 //!
-//! [`Computer::step`] is the only way forward: one [`Input`] a frame, one [`Output`] back, and the same inputs give the same
-//! outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing are all decided here,
-//! through one [phase table](crate::rules::phase).
+//! [`Computer::step`] is the only way to advance it: one [`Input`] a frame, one [`Output`] back, and the same inputs
+//! give the same outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing
+//! are all decided here, through one [phase table](crate::rules::phase).
 //!
-//! * [`table`]: the phase table as the computer uses it: each event is put to it once.
-//! * [`crew`], `requests`: what a crew may ask for, and how it is decided.
-//! * [`news`], `motor_watch`: what the computer tells.
+//! * [`table`]: the phase table as the computer uses it: each event goes through it once.
+//! * [`crew`], `requests`: the crew's requests, and the decision about each.
+//! * [`news`], `motor_watch`: the computer's messages to the crew.
 //! * [`pad`], `self_test`, `readiness`, `on_the_pad`: from power-up to the release.
-//! * [`pilot`]: what flies a rocket in space from its release.
+//! * [`pilot`]: flies a rocket in space from its release.
 //! * [`plane`]: the landing paper's planar vehicle.
-//! * `start`: power-up, and going on from elsewhere.
+//! * `start`: power-up, and starting from a recorded moment or after a restart.
 //! * `abort_effect`: what an abort would do now.
-//! * `memory`, `digest`: one number for what is remembered, to compare a replay with a log.
+//! * `memory`, `digest`: one number for the whole memory, to compare a replay with a log.
 
 mod abort_effect;
 pub mod crew;
@@ -54,21 +54,21 @@ use crate::rules::arming::Uplink;
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Mode, Motor, Phase};
 use crate::vehicle::profile::ArmingLimits;
 
-/// Length of a frame of a rocket in space, ms.
+/// Frame length of a rocket in space, ms.
 pub const FRAME_MS: u32 = 5;
-/// The same, s.
+/// Frame length of a rocket in space, s.
 pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 pub const AT_REST_S: f64 = 1.0;
 
-/// When the vehicle was let go.
+/// When the vehicle was released.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Release {
     frame: u64,
     time_s: f64,
 }
 
-/// The vehicle that is flown.
+/// The vehicle being flown.
 #[derive(Debug, Clone)]
 enum Vehicle {
     Space(Box<Space>),
@@ -114,7 +114,8 @@ impl Computer {
         output
     }
 
-    /// One frame, and the landing that a rocket's pilot plans in it, solved alone; none if it plans none.
+    /// One frame. Also returns the landing that a rocket's pilot plans in it, solved separately; `None` if it plans
+    /// none.
     pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
         let before = self.pilot().cloned();
         let output = self.step(input);
@@ -128,7 +129,7 @@ impl Computer {
         (output, solved)
     }
 
-    /// Switches, log and actuators, as they are found.
+    /// Takes over the state of switches, log and actuators from the input.
     fn take_note(&mut self, input: &Input<'_>) {
         let pin_out = self.table.mode().interlocks.pin_out;
         if input.pin_out != pin_out {
@@ -216,14 +217,14 @@ impl Computer {
         if due {
             self.complain_of_readiness();
         }
-        // After the controller: the gate judges a plan from where the vehicle is now, not a rehearsal.
+        // After the controller: the gate judges a plan that starts from the present state, not a rehearsal.
         if let (Vehicle::Plane(plane), Phase::LandArmed) = (&mut self.vehicle, self.table.mode().phase) {
             plane.consider_ignition(&mut self.table, input);
         }
         tick
     }
 
-    /// A rocket in the air, or on the ground after its flight. Returns whether it planned.
+    /// One frame of a rocket in the air, or on the ground after its flight. Returns whether it planned.
     fn fly(&mut self, input: &Input<'_>, abort: bool) -> bool {
         let (Vehicle::Space(space), Feeling::InSpace(sensed), Some(release)) =
             (&mut self.vehicle, input.feeling, self.release)
@@ -251,7 +252,7 @@ impl Computer {
             && frame.is_multiple_of(crate::computer::pilot::FRAMES_PER_PLAN)
     }
 
-    /// What time alone brings about, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
+    /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
     fn keep_time(&mut self) {
         let (mode, time_s) = (*self.table.mode(), self.table.time_s());
         if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
@@ -287,8 +288,8 @@ impl Computer {
         self.table.mode()
     }
 
-    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED may come much later, or
-    /// never: that is a matter of its motor.
+    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED depends on the
+    /// motor: it may come much later, or never.
     pub fn is_over(&self) -> bool {
         let mode = self.table.mode();
         let in_phase_s = self.table.time_s() - mode.entered_at_s;
@@ -315,7 +316,7 @@ impl Computer {
         }
     }
 
-    /// The last frame of the pilot: what it was given and what it decided.
+    /// Input and output of the pilot's last frame.
     pub fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
         match &self.vehicle {
             Vehicle::Space(space) => space.last.as_ref().map(|(input, output)| (input, output)),
@@ -328,17 +329,16 @@ impl Computer {
         self.release.map(|release| release.time_s)
     }
 
-    /// What the actuators were told last.
+    /// The last commands to the actuators.
     pub fn commands(&self) -> &Commands {
         &self.commands
     }
 
-    /// What the rehearsal came to, once it is over.
+    /// Result of the rehearsal, once it is over.
     pub fn rehearsed(&self) -> Option<&Rehearsed> {
         self.rehearsed.as_ref()
     }
 
-    /// Length of the countdown, s.
     pub fn countdown_s(&self) -> f64 {
         self.countdown_s
     }
@@ -346,6 +346,6 @@ impl Computer {
 
 /// Time since its release at the end of a frame, s.
 pub fn flight_time_s(frame: u64) -> f64 {
-    // A recorded frame may have any number.
+    // Saturating, because a recorded frame may have any number.
     frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3
 }

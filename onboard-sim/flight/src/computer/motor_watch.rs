@@ -1,4 +1,5 @@
-//! What the crew is told as the landing motor's state changes: whoever walks up to the vehicle lives by it.
+//! Tells the crew each change of the landing motor's state: the safety of anyone who approaches the vehicle depends on
+//! it.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -9,13 +10,13 @@ use crate::rules::phase::{MISFIRE_WAIT_S, MOTOR_HOT_S, Mode, MotorStatus, Phase}
 use super::news::Severity;
 use crate::computer::memory::{Memory, Remembers, remembers};
 
-/// What was last told.
+/// The state that the crew was last told of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Told {
     status: MotorStatus,
-    /// After the flight, on the ground.
+    /// On the ground after the flight.
     landed: bool,
-    /// Nobody has to wait.
+    /// The vehicle may be approached without waiting.
     free: bool,
 }
 
@@ -39,7 +40,7 @@ impl Default for MotorWatch {
 }
 
 impl MotorWatch {
-    /// What has changed, in words.
+    /// A message if the state has changed.
     pub(super) fn news(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
         use MotorStatus as M;
         let now = Told {
@@ -59,7 +60,7 @@ impl MotorWatch {
             Told { status: M::Live, landed: true, free: true } => {
                 (Severity::Critical, "LIVE MOTOR: the wait is over; put the pin in before anything else")
             }
-            // The rest is told once, by the change of status alone.
+            // All other states are told once, when the status changes.
             _ if now.status == before.status => return None,
             Told { status: M::Hot, .. } => {
                 return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
@@ -72,7 +73,7 @@ impl MotorWatch {
             }
             Told { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
             Told { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
-            // The command to light was told already.
+            // The crew was told when the motor was commanded to light.
             Told { status: M::Burning, .. } => return None,
         };
         Some((severity, words.to_owned()))
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_live_motor_on_the_ground_is_told_with_its_wait_and_when_that_is_over() {
+    fn the_crew_is_told_how_long_to_wait_at_a_live_motor_and_when_the_wait_is_over() {
         let mut watch = MotorWatch::default();
         let live = mode(Phase::Touchdown, Motor::Unlit, true);
         let (severity, words) = watch.news(&live, 1.0).unwrap();
@@ -104,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_is_told_change_by_change() {
+    fn each_change_of_the_motor_in_a_flight_is_told_once() {
         let mut watch = MotorWatch::default();
         let mut told = |phase, motor, time_s| {
             watch.news(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)

@@ -1,4 +1,4 @@
-//! What the flight computer tells: changes of phase, and words for the crew.
+//! What the flight computer reports: changes of phase, and messages to the crew.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -8,25 +8,25 @@ use crate::computer::memory::{Memory, Remembers};
 use crate::rules::arming::{Check, UPLINK_CHECK};
 use crate::rules::phase::{Effect, HOLD_LIMIT_S, Interlocks, Phase};
 
-/// How grave a text is.
+/// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// As planned.
     Info,
-    /// As planned, and worth noticing.
+    /// As planned, but worth noticing.
     Notice,
     /// Not as planned.
     Warning,
     /// Something failed, or was refused because of a fault.
     Error,
-    /// The vehicle is at stake.
+    /// The vehicle is in danger.
     Critical,
 }
 
-/// Something that the flight computer tells.
+/// One report of the flight computer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum News {
-    /// Words for the crew.
+    /// A message to the crew.
     Said {
         severity: Severity,
         words: String,
@@ -37,7 +37,7 @@ pub enum News {
     },
 }
 
-/// The words for an effect; `None` where the change of phase says it.
+/// The message for an effect; `None` if the change of phase already says it.
 pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, String)> {
     let (severity, words) = match effect {
         Effect::IgniteLandingMotor => (Severity::Notice, "landing motor commanded to light"),
@@ -54,13 +54,13 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
         Effect::ShowPadWait => (Severity::Critical, "ABORT on the pad: keep away for 60 s"),
         Effect::RecordLoss => (Severity::Critical, "vehicle will be lost: landing motor inhibited"),
         Effect::DeployChute => (Severity::Critical, "parachute deployed"),
-        // No ascent is flown here, and fins are seen.
+        // No ascent is flown here, and the crew can see the fins.
         Effect::FinsOpen | Effect::IgniteAscentMotor => return None,
     };
     Some((severity, words.to_owned()))
 }
 
-/// The words for an abort that found the landing motor commanded or lit, if it came between two modes.
+/// The message for an abort after the landing motor was commanded or lit, if the abort came between these two modes.
 pub(super) fn words_of_landing_here(
     before: Interlocks,
     after: Interlocks,
@@ -73,7 +73,7 @@ pub(super) fn words_of_landing_here(
     (after.lands_here && !before.lands_here).then_some((Severity::Critical, words))
 }
 
-/// The check that the crew on the pad was last told to stand in the way of arming.
+/// The failing arming check that the crew on the pad was last told of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Readiness(Option<&'static str>);
 
@@ -84,8 +84,8 @@ impl Remembers for Readiness {
 }
 
 impl Readiness {
-    /// What stands in the way now, in words, if that has changed. The uplink comes and goes with every lost heartbeat,
-    /// and each station is told of its own without being asked: it is left out here.
+    /// A message with the check that fails now, if it is another one than before. The uplink is left out: it comes and
+    /// goes with every lost heartbeat, and each station is told of its own uplink anyway.
     pub(super) fn news(&mut self, checks: &[Check]) -> Option<String> {
         let failing = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK);
         let complaint = failing.map(|check| check.name);

@@ -8,7 +8,7 @@ use super::{Computer, Input, Release, Vehicle};
 use crate::rules::phase::{Event, Phase, StartPoint};
 
 impl Computer {
-    /// A rocket on its pad.
+    /// One frame of a rocket on its pad.
     pub(super) fn wait_on_the_pad(&mut self, input: &Input<'_>) {
         if self.table.mode().phase == Phase::Safe {
             let felt = matches!(&self.vehicle, Vehicle::Space(space) if space.pad.has_felt());
@@ -22,7 +22,7 @@ impl Computer {
         }
     }
 
-    /// Moves every actuator and brings it back. `ready`: what else has to be known before the test is passed.
+    /// Moves every actuator and brings it back. The test is not passed before `ready` is true.
     pub(super) fn test_itself(&mut self, input: &Input<'_>, ready: bool) {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
@@ -57,7 +57,7 @@ impl Computer {
         self.table.mode().countdown_remaining_s(self.table.time_s()).is_some_and(|left_s| left_s <= 0.0)
     }
 
-    /// The countdown has ended: the flight begins where its simulation lets go.
+    /// The countdown has ended: the flight begins where the simulation releases the vehicle.
     pub(super) fn let_go(&mut self) {
         let at = match self.vehicle {
             Vehicle::Space(_) => StartPoint::Apogee,

@@ -1,4 +1,4 @@
-//! What a frame of the flight computer decides.
+//! The output of one frame of the flight computer.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -7,7 +7,7 @@ use super::crew::Answer;
 use super::news::News;
 use super::plane::PlanarTick;
 
-/// What the actuators are told.
+/// Commands to the actuators.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Commands {
     /// Gimbal angles (pitch, yaw), rad.
@@ -16,19 +16,19 @@ pub struct Commands {
     pub fins_rad: [f64; 4],
     /// Current through the landing motor's igniter.
     pub ignite: bool,
-    /// The parachute is thrown out.
+    /// The parachute is ejected.
     pub parachute: bool,
 }
 
-/// What a frame decides.
+/// The output of one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     pub commands: Commands,
-    /// The countdown has ended in this frame: the simulation lets the vehicle go where its flight begins.
+    /// The countdown has ended in this frame: the simulation releases the vehicle where its flight begins.
     pub released: bool,
     /// An answer to each request, in order.
     pub answers: Vec<Answer>,
-    /// What has happened, in order.
+    /// Reports, in order.
     pub news: Vec<News>,
     /// A plan or a tick of the landing controller was made.
     pub planned: bool,

@@ -1,4 +1,4 @@
-//! What the sensors tell on the pad: whether the vehicle stands still, and how it stands.
+//! Finds from the sensors on the pad whether the vehicle stands still, and in which attitude.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -8,10 +8,10 @@ use crate::estimation::estimator::alignment::PadAlignment;
 use crate::estimation::estimator::{Estimate, GnssFix, ImuSample, Measurements};
 use crate::vehicle::rigid::{RigidState, upright};
 
-/// The pad is judged anew after so many frames: a second.
+/// The stance is evaluated every so many frames: once a second.
 const WINDOW_FRAMES: u32 = 200;
 
-/// How the vehicle stands on its pad, as it was last felt. A value that is not known is not a number, and passes no check.
+/// Attitude and motion on the pad, as last measured. An unknown value is NaN and passes no check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stance {
     /// Tilt of the nose from the vertical, rad.
@@ -27,18 +27,18 @@ impl Stance {
         Self { tilt_rad: f64::NAN, rotation_rad_s: f64::NAN, speed_m_s: f64::NAN, settled: false };
 }
 
-/// What a second on the pad told.
+/// Result of one second on the pad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
     /// Attitude with the heading of the pad; `None` if the vehicle was not at rest.
     world_from_body: Option<UnitQuaternion<f64>>,
     /// Mean rotation rate, rad/s.
     rotation_rad_s: f64,
-    /// Mean velocity by satellite, world, m/s; not a number without a fix.
+    /// Mean GNSS velocity, world, m/s; NaN without a fix.
     velocity_m_s: Vector3<f64>,
 }
 
-/// The second under way, and what the last one told.
+/// The sums of the current second, and the result of the last one.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PadWatch {
     alignment: PadAlignment,
@@ -53,7 +53,7 @@ remembers!(Found { world_from_body, rotation_rad_s, velocity_m_s });
 remembers!(PadWatch { alignment, frames, gyro_sum_rad_s, fixes, velocity_sum_m_s, found });
 
 impl PadWatch {
-    /// Takes a frame.
+    /// Adds a frame.
     pub(super) fn feel(&mut self, sensed: &Sensed) {
         let measurements = match sensed {
             Sensed::Measured(measurements) => *measurements,
@@ -73,17 +73,17 @@ impl PadWatch {
         self.found = Some(Found {
             world_from_body: over.alignment.finish(0.0).ok().map(|start| start.world_from_body),
             rotation_rad_s: (over.gyro_sum_rad_s / f64::from(over.frames)).norm(),
-            // Without a fix nought by nought: not a number, which passes no check.
+            // Without a fix this is zero by zero: NaN, which passes no check.
             velocity_m_s: over.velocity_sum_m_s / f64::from(over.fixes),
         });
     }
 
-    /// Whether a whole second has been felt.
+    /// Whether a whole second has been evaluated.
     pub(super) fn has_felt(&self) -> bool {
         self.found.is_some()
     }
 
-    /// How the vehicle stands.
+    /// Attitude and motion on the pad.
     pub(super) fn stance(&self) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
         Stance {
@@ -94,7 +94,7 @@ impl PadWatch {
         }
     }
 
-    /// The state as it was last felt, at rest at the origin.
+    /// The last measured attitude, at rest at the origin.
     pub(super) fn believed(&self) -> RigidState {
         let found = self.found.as_ref();
         RigidState {
@@ -105,7 +105,7 @@ impl PadWatch {
     }
 }
 
-/// What perfect sensors would say of a known state.
+/// The measurements of perfect sensors in a known state.
 fn as_measured(estimate: &Estimate) -> Measurements {
     let state = &estimate.state;
     Measurements {

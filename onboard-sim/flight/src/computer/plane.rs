@@ -1,7 +1,7 @@
 //! The landing paper's planar vehicle: a rig that holds it until its release, and a landing from there.
 //!
-//! A sample is several frames. What falls on a sample happens in this order: the actuators get what was decided a sample
-//! ago, then come the phases, then the controller, then the ignition gate. In every frame the motor is felt.
+//! A sample is several frames. On a sample, in this order: the actuators get the commands decided one sample earlier,
+//! the phases change, the controller runs, the ignition gate is checked. The motor is measured in every frame.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -30,7 +30,7 @@ use crate::vehicle::profile::{Profile, StartPoint};
 const FRAME_MIN_MS: u64 = 20;
 /// The landing is rehearsed this often while the vehicle waits on the pad, s.
 const REHEARSAL_PERIOD_S: f64 = 1.0;
-/// Thrust is believed once it has been felt for this long, s: one spike is not a burning motor.
+/// Thrust is confirmed once it has been measured for this long, s: a single spike is not a burning motor.
 const THRUST_CONFIRM_S: f64 = 0.04;
 
 /// Why a profile cannot be flown.
@@ -44,7 +44,7 @@ pub enum PlaneError {
     SampleTime { profile: alloc::string::String, sample_time_s: f64 },
 }
 
-/// What perfect sensors say of the planar vehicle.
+/// The measurements of perfect sensors on the planar vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneSensed {
     pub state: PlanarState,
@@ -52,13 +52,13 @@ pub struct PlaneSensed {
     pub axial_specific_force_m_s2: f64,
     /// Where the gimbal is, rad.
     pub gimbal_rad: f64,
-    /// What a load cell under the motor says, N.
+    /// Reading of a load cell under the motor, N.
     pub thrust_n: f64,
     /// The thrust is too small to lift the vehicle.
     pub thrust_below_weight: bool,
 }
 
-/// One tick of the landing controller, whole.
+/// One tick of the landing controller: input, output and digest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarTick {
     pub input: ControllerInput,
@@ -73,18 +73,18 @@ pub enum PlanarLaw {
     /// The landing controller, with its plans.
     #[default]
     Nmpc,
-    /// The upright law alone. It plans no landing, so the ignition gate has none to judge.
+    /// The upright law alone. It plans no landing, so the ignition gate has no plan to judge.
     Upright,
 }
 
 /// A moment of a recorded landing to go on from.
 #[derive(Debug, Clone)]
 pub struct Moment {
-    /// What the controller remembered then.
+    /// The controller's memory at that moment.
     pub controller: ControllerState,
     /// The input of the tick at that moment, in LAND_ARMED, IGNITION or POWERED.
     pub input: ControllerInput,
-    /// What the fins are told at that moment, rad.
+    /// The fin commands at that moment, rad.
     pub fins_told_rad: [f64; 4],
 }
 
@@ -100,29 +100,29 @@ pub struct Plane {
     ignition_sample: Option<u64>,
     output: Option<ControllerOutput>,
     thrust: ThrustEstimate,
-    /// Since when thrust has been felt without a break, s.
+    /// Time since when thrust has been measured without a break, s.
     thrust_felt_since_s: Option<f64>,
     /// The gate check that the crew was last told of.
     gate_complaint: Option<&'static str>,
     /// The command that the gimbal gets at the next sample, rad.
     next_gimbal_rad: f64,
     fin_command_rad: [f64; 4],
-    /// The last output is new: whether it came in time is not known yet.
+    /// The last output is new: it is not known yet whether it came in time.
     fresh: bool,
     /// The last output that came in time, and the ticks missed since.
     in_time: Option<ControllerOutput>,
     misses: usize,
-    /// The state at the release, which a vehicle in its rig cannot feel.
+    /// The state at the release, which cannot be measured in the rig.
     release: PlanarState,
     felt: PlaneSensed,
     pub(super) law: PlanarLaw,
-    /// What is felt in this frame was felt before, in the record that this flight goes on from.
+    /// This frame's measurements were already used in the record that this flight continues.
     felt_before: bool,
-    /// What the actuators were last told: gimbal and fins, rad.
+    /// The last commands to the actuators: gimbal and fins, rad.
     pub(super) told: (f64, [f64; 4]),
 }
 
-// Outputs are compared tick by tick, and what was felt came with the input.
+// Outputs are compared tick by tick, and the measurements came with the input.
 remembers!(Plane {
     controller, tick, ignition_sample, thrust, thrust_felt_since_s, gate_complaint, next_gimbal_rad, fin_command_rad, fresh,
     misses, felt_before, told
@@ -177,7 +177,7 @@ impl Plane {
         })
     }
 
-    /// At a moment of a recorded landing.
+    /// The same vehicle at a moment of a recorded landing.
     pub(super) fn at(self, moment: &Moment) -> Self {
         let Moment { controller, input, fins_told_rad } = moment;
         let sample_s = self.profile.nmpc.sample_time_s;
@@ -201,7 +201,7 @@ impl Plane {
         libm::round(time_s / self.profile.nmpc.sample_time_s) as u64 * self.frames_per_sample
     }
 
-    /// Another profile for the landing controller; what it remembers stays.
+    /// Gives the landing controller another profile; its memory stays.
     pub(super) fn reconfigure(&mut self, profile: &Profile) {
         self.controller = self.controller.reconfigured(&ControllerConfig::from_profile(profile));
     }
@@ -215,17 +215,15 @@ impl Plane {
         &self.limits
     }
 
-    /// Length of a frame, ms.
     pub fn frame_ms(&self) -> u64 {
         self.frame_ms
     }
 
-    /// Length of a frame, s.
     pub fn frame_s(&self) -> f64 {
         self.profile.nmpc.sample_time_s / self.frames_per_sample as f64
     }
 
-    /// What the controller decided last.
+    /// The controller's last output.
     pub fn output(&self) -> Option<&ControllerOutput> {
         self.output.as_ref()
     }
@@ -240,7 +238,7 @@ impl Plane {
         self.ignition_sample.map(|sample| sample as f64 * self.profile.nmpc.sample_time_s)
     }
 
-    /// What was last felt.
+    /// The last measurements.
     pub fn felt(&self) -> &PlaneSensed {
         &self.felt
     }
@@ -249,7 +247,7 @@ impl Plane {
         frame.is_multiple_of(self.frames_per_sample)
     }
 
-    /// The estimate is the truth: it stands as it is.
+    /// Attitude and motion in the rig. The estimate is the truth here.
     pub(super) fn stance(&self) -> Stance {
         let state = &self.felt.state;
         Stance {
@@ -260,14 +258,14 @@ impl Plane {
         }
     }
 
-    /// The rehearsal's outcome: whether it converged, and in words.
+    /// Whether the rehearsal converged, and its result in words.
     pub(super) fn rehearsal(&self) -> (bool, alloc::string::String) {
         let solver = self.output.as_ref().map(|output| output.solver);
         let words = solver.map_or_else(|| "no rehearsal yet".into(), |solver| solver.summary());
         (solver.is_some_and(|solver| solver.converged()), words)
     }
 
-    /// Where the rehearsed landing ends, judged.
+    /// The verdict on the end of the rehearsed landing.
     pub(super) fn predicted_landing(&self) -> Option<crate::rules::verdict::LandingVerdict> {
         let rehearsed = self.output.as_ref().filter(|output| output.level == ControlLevel::Rehearsal)?;
         (rehearsed.plan.len > 0).then(|| {
@@ -298,7 +296,7 @@ impl Plane {
         Event::AbortRequested { above_commit_height: false, gate_open }
     }
 
-    /// Takes the effects of an event on the actuators.
+    /// Carries out the effects of an event on the actuators.
     pub(super) fn carry_out(&mut self, effects: crate::rules::phase::Effects, frame: u64) {
         if effects.contains(Effect::IgniteLandingMotor) {
             self.ignition_sample = Some(frame.div_ceil(self.frames_per_sample));
@@ -319,7 +317,7 @@ impl Plane {
         Ok(())
     }
 
-    /// What is felt in every frame: whether the motor burns and how strongly, and contact with the ground.
+    /// Evaluates the measurements of every frame: whether the motor burns, its thrust, and contact with the ground.
     pub(super) fn feel(&mut self, table: &mut PhaseTable, sensed: &PlaneSensed, input: &Input<'_>) {
         self.felt = *sensed;
         if core::mem::take(&mut self.felt_before) {
@@ -340,7 +338,7 @@ impl Plane {
             }
             _ => None,
         };
-        // Refused where the phase does not fit: then nothing has happened.
+        // The table refuses an event that does not fit the phase; nothing changes then.
         let _ = event.map(|event| self.happen(table, event, input.frame));
         let phase = table.mode().phase;
         let airborne = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed);
@@ -350,7 +348,7 @@ impl Plane {
         }
     }
 
-    /// Whether the accelerometer, since ignition, has felt at least half the nominal thrust for long enough.
+    /// Whether the accelerometer has measured at least half the nominal thrust for long enough since ignition.
     fn thrust_is_confirmed(&mut self, phase: Phase, contact: bool, time_s: f64) -> bool {
         let half_m_s2 = 0.5 * self.profile.motor.thrust_n / self.profile.vehicle.mass_kg;
         let lit = phase == Phase::Ignition && !contact;
@@ -361,7 +359,7 @@ impl Plane {
         time_s - *self.thrust_felt_since_s.get_or_insert(time_s) >= THRUST_CONFIRM_S
     }
 
-    /// Learns the motor's strength, once thrust is confirmed and until contact.
+    /// Estimates the motor's thrust, from its confirmation until contact.
     fn weigh_the_motor(&mut self, phase: Phase, input: &Input<'_>, time_s: f64) {
         let Some(ignited_at_s) = self.ignited_at_s().filter(|_| phase == Phase::Powered) else { return };
         let nominal_thrust_n = self.profile.motor.thrust_at_n(time_s - ignited_at_s);
@@ -369,15 +367,15 @@ impl Plane {
             axial_specific_force_m_s2: self.felt.axial_specific_force_m_s2,
             state: self.felt.state,
             gimbal_rad: self.felt.gimbal_rad,
-            // In contact the ground pushes too.
+            // In contact, the ground pushes too.
             nominal_thrust_n: if input.contact { 0.0 } else { nominal_thrust_n },
             interval_s: self.frame_s(),
         };
         self.thrust.update(&self.profile.planar_params(), &sample);
     }
 
-    /// The part of a sample before the phases: the actuators get what was decided a sample ago. If that came too late,
-    /// they get what the last plan that came in time has for now.
+    /// The part of a sample before the phases: the actuators get the commands decided one sample earlier. If those came
+    /// too late, they get the commands that the last timely plan holds for the present time.
     pub(super) fn apply(&mut self, late: bool) {
         if core::mem::take(&mut self.fresh) {
             if late {
@@ -393,12 +391,12 @@ impl Plane {
         self.told = (self.next_gimbal_rad, self.fin_command_rad);
     }
 
-    /// The rig lets the vehicle go.
+    /// The rig releases the vehicle.
     pub(super) fn release(&mut self) {
         self.felt.state = self.release;
     }
 
-    /// Every sample in flight; on the pad when there is no rehearsal yet, and then once in a while.
+    /// Every sample in flight; on the pad every sample until the first rehearsal, then once a rehearsal period.
     pub(super) fn controller_is_due(&self, phase: Phase, frame: u64) -> bool {
         let between = libm::round(REHEARSAL_PERIOD_S / self.profile.nmpc.sample_time_s).max(1.0) as u64;
         if !phase.on_pad() {
@@ -445,7 +443,7 @@ impl Plane {
         let checks = self.gate_checks(input.igniter_continuity);
         let failing = checks.iter().find(|check| !check.passed && self.law == PlanarLaw::Nmpc);
         let open = failing.is_none();
-        // Told when the reason changes, not ten times a second over a radio.
+        // Told only when the reason changes, not ten times a second over a radio.
         let complaint = failing.map(|check| check.name);
         let news = complaint != self.gate_complaint;
         if news && let Some(reason) = failing.and_then(Check::refusal) {
@@ -459,7 +457,7 @@ impl Plane {
         self.gate_complaint = complaint;
     }
 
-    /// The ignition gate's checks with the values found now.
+    /// The ignition gate's checks with the present values.
     fn gate_checks(&self, igniter_continuity: bool) -> Vec<Check> {
         let state = &self.felt.state;
         let predicted = self.output.as_ref();
@@ -474,7 +472,8 @@ impl Plane {
             landing_feasible: predicted.is_some_and(|output| output.solver.landing_feasible),
             predicted_touchdown_x_m: predicted
                 .map_or(f64::NAN, |output| output.predicted_touchdown.state.x_m),
-            // Released at ignition, the fins open with the release; their confirmation belongs to the descent.
+            // This vehicle is released at ignition and its fins open with the release; confirming them belongs to the
+            // descent.
             fins_confirmed: true,
             parachute_stowed: true,
             igniter_continuity,

@@ -1,4 +1,4 @@
-//! Whether the vehicle may be armed, by what it has found out about itself on the pad.
+//! Whether the vehicle may be armed, from its checks of itself on the pad.
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ use crate::rules::phase::Phase;
 use crate::vehicle::rigid::RigidState;
 
 impl Computer {
-    /// How the vehicle stands on its pad.
+    /// Attitude and motion on the pad.
     pub fn stance(&self) -> Stance {
         match &self.vehicle {
             Vehicle::Space(space) => space.pad.stance(),
@@ -18,7 +18,7 @@ impl Computer {
         }
     }
 
-    /// The state that is believed on the pad, at rest at the origin; of a rocket in space.
+    /// The estimated state on the pad, at rest at the origin; only for a rocket in space.
     pub fn believed_on_the_pad(&self) -> Option<RigidState> {
         match &self.vehicle {
             Vehicle::Space(space) => Some(space.pad.believed()),
@@ -26,7 +26,7 @@ impl Computer {
         }
     }
 
-    /// The arming checks with the values found now, by the station that is heard best.
+    /// The arming checks with the present values; the uplink is that of the station heard best.
     pub fn arming_checks(&self) -> Vec<Check> {
         self.arming_checks_by(self.uplink)
     }

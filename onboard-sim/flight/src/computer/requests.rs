@@ -1,4 +1,4 @@
-//! What the crew asks for, decided; and a commander that has fallen silent.
+//! Decides the crew's requests, and holds the countdown when the commanding station falls silent.
 
 use alloc::format;
 
@@ -8,7 +8,7 @@ use super::{Commander, Computer, Input, Vehicle};
 use crate::rules::phase::{Event, HoldCause, Phase, UPLINK_SILENT_S};
 
 impl Computer {
-    /// Decides about a request; `None` of an abort in space, which the pilot takes in this frame.
+    /// Decides a request; `None` for an abort in the air in space, which the pilot handles in this frame.
     pub(super) fn answer(&mut self, request: &Request) -> Option<Answer> {
         let mode = *self.table.mode();
         let Request { asked, uplink, station } = *request;
@@ -30,7 +30,7 @@ impl Computer {
         })
     }
 
-    /// The answer to an abort that the pilot has taken.
+    /// The answer to an abort that the pilot has handled.
     pub(super) fn abort_answer(&self) -> Answer {
         if self.table.mode().interlocks.abort_latched {
             return Answer::ACCEPTED;
@@ -38,7 +38,7 @@ impl Computer {
         Answer { ending: Ending::Failed, reason: Some("the flight ended before it".into()) }
     }
 
-    /// Holds a countdown whose station has fallen silent.
+    /// Holds the countdown if the station that armed the vehicle has fallen silent.
     pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
         let Some(Commander { station: (system, component), age_s }) = input.commander else { return };
         if self.table.mode().countdown_end_s.is_none() || age_s <= UPLINK_SILENT_S {

@@ -2,12 +2,12 @@
 
 /// Fins and gimbal are moved by this much, rad.
 const MOVED_RAD: f64 = 0.05;
-/// An actuator that is farther than this from its command does not answer, rad.
+/// An actuator farther than this from its command counts as not answering, rad.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
 /// The self-test has failed if it has not passed by then, s.
 const LIMIT_S: f64 = 3.0;
 
-/// How far it has come.
+/// Progress of the self-test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SelfTest {
     NotBegun,
@@ -16,7 +16,7 @@ pub(super) enum SelfTest {
     Failed,
 }
 
-/// What is to be done next.
+/// The next action of the self-test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum TestStep {
     /// Command every actuator to this angle from its rest, rad.
@@ -30,7 +30,7 @@ pub(super) enum TestStep {
 }
 
 impl SelfTest {
-    /// Called until it has passed, with whether every actuator has come to its commanded angle.
+    /// Called until the test has passed. `answering`: every actuator has reached its commanded angle.
     pub(super) fn step(&mut self, answering: bool, time_s: f64) -> TestStep {
         match self {
             Self::NotBegun => {

@@ -1,4 +1,4 @@
-//! A rocket in space: its pad, and the pilot that flies it from its release.
+//! A rocket in space: the wait on its pad, and the pilot that flies it from its release.
 
 use super::pad::PadWatch;
 use super::table::PhaseTable;
@@ -21,7 +21,7 @@ pub(super) struct Space {
     gate_refusal: Option<&'static str>,
 }
 
-// The last frame in the air came with its input, and what it decided is compared as output.
+// The last frame in the air came with its input, and its decisions are compared as output.
 remembers!(Space { pad, pilot, gate_refusal } but { last });
 
 impl Space {

@@ -1,5 +1,5 @@
-//! How a flight computer begins: at power-up, at its release, at a moment of a recorded landing, and again after it died; and
-//! with what other settings it goes on.
+//! Starts of a flight computer: at power-up, at its release, at a moment of a recorded landing, and after a restart in
+//! the air; and changes of its settings.
 
 use alloc::boxed::Box;
 
@@ -20,8 +20,8 @@ use crate::vehicle::profile::{ArmingLimits, Profile};
 use crate::vehicle::rigid::RigidState;
 
 impl Computer {
-    /// The computer of a rocket at power-up on its pad. No ascent is flown: `believed` is its idea of its state at the
-    /// release at apogee.
+    /// The computer of a rocket at power-up on its pad. No ascent is flown: `believed` is its estimate of the state at
+    /// the release at apogee.
     pub fn in_space(mission: &Mission, law: Law, believed: &RigidState) -> Self {
         let space = Space::new(mission, law, believed);
         let closed_rad = mission.airframe.fins.closed_rad();
@@ -29,20 +29,20 @@ impl Computer {
         Self::new(Vehicle::Space(Box::new(space)), arming, countdown_s, closed_rad)
     }
 
-    /// The computer of the planar vehicle at power-up in its rig, which lets it go in the state `release`.
+    /// The computer of the planar vehicle at power-up in its rig, which releases it in the state `release`.
     ///
     /// # Errors
-    /// The profile asks for what this computer does not do.
+    /// The profile asks for something that this computer does not support.
     pub fn in_plane(profile: &Profile, release: PlanarState) -> Result<Self, PlaneError> {
         let plane = Plane::new(profile, release)?;
         let (arming, countdown_s) = (profile.arming, profile.start.countdown_s);
         Ok(Self::new(Vehicle::Plane(Box::new(plane)), arming, countdown_s, profile.fins.closed_rad()))
     }
 
-    /// The computer of the planar vehicle at a moment of a recorded landing, to go on from there.
+    /// The computer of the planar vehicle at a moment of a recorded landing, to continue from there.
     ///
     /// # Errors
-    /// The profile asks for what this computer does not do.
+    /// The profile asks for something that this computer does not support.
     pub fn at_moment(profile: &Profile, moment: &Moment, law: PlanarLaw) -> Result<Self, PlaneError> {
         let computer = Self::in_plane(profile, moment.input.state)?;
         let mut computer = computer.released();
@@ -50,7 +50,7 @@ impl Computer {
         **plane = plane.clone().at(moment);
         plane.law = law;
         computer.frame = plane.frame_at(moment.input.time_s);
-        // By the table, as the record came there.
+        // Through the phase table, as in the recorded flight.
         let (table, input) = (&mut computer.table, &moment.input);
         if let Some(ignited_at_s) = plane.ignited_at_s() {
             table.begin(ignited_at_s);
@@ -93,7 +93,7 @@ impl Computer {
         }
     }
 
-    /// The same released at once at the start of its clock, as flights are that begin without a pad.
+    /// The same computer, released at the start of its clock, for flights that begin without a pad.
     #[must_use]
     pub fn released(mut self) -> Self {
         for event in [
@@ -102,7 +102,7 @@ impl Computer {
             Event::ArmRequested { checks_passed: true },
             Event::StartRequested { countdown_s: 0.0 },
         ] {
-            // Accepted in this order: a test holds that.
+            // The table accepts these events in this order; a test checks that.
             let _ = self.table.happen(event);
         }
         self.let_go();
@@ -112,28 +112,28 @@ impl Computer {
         self
     }
 
-    /// What is left of a computer that starts again in the air: what it keeps in memory that outlives the power.
+    /// Restarts the computer in the air: only memory that survives a power loss is kept.
     pub fn restart(&mut self, time_s: f64) {
         if let (Vehicle::Space(space), Some(release)) = (&mut self.vehicle, self.release) {
             space.pilot = space.pilot.restarted(time_s - release.time_s);
         }
     }
 
-    /// Another mission from now on; what is remembered stays.
+    /// Changes the mission from now on; the memory stays.
     pub fn reconfigure(&mut self, mission: &Mission) {
         if let Vehicle::Space(space) = &mut self.vehicle {
             space.pilot = space.pilot.reconfigured(mission);
         }
     }
 
-    /// Another profile for the planar vehicle's landing controller; what it remembers stays.
+    /// Gives the planar vehicle's landing controller another profile; its memory stays.
     pub fn reconfigure_controller(&mut self, profile: &Profile) {
         if let Vehicle::Plane(plane) = &mut self.vehicle {
             plane.reconfigure(profile);
         }
     }
 
-    /// Another law for the landing burn from now on.
+    /// Changes the law for the landing burn from now on.
     pub fn set_law(&mut self, law: Law) {
         if let Vehicle::Space(space) = &mut self.vehicle {
             space.pilot.set_law(law);

@@ -1,4 +1,4 @@
-//! The phase table as the flight computer uses it: every event of a vehicle goes through here, once.
+//! The phase table as the flight computer uses it: every event of a vehicle goes through here once.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use super::news::{News, Severity, words_of, words_of_landing_here};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Refusal, transition};
 
-/// Phase and latches, and what has happened to them in this frame.
+/// Phase and latches, and the reports of this frame.
 #[derive(Debug, Clone)]
 pub struct PhaseTable {
     mode: Mode,
@@ -18,12 +18,12 @@ pub struct PhaseTable {
 }
 
 impl PhaseTable {
-    /// At power-up.
+    /// The table at power-up.
     pub(super) fn new(time_s: f64) -> Self {
         Self { mode: Mode::power_up(time_s), time_s, news: Vec::new() }
     }
 
-    /// A frame begins.
+    /// Begins a frame.
     pub(super) fn begin(&mut self, time_s: f64) {
         self.time_s = time_s;
     }
@@ -38,7 +38,7 @@ impl PhaseTable {
         self.time_s
     }
 
-    /// Puts an event to the phase table. Its effects are the caller's to carry out; the crew is told of them here.
+    /// Applies an event. The caller carries out its effects; the crew is told of them here.
     ///
     /// # Errors
     /// The table refuses the event, and nothing has changed.
@@ -51,7 +51,7 @@ impl PhaseTable {
         self.mode = next.mode;
         let countdown_s = if let Event::StartRequested { countdown_s } = event { countdown_s } else { 0.0 };
         for effect in next.effects.iter() {
-            // The motor of a vehicle that touches down may have been inhibited long before.
+            // At touchdown, the motor may have been inhibited long before: it is not reported again.
             let known = effect == Effect::InhibitLandingMotor && before.interlocks.landing_motor_inhibited;
             if let Some((severity, words)) = words_of(effect, countdown_s).filter(|_| !known) {
                 self.say(severity, words);
@@ -66,7 +66,7 @@ impl PhaseTable {
         Ok(next.effects)
     }
 
-    /// Tells the crew something.
+    /// Sends a message to the crew.
     pub(crate) fn say(&mut self, severity: Severity, words: String) {
         self.news.push(News::Said { severity, words });
     }
@@ -76,7 +76,7 @@ impl PhaseTable {
         self.say(Severity::Critical, format!("ignition gate closed: {reason}"));
     }
 
-    /// What has happened in this frame, in order.
+    /// Takes the reports of this frame, in order.
     pub(super) fn take_news(&mut self) -> Vec<News> {
         core::mem::take(&mut self.news)
     }

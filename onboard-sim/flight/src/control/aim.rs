@@ -66,7 +66,6 @@ pub fn turn_to_aim_rad(world_from_body: &UnitQuaternion<f64>, nose_in_world: &Ve
 pub struct AimGains {
     /// Natural frequency of the closed loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Its damping ratio.
     pub damping: f64,
     /// Time from a command to the motion it causes, s.
     pub latency_s: f64,
@@ -262,7 +261,7 @@ mod tests {
         for _ in 0..800 {
             let command = aim_loop.command_rad(&attitude, &rate, turning, &Aim::upright(), 0.12);
             pipe.push_back(command);
-            let applied = pipe.pop_front().expect("filled");
+            let applied = pipe.pop_front().expect("the queue is never empty");
             let acceleration = Vector3::new(
                 0.0,
                 disturbance_rad_s2 - turning * libm::sin(applied[0]),

@@ -84,14 +84,14 @@ impl Patterns {
         self.roll = self.roll.clamp(-roll_max, roll_max);
         let pattern = Self { mean: 0.0, ..self }.sines();
         let (low, high) = extremes(&pattern);
-        // By rounding the pattern may be slightly wider than the room.
+        // Because of rounding the pattern may be slightly wider than the range.
         self.mean = self.mean.min(highest - high).max(lowest - low);
         self
     }
 }
 
-/// The largest roll amplitude of a sign that keeps a pattern within its room: each pair of fins with opposite roll
-/// signs may drift apart until it fills the room.
+/// The largest roll amplitude of this sign that keeps a pattern within `room`, the width of the range: each pair of
+/// fins with opposite roll signs may move apart until it fills the range.
 fn largest_roll(tilt: &[f64; 4], sign: f64, room: f64) -> f64 {
     let mut largest = room / 2.0;
     for up in 0..4 {

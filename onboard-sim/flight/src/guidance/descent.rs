@@ -30,7 +30,6 @@ pub struct DescentGains {
     pub lean_fades_s: f64,
     /// Natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Its damping ratio.
     pub damping: f64,
     /// Decay rate of the roll rate, 1/s.
     pub roll_decay_per_s: f64,
@@ -44,7 +43,6 @@ pub struct DescentSituation {
     pub mass_kg: f64,
     /// Moments of inertia about the roll axis and across it, kg m^2.
     pub inertia_kg_m2: [f64; 2],
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
     /// Drag area of body and fins along the wind, m^2.
@@ -128,7 +126,7 @@ impl DescentGains {
         dynamic_pressure_pa: f64,
     ) -> Vector3<f64> {
         let per_mass = dynamic_pressure_pa / situation.mass_kg;
-        // The drag along the wind acts in any case.
+        // The drag along the wind always acts.
         let carried_m_s2 = upstream * (per_mass * situation.drag_area_m2);
         let carried_m_s2 = Vector3::new(carried_m_s2.x, carried_m_s2.y, 0.0);
         let wanted_m_s2 = self.steering_m_s2(state, situation) - carried_m_s2;
@@ -246,8 +244,9 @@ mod tests {
         let mut state = falling();
         state.position_m.x = 60.0;
         let nose = gains().demand(&state, &situation(), true).nose_in_world;
-        state.world_from_body =
-            UnitQuaternion::rotation_between(&Vector3::z(), &nose).expect("not opposite") * upright();
+        state.world_from_body = UnitQuaternion::rotation_between(&Vector3::z(), &nose)
+            .expect("the directions are not opposite")
+            * upright();
         let demand = gains().demand(&state, &situation(), true);
         let lean_rad = 14.0_f64.to_radians();
         let weathercock_m3 = (0.0061 - 0.0622 * 0.05 * libm::sin(lean_rad)) * lean_rad;

@@ -9,7 +9,6 @@ use core::f64::consts::FRAC_PI_2;
 use crate::vehicle::dynamics::{PlanarParams, PlanarState};
 use crate::vehicle::profile::Profile;
 
-/// The upright law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stabiliser {
     /// Commanded angular acceleration per radian of pitch error, 1/s^2.

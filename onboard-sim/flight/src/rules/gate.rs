@@ -13,7 +13,6 @@ use alloc::vec::Vec;
 pub use crate::rules::check::{Check, all_passed, first_refusal};
 use crate::vehicle::profile::GateLimits;
 
-/// The inputs of the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateInput {
     /// Tilt of the nose from the vertical, rad; tail-first descent is near 0.

@@ -1,7 +1,7 @@
-//! This room holds the rules for what the vehicle may do.
+//! The rules for what the vehicle may do.
 //!
 //! * [`phase`] has the flight phases and the one table that moves between them.
-//! * [`arming`] has the checks before arming, [`gate`] those before ignition; [`check`] is one of them.
+//! * [`arming`] has the checks before arming, [`gate`] the checks before ignition; [`check`] has the type of one check.
 //! * [`verdict`] has the touchdown limits, and whether a landing kept them.
 
 pub mod arming;

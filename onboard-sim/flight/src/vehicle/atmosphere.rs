@@ -4,7 +4,6 @@
 //! and is 216.65 K above. Heights are above mean sea level. The standard's lowest layer is used down to -5 km, and a
 //! height outside -5 to 20 km gets the air of the nearest end.
 
-/// Standard gravity, m/s^2.
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
 /// The standard's radius of the Earth, which converts geometric into geopotential height, m.
@@ -28,7 +27,6 @@ const GAMMA: f64 = 1.4;
 pub struct Air {
     pub temperature_k: f64,
     pub pressure_pa: f64,
-    /// Density, kg/m^3.
     pub density_kg_m3: f64,
 }
 

@@ -42,7 +42,8 @@ impl<'a> Burn<'a> {
     /// `mass_at_ignition_kg` is the mass before the burn.
     pub fn falls_through_weight_s(&self, mass_at_ignition_kg: f64, gravity_m_s2: f64) -> Option<f64> {
         let mut time_s = self.time_scale * self.curve.burn_time_s();
-        // The burnt propellant changes the weight by a per cent or two, so a fixed point needs very few rounds.
+        // The burnt propellant changes the weight by one or two per cent, so the fixed-point iteration needs few
+        // rounds.
         for _ in 0..4 {
             let weight_n = (mass_at_ignition_kg - self.burnt_kg(time_s)) * gravity_m_s2;
             let curve_n = weight_n * self.time_scale / self.impulse_scale;
@@ -59,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_scales_give_the_stated_impulse_and_burn_time() {
-        let curve = motors::builtin("H45W").expect("built in");
+        let curve = motors::builtin("H45W").expect("a built-in motor");
         let burn = Burn { curve: &curve, impulse_scale: 1.05, time_scale: 0.96 };
         let whole_n_s = burn.mean_thrust_n(0.0, 10.0) * 10.0;
         assert!((whole_n_s - 1.05 * curve.total_impulse_n_s()).abs() < 1e-9);
@@ -68,7 +69,7 @@ mod tests {
 
     #[test]
     fn thrust_equals_weight_at_the_fall_through() {
-        let curve = motors::builtin("H45W").expect("built in");
+        let curve = motors::builtin("H45W").expect("a built-in motor");
         let burn = Burn { curve: &curve, impulse_scale: 0.97, time_scale: 1.03 };
         let time_s = burn.falls_through_weight_s(3.13, 9.80665).expect("the thrust carries the vehicle");
         let weight_n = (3.13 - burn.burnt_kg(time_s)) * 9.80665;

@@ -37,7 +37,6 @@ pub struct ApogeeStart {
     pub tilt_deg: f64,
 }
 
-/// The limits of the legs.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegLimits {
@@ -114,7 +113,6 @@ pub struct Mission {
     pub gate: GateLimits,
     /// What counts as a landing: the landing paper's Table 2.
     pub touchdown_limits: TouchdownBox,
-    /// The limits of the legs.
     pub leg_limits: LegLimits,
 }
 

@@ -31,7 +31,7 @@ pub struct PlanarFlight {
     drawn: Draw,
     policy: DeadlinePolicy,
     frame: u64,
-    /// Nothing has been decided yet: the first frame is the moment itself, and nothing moves before it.
+    /// Nothing has been decided yet: the first frame is decided at the start itself, before the plant moves.
     at_the_beginning: bool,
     lit: bool,
     /// The last tick came too late to be applied.
@@ -82,7 +82,7 @@ impl PlanarFlight {
         self.computer.reconfigure_controller(profile);
     }
 
-    /// Flies one frame; in the first the computer decides where it is, before anything moves.
+    /// Flies one frame. In the first frame the computer decides before the plant moves.
     pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Flown {
         if !std::mem::take(&mut self.at_the_beginning) {
             for _ in 0..self.plane().frame_ms() {

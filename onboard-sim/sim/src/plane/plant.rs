@@ -147,8 +147,8 @@ impl Plant {
         !self.lifts_off(self.thrust_n())
     }
 
-    /// What a perfect accelerometer along the nose axis reads, m/s^2. On the ground or in the rig, the reaction
-    /// to gravity.
+    /// The reading of a perfect accelerometer along the nose axis, m/s^2. On the ground or in the rig it is the
+    /// reaction to gravity.
     pub fn axial_specific_force_m_s2(&self) -> f64 {
         let state = self.state;
         let gravity_m_s2 = self.model.params.gravity_m_s2 * libm::sin(state.theta_rad);

@@ -222,7 +222,9 @@ impl Sortie {
         let fed_back_rad = self.world.fins_feedback_rad();
         let touched = self.computer.released_at_s().is_some() && self.world.touchdown().is_some();
         let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
-            Some(sensors) => (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity()),
+            Some(sensors) => {
+                (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity())
+            }
             None => (fed_back_rad, touched, true),
         };
         let input = Input {
@@ -245,7 +247,7 @@ impl Sortie {
         let mut output = self.computer.step(&input);
         let took = watch.now().saturating_sub(began);
         watch.decided(&input, &output, &self.computer);
-        // Nobody waits for an answer to an abort that the computer itself asked for.
+        // An abort from `abort` has no station that waits for its answer.
         output.answers.truncate(outside.requests.len());
         self.command(&output.commands);
         if output.released {
@@ -278,7 +280,7 @@ impl Sortie {
         }
     }
 
-    /// Whether the flight goes on: the vehicle is not at rest and the time limit has not passed.
+    /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
     }
@@ -357,12 +359,12 @@ impl Sortie {
         self.injector.happened()
     }
 
-    /// The radio. In a campaign nobody is at its other end; in a live flight the ground is.
+    /// The radio. In a campaign there is no station; in a live flight the ground listens.
     pub fn radio(&self) -> &Radio {
         &self.radio
     }
 
-    /// What the flight computer believes about its state at apogee.
+    /// The flight computer's estimate of its state at apogee.
     pub fn believed_at_apogee(&self) -> &RigidState {
         &self.believed
     }

@@ -31,7 +31,6 @@ pub enum ProfileError {
         origin: String,
         /// The key, with its section.
         key: &'static str,
-        /// The value found.
         found: String,
         /// The accepted range, in words.
         required: &'static str,

@@ -15,9 +15,7 @@ pub enum ThrustCurveError {
         line: usize,
         /// What the format has there.
         field: &'static str,
-        /// What was found.
         found: String,
-        /// What would be accepted.
         required: &'static str,
     },
     /// The file ends before it holds a motor.
@@ -25,7 +23,6 @@ pub enum ThrustCurveError {
     Missing {
         /// What is missing.
         what: &'static str,
-        /// What would be accepted.
         required: &'static str,
     },
     /// The file name has no known ending.

@@ -4,7 +4,7 @@ use vehicles::mission::{BUILTIN, from_toml, is_meant};
 #[test]
 fn every_builtin_mission_is_sound() {
     for (name, text) in BUILTIN {
-        let mission = from_toml(text, name).expect("sound");
+        let mission = from_toml(text, name).expect("a valid mission");
         assert_eq!(mission.name, *name);
     }
 }
@@ -13,8 +13,8 @@ fn every_builtin_mission_is_sound() {
 fn the_countdown_is_range_checked_and_five_seconds_by_default() {
     let (name, text) = BUILTIN[0];
     let of = |countdown: &str| from_toml(&text.replace("[start]", countdown), name);
-    assert!((of("[start]").expect("sound").start.countdown_s - 5.0).abs() < 1e-12);
-    assert!((of("[start]\ncountdown_s = 0").expect("sound").start.countdown_s).abs() < 1e-12);
+    assert!((of("[start]").expect("a valid mission").start.countdown_s - 5.0).abs() < 1e-12);
+    assert!((of("[start]\ncountdown_s = 0").expect("a valid mission").start.countdown_s).abs() < 1e-12);
     for wrong in ["-1.0", "nan", "601.0"] {
         let message = of(&format!("[start]\ncountdown_s = {wrong}")).expect_err("wrong").to_string();
         assert!(message.contains("start.countdown_s") && message.contains("must be 0 to 600"), "{message}");
@@ -26,8 +26,8 @@ fn the_countdown_is_range_checked_and_five_seconds_by_default() {
 fn the_site_is_range_checked_and_a_known_field_by_default() {
     let (name, text) = BUILTIN[0];
     let of = |site: &str| from_toml(&text.replace("[start]", &format!("{site}\n[start]")), name);
-    assert_eq!(of("").expect("sound").site, Site::default());
-    let given = of("[site]\nlatitude_deg = 48.1\nlongitude_deg = 11.6").expect("sound").site;
+    assert_eq!(of("").expect("a valid mission").site, Site::default());
+    let given = of("[site]\nlatitude_deg = 48.1\nlongitude_deg = 11.6").expect("a valid mission").site;
     assert_eq!(given, Site { latitude_deg: 48.1, longitude_deg: 11.6 });
     let message = of("[site]\nlatitude_deg = 89.0\nlongitude_deg = 11.6").expect_err("wrong").to_string();
     assert!(message.contains("site.latitude_deg = 89") && message.contains("-85 to 85"), "{message}");

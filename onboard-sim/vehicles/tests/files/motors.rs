@@ -20,7 +20,7 @@ fn val_catalogue_impulse_of_the_builtin_motors() {
 }
 
 #[test]
-fn every_builtin_motor_parses_and_carries_its_origin() {
+fn every_builtin_motor_parses_and_states_its_origin() {
     for (name, text) in BUILTIN {
         let motor = builtin(name).unwrap();
         assert!(name.starts_with(motor.name().trim_end_matches('W')), "{name}: {}", motor.name());
@@ -37,12 +37,12 @@ fn the_error_for_an_unknown_name_lists_the_known_names() {
 
 #[test]
 fn an_airframe_may_contain_the_text_of_its_motor_file() {
-    let (_, rasp) = BUILTIN.iter().find(|(name, _)| *name == "H45W").expect("built in");
+    let (_, rasp) = BUILTIN.iter().find(|(name, _)| *name == "H45W").expect("a built-in motor");
     assert_eq!(named(rasp), builtin("H45W"));
     let rocksim = r#"<engine-database><engine-list><engine mfg="M" code="X10" dia="24" len="70" initWt="50"
         propWt="20"><data><eng-data t="0" f="0"/><eng-data t="0.1" f="10"/><eng-data t="2" f="10"/>
         <eng-data t="2.1" f="0"/></data></engine></engine-list></engine-database>"#;
-    let curve = named(rocksim).expect("a motor");
+    let curve = named(rocksim).expect("a valid motor");
     assert!((curve.total_impulse_n_s() - 20.0).abs() < 1e-9, "{}", curve.total_impulse_n_s());
     let refused = named("<engine-database>\n</engine-database>").expect_err("no motor in it");
     assert!(refused.to_string().contains("of the airframe"), "{refused}");

@@ -16,7 +16,7 @@ fn every_builtin_parses_and_carries_its_name() {
 }
 
 #[test]
-fn builtins_differ_only_where_they_say() {
+fn builtins_differ_only_in_thrust_and_dispersion() {
     let calibrated = builtin("paper-calibrated").unwrap();
     let mut printed = builtin("paper-as-printed").unwrap();
     assert_eq!(printed.motor.thrust_n.to_bits(), 30.0_f64.to_bits());

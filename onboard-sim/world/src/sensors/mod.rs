@@ -276,9 +276,9 @@ impl Sensors {
         let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
         let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * barometer.late_s;
         let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };
-        let ejection_m = truth.ejected_for_s.map_or(0.0, |for_s| {
-            self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S)
-        });
+        let ejection_m = truth
+            .ejected_for_s
+            .map_or(0.0, |for_s| self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S));
         Some(
             then_m + self.errors.barometer_offset_m + plume_m + ejection_m
                 - self.errors.barometer_ram * speed_height_m

@@ -48,7 +48,6 @@ pub struct ImuParams {
     pub off_cg_m: f64,
 }
 
-/// Barometer.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BarometerParams {
@@ -224,9 +223,7 @@ impl Default for LidarParams {
 pub struct SensorParamError {
     /// Section and field.
     pub field: &'static str,
-    /// The value found.
     pub found: f64,
-    /// What would be accepted.
     pub accepted: &'static str,
 }
 

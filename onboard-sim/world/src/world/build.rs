@@ -41,9 +41,7 @@ pub enum WorldError {
     Truth {
         /// The parameter.
         key: &'static str,
-        /// The value found.
         found: f64,
-        /// What would be accepted.
         required: &'static str,
     },
     /// The initial state is not finite, or its attitude is not a rotation.
@@ -119,7 +117,9 @@ impl World {
 fn fin_links_at(airframe: &Airframe, truth: &Truth, opening_rad: f64) -> [Linkage; 4] {
     let stops_rad = (airframe.fins.closed_rad(), FRAC_PI_2.max(airframe.fins.open_rad()));
     let at_rad = opening_rad.clamp(airframe.fins.closed_rad(), airframe.fins.open_rad());
-    truth.fin_offset_rad.map(|offset_rad| Linkage::new(1.0, offset_rad, truth.fin_slop_rad, stops_rad, at_rad))
+    truth
+        .fin_offset_rad
+        .map(|offset_rad| Linkage::new(1.0, offset_rad, truth.fin_slop_rad, stops_rad, at_rad))
 }
 
 fn fins_at(airframe: &Airframe, opening_rad: f64) -> [Servo; 4] {
@@ -168,7 +168,8 @@ fn check(truth: &Truth) -> Result<(), WorldError> {
     if !truth.wind_towards_rad.is_finite() {
         return refuse("wind_towards_rad", truth.wind_towards_rad, "a finite number");
     }
-    for (key, value) in [("plume_body_loss", truth.plume_body_loss), ("plume_fin_loss", truth.plume_fin_loss)] {
+    for (key, value) in [("plume_body_loss", truth.plume_body_loss), ("plume_fin_loss", truth.plume_fin_loss)]
+    {
         if !(-1.0..=1.0).contains(&value) {
             return refuse(key, value, "-1 to 1");
         }

@@ -32,7 +32,9 @@ impl World {
             motor: self.motor.changed(&other.motor, &self.truth),
             gimbal: core::array::from_fn(|axis| servo(&self.gimbal[axis], gimbal_data, &other.gimbal[axis])),
             fins: core::array::from_fn(|fin| servo(&self.fins[fin], fin_data, &other.fins[fin])),
-            gimbal_links: core::array::from_fn(|axis| self.gimbal_links[axis].changed(&other.gimbal_links[axis])),
+            gimbal_links: core::array::from_fn(|axis| {
+                self.gimbal_links[axis].changed(&other.gimbal_links[axis])
+            }),
             fin_links: core::array::from_fn(|fin| self.fin_links[fin].changed(&other.fin_links[fin])),
             parachute: self.parachute.clone(),
             wind: self.wind.changed(&other.wind),

@@ -22,8 +22,8 @@ use crate::STEP_S;
 use crate::aero::{Configuration, Flow, Load, Plume, Shape};
 use crate::body::{self, Inertia, Loads};
 use crate::fault::Fault;
-use crate::linkage::Linkage;
 use crate::ground::{Ground, Rest, RestOutcome, Touchdown};
+use crate::linkage::Linkage;
 use crate::motor::Motor;
 use crate::parachute::Parachute;
 use crate::servo::Servo;
@@ -165,7 +165,9 @@ impl World {
             servo.step(command_rad);
             link.step(servo.load_rad());
         }
-        for ((servo, link), command_rad) in self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad) {
+        for ((servo, link), command_rad) in
+            self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad)
+        {
             servo.step(command_rad);
             link.step(servo.load_rad());
         }
@@ -202,8 +204,8 @@ impl World {
     fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
         let cg_m = self.cg_m();
         let air = Air::at_height_m(self.state.position_m.z);
-        let [pitch_rad, yaw_rad] =
-            [0, 1].map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
+        let [pitch_rad, yaw_rad] = [0, 1]
+            .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
         let arm_m = cg_m.x;
         let acting = Acting {

@@ -27,7 +27,7 @@ pub(crate) struct Scene {
     pub(crate) wind_m_s: Vector2<f64>,
     pub(crate) faults: fn(f64) -> SensorFaults,
     pub(crate) sensors: SensorParams,
-    /// The true force of the air divided by the one in the estimator's model.
+    /// The true force of the air divided by the force in the estimator's model.
     pub(crate) air_scale: f64,
 }
 
@@ -85,7 +85,7 @@ impl Scene {
     /// Runs the flight until the centre of gravity is 0.1 m above its height at rest.
     pub(crate) fn fly(&self) -> Vec<Frame> {
         let mut estimator = self.estimator();
-        let mut sensors = Sensors::new(&self.sensors, self.seed, 0.0).expect("good figures");
+        let mut sensors = Sensors::new(&self.sensors, self.seed, 0.0).expect("valid sensor parameters");
         let mut state = Self::start();
         let (mut burning, mut ms) = (false, 0_u32);
         let mut frames = Vec::new();

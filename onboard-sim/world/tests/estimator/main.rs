@@ -1,4 +1,4 @@
-//! The estimator with the modelled sensors: it is consistent, accurate enough for landing, and steady when sensors
+//! Tests the estimator with the modelled sensors: it is consistent, accurate enough for landing, and works when sensors
 //! fail.
 #![expect(clippy::expect_used, reason = "a test says what it expected")]
 
@@ -53,7 +53,7 @@ fn height_rms_m(at: &[&Frame]) -> f64 {
 #[test]
 fn val_chi_square_the_error_matches_the_filters_covariance() {
     let flights = &*HEALTHY;
-    let shortest = flights.iter().map(Vec::len).min().expect("flights");
+    let shortest = flights.iter().map(Vec::len).min().expect("at least one flight");
     // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard deviation of 60, and
     // 99.9 % of it lies within 3.29 of them (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking
     // and Navigation", section 5.4).
@@ -91,8 +91,10 @@ fn the_estimate_is_accurate_enough_for_landing() {
 #[test]
 fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
-    let lit: Vec<&Frame> =
-        flights.iter().map(|frames| frames.iter().find(|frame| frame.burning).expect("lit")).collect();
+    let lit: Vec<&Frame> = flights
+        .iter()
+        .map(|frames| frames.iter().find(|frame| frame.burning).expect("a frame with the motor burning"))
+        .collect();
     for axis in 0..2 {
         let error_m_s = rms(&lit, |frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]);
         println!("wind at ignition: {error_m_s:.2} m/s");
@@ -101,7 +103,7 @@ fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
 }
 
 #[test]
-fn the_two_heights_agree_at_ignition_and_show_a_jump_of_one() {
+fn the_two_heights_agree_at_ignition_and_show_a_jump_of_the_barometer() {
     let flights = &*HEALTHY;
     for frame in frames(flights, |frame| frame.time_s > 1.0) {
         let apart_m = frame.estimate.heights.disagreement_m().expect("two heights");

@@ -1,5 +1,5 @@
-//! The estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that knows
-//! the truth lights the motor and holds the vehicle upright.
+//! Tests the estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that
+//! knows the truth lights the motor and holds the vehicle upright.
 
 use std::sync::LazyLock;
 
@@ -84,10 +84,10 @@ fn fly(seed: u64) -> Vec<Frame> {
     let curve: ThrustCurve = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = truth_of(seed);
     let mut world =
-        World::new(&airframe, &curve, &truth, &start(&truth), seed).expect("good data").with_fins_at(1.2);
+        World::new(&airframe, &curve, &truth, &start(&truth), seed).expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
-    let mut sensors = Sensors::new(&params, seed, 0.0).expect("good figures");
+    let mut sensors = Sensors::new(&params, seed, 0.0).expect("valid sensor parameters");
     let uncertainty = StartUncertainty::at_apogee();
     let believed = believed_start(&start(&truth), &uncertainty, seed);
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed);
@@ -159,7 +159,10 @@ static FLOWN: LazyLock<Vec<(Truth, Vec<Frame>)>> =
 /// Every flight's truth, with its first frame at this time after the thrust began.
 fn burning_for(since_s: f64) -> Vec<(&'static Truth, &'static Frame)> {
     let at = |frame: &&Frame| frame.since_thrust_s.is_some_and(|found_s| found_s >= since_s);
-    FLOWN.iter().map(|(truth, frames)| (truth, frames.iter().find(at).expect("burning"))).collect()
+    FLOWN
+        .iter()
+        .map(|(truth, frames)| (truth, frames.iter().find(at).expect("a frame with the motor burning")))
+        .collect()
 }
 
 fn rms(

@@ -186,7 +186,7 @@ impl<'a> AtStart<'a> {
         Ok((report, ReflownFlight { records, run, verdict, ..ReflownFlight::default() }))
     }
 
-    /// Facts that the log of this flight has in addition to those of the recorded one.
+    /// Facts that the log of this flight has in addition to those of the recorded flight.
     fn run_facts(&self, options: &ReflyOptions) -> Result<BTreeMap<String, String>, ReflyError> {
         let lines: Vec<String> = self.in_flight(options)?.iter().map(ToString::to_string).collect();
         Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
@@ -198,7 +198,7 @@ impl<'a> AtStart<'a> {
     fn in_flight(&self, options: &ReflyOptions) -> Result<Vec<Setting>, ReflyError> {
         let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
         let mut in_flight = options.settings.clone();
-        // Of two settings that take effect at the start, the later one wins, as it would have in flight.
+        // Of two settings that take effect at the start, the later setting wins, as it would have in flight.
         in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
         for setting in &mut in_flight {
             setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
@@ -218,7 +218,7 @@ impl<'a> AtStart<'a> {
         Ok(in_flight)
     }
 
-    /// The requested controller of the landing burn, if it differs from the recorded one.
+    /// The requested controller of the landing burn, if it differs from the recorded controller.
     fn other_controller(&self, options: &ReflyOptions) -> Result<Option<Controller>, ReflyError> {
         match options.law {
             Law::AsRecorded => Ok(None),

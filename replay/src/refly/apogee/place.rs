@@ -53,7 +53,7 @@ pub(super) fn find(
     })
 }
 
-/// Puts the vehicle where its flight computer believed it was at the end of the frame before the start.
+/// Puts the vehicle at the position that its flight computer estimated at the end of the frame before the start.
 pub(super) fn put_where_it_believes(
     recording: &Recording,
     rerun: &mut Rerun,

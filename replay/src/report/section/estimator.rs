@@ -1,4 +1,4 @@
-//! What the controller believed, against the simulated plant.
+//! The controller's estimate, against the simulated plant.
 
 use super::{COMPONENTS, rms_and_max};
 use crate::report::html::{paragraph, table};

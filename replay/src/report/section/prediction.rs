@@ -1,4 +1,4 @@
-//! The touchdown predicted at each tick, against the actual one.
+//! The touchdown predicted at each tick, against the actual touchdown.
 
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;

@@ -1,4 +1,4 @@
-//! The motor in the profile, as estimated by the controller, and the true one.
+//! The motor in three versions: in the profile, as estimated by the controller, and in truth.
 
 use super::rms_and_max;
 use crate::report::chart::{Chart, Line};

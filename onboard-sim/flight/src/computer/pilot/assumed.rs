@@ -1,14 +1,14 @@
-//! What a plan assumes of motor and fins.
+//! The motor and the fin opening that a plan assumes.
 //!
-//! What turns out to be too much thrust can be thrown away late, what is missing cannot be had: a plan is made for a
-//! motor that is weaker than estimated, by as many standard deviations as the mission is cautious. But not for one that
-//! could not be landed any more: its plan would lie across the air to brake, and lose the landing of all others. So of
-//! the weaker motors the weakest is taken that still lands from here. The fins are assumed as that motor would have
-//! them, for they follow what is learnt of it.
+//! Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is therefore made for a
+//! motor that is weaker than estimated, by the number of standard deviations that the mission sets as its caution. The
+//! motor must not be so weak that no landing is possible: such a plan would turn the vehicle across the air to brake,
+//! and spoil the landing for every stronger motor. So the plan takes the weakest of these motors that can still land
+//! from here. The fins are assumed as open as they would be with that motor, because they follow the motor's estimate.
 //!
-//! High in the band of feasible heights a plan for a weak motor that ends hard means something else: that it has not
-//! found how to sink faster. There the motor as estimated is tried as well, because braking upright, which helps a
-//! vehicle that is too low, would make this one hover.
+//! High in the band of feasible heights, a hard landing in a plan for a weak motor has another cause: the plan has not
+//! found a way to sink faster. There the motor as estimated is tried as well, because braking upright, which helps a
+//! vehicle that is too low, would make this vehicle hover.
 
 use super::known::{Burning, Known};
 use crate::estimation::estimator::Estimate;
@@ -16,7 +16,7 @@ use crate::guidance::powered::PoweredSituation;
 use crate::guidance::vertical::{Band, share_for};
 use crate::vehicle::burn::Burn;
 
-/// Steps from the whole caution to none.
+/// Number of steps from full caution to none.
 const CAUTION_STEPS: u32 = 3;
 
 /// Above this place in the band the motor as estimated is tried as well.
@@ -29,7 +29,7 @@ struct Assumed<'a> {
 }
 
 impl Known {
-    /// What to plan with: first the situation to be preferred, and the one to fall back on if its plan ends hard.
+    /// The preferred situation to plan with, and a fallback for the case that its plan lands hard.
     pub(super) fn situations_to_plan<'a>(
         &'a self,
         estimate: &Estimate,
@@ -52,7 +52,7 @@ impl Known {
         let estimated = self.burn();
         let estimated_band = band(&estimated);
         let caution_sigmas = self.caution_sigmas(burning.burning_s);
-        // Without caution the motor as estimated is all there is to try.
+        // Without caution, only the motor as estimated is tried.
         let steps = if caution_sigmas > 0.0 { CAUTION_STEPS } else { 0 };
         let weaker = (0..steps).find_map(|step| {
             let share = 1.0 - f64::from(step) / f64::from(CAUTION_STEPS);
@@ -66,8 +66,8 @@ impl Known {
         (situation(weaker.unwrap_or_else(as_estimated)), fallback)
     }
 
-    /// Standard deviations that a plan takes the motor to be weaker than estimated: all the mission's caution early,
-    /// none in the last moments, when nothing can be thrown away any more.
+    /// By how many standard deviations a plan takes the motor to be weaker than estimated: the mission's full caution
+    /// early, none in the last moments, when no thrust can be wasted any more.
     fn caution_sigmas(&self, burning_s: f64) -> f64 {
         let carried_until_s =
             self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);

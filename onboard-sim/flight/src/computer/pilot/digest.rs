@@ -1,4 +1,4 @@
-//! A number for everything a pilot remembers.
+//! A digest of everything that a pilot remembers.
 
 use super::known::Known;
 use super::{Outlook, Pilot};
@@ -23,7 +23,7 @@ remembers!(Pilot {
     gate_shut_since_s,
 });
 
-// The mission, its motor and its masses are what a log's profile says; they do not change in flight.
+// The mission, its motor and its masses come from the profile in the log; they do not change in flight.
 remembers!(Known { motor } but { mission, mass });
 
 remembers!(Outlook { ignition, commit_height_m, height_m, predicted_speed_m_s, touchdown_distance_m });

@@ -1,23 +1,23 @@
-//! A fin that does not move although it is told to.
+//! Finds a fin that does not move when commanded.
 //!
-//! A command that sweeps to and fro passes a stuck fin again and again, so being where it is told to be says little. A
-//! fin that is told to be far away, for longer than a servo needs, and has not moved at all meanwhile, is stuck.
+//! A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded angle may still be
+//! stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
 use crate::computer::memory::remembers;
 
-/// A fin that has moved by this much lives, rad.
+/// A fin that has moved by this much is working, rad.
 const MOVED_RAD: f64 = 0.015;
-/// Farther than this from where it is, a fin that lives goes where it is told at once, rad: as far as the gate allows.
+/// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
 const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
-/// Told to be far away for so long altogether without having moved, it is stuck, s.
+/// A fin is stuck if its command has been far away for this long in total and it has not moved, s.
 const STUCK_AFTER_S: f64 = 0.25;
 
-/// What is remembered of one fin.
+/// State of the watch over one fin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Watched {
-    /// Where it was when it last moved, rad.
+    /// Angle after its last movement, rad.
     rests_at_rad: f64,
-    /// How long it has been told to be far from there since, s.
+    /// Total time since then with a command far from the fin, s.
     called_for_s: f64,
 }
 
@@ -31,7 +31,7 @@ remembers!(Watched { rests_at_rad, called_for_s });
 remembers!(FinWatch { fins });
 
 impl FinWatch {
-    /// Takes a frame: where the fins are and where they had been told to be, rad.
+    /// Takes a frame: measured and commanded angles of the fins, rad.
     pub(super) fn look(&mut self, found_rad: &[f64; 4], told_rad: &[f64; 4], frame_s: f64) {
         for ((fin, found_rad), told_rad) in self.fins.iter_mut().zip(found_rad).zip(told_rad) {
             if (found_rad - fin.rests_at_rad).abs() > MOVED_RAD {
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
     use crate::computer::FRAME_S;
 
-    /// When a sweep of all fins, 1 s to and fro, finds one stuck that follows only until a time.
+    /// When the watch reports a fin that sticks from `stuck_from_s` on, in a sweep with a period of 1 s.
     fn found_after_s(stuck_from_s: f64, rate_rad_s: f64) -> Option<f64> {
         let mut watch = FinWatch::default();
         let mut fin_rad: f64 = 0.0;
@@ -68,13 +68,13 @@ mod tests {
     }
 
     #[test]
-    fn a_fin_that_the_command_passes_by_is_found_all_the_same() {
-        let found_s = found_after_s(2.3, 5.0).expect("found");
+    fn a_stuck_fin_is_found_although_the_command_sweeps_past_it() {
+        let found_s = found_after_s(2.3, 5.0).expect("the stuck fin is found");
         assert!((2.5..3.3).contains(&found_s), "{found_s}");
     }
 
     #[test]
-    fn one_that_follows_late_is_not_stuck() {
+    fn a_fin_that_follows_slowly_is_not_stuck() {
         assert_eq!(found_after_s(f64::INFINITY, 5.0), None);
         assert_eq!(found_after_s(f64::INFINITY, 0.5), None, "a tenth of the rate");
     }

@@ -1,21 +1,21 @@
-//! When there is no use in waiting for the ignition gate: the parachute, while it has room.
+//! Releases the parachute while there is height for it, if the ignition gate will not open.
 
 use super::{Pilot, PilotInput};
 use crate::estimation::estimator::Estimate;
 use crate::rules::phase::Phase;
 
-/// What stands in the gate's way so long, s, will not step aside before the ignition.
+/// A reason that has kept the gate shut for this long, s, will not go away before ignition.
 const LASTS_S: f64 = 0.5;
-/// The decision falls so long before the commit height is passed, s.
+/// The decision is taken this long before the commit height is passed, s.
 const BEFORE_COMMIT_S: f64 = 0.1;
-/// Beyond the gate's limit of the tilt times this, the vehicle does not steer, it tumbles.
+/// Beyond this multiple of the gate's limits of tilt and pitch rate, the vehicle tumbles.
 const TUMBLING: f64 = 2.0;
 
 impl Pilot {
-    /// The gate has been shut for a reason that lasts, and the parachute's last chance has come.
+    /// Whether the gate has been shut for a lasting reason, and this is the last chance for the parachute.
     ///
-    /// Reasons that last are fins that do not answer, an estimate that is not healthy, an attitude out of hand, and a
-    /// speed that no landing begins with. Operations: above the commit height that means the parachute.
+    /// Lasting reasons are fins that do not answer, an unhealthy estimate, an attitude out of control, and a speed from
+    /// which no landing is possible. The operating rules then require the parachute above the commit height.
     pub(super) fn gate_will_not_open(
         &mut self,
         phase: Phase,
@@ -40,7 +40,7 @@ impl Pilot {
         let feet_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
         let sinking_m_s = (-state.velocity_m_s.z).max(0.0);
         let above_commit_m = feet_m - self.outlook.commit_height_m;
-        // A stuck fin has been watched for long enough already.
+        // A stuck fin has already been watched for long enough.
         (self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S)
             && self.outlook.commit_height_m > 0.0
             && above_commit_m > 0.0
@@ -64,13 +64,14 @@ mod tests {
         Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
     }
 
-    /// Height of the parachute's release, m, in a fall with fins that answer or do not.
+    /// Height of the parachute's release in a fall, m, with or without fins that answer.
     fn released_m(fins_answer: bool) -> Option<f64> {
-        let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
+        let mission =
+            crate::vehicles::mission::builtin("mk2").expect("a built-in mission").expect("a valid mission");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee());
         let (mut table, mut fins_rad) = (released(), [0.0; 4]);
-        // To 80 m: below the commit height, above the ignition.
+        // Down to 80 m: below the commit height, above the ignition.
         (1..900).find_map(|frame| {
             let time_s = frame as f64 * 0.005;
             let estimate = falling(time_s);
@@ -94,10 +95,11 @@ mod tests {
     }
 
     #[test]
-    fn fins_that_do_not_answer_bring_the_parachute_in_time_and_others_do_not() {
+    fn the_parachute_is_released_in_time_only_if_the_fins_do_not_answer() {
         assert_eq!(released_m(true), None);
-        let released_m = released_m(false).expect("released");
-        // 1.5 times a second's fall and 20 m of inflation, and the feet below the centre of gravity.
+        let released_m = released_m(false).expect("the parachute is released");
+        // 1.5 times the sum of one second's fall and 20 m of inflation, plus the feet's distance below the centre of
+        // gravity.
         assert!((87.0..93.0).contains(&released_m), "{released_m}");
     }
 }

@@ -1,4 +1,4 @@
-//! The flight computer looked at, and its settings changed, from outside the flight: for those who replay it.
+//! For replay: reads the pilot's state and changes its settings from outside the flight.
 
 use super::known::{Burning, Known};
 use super::{FRAMES_PER_PLAN, Pilot, PilotInput};
@@ -10,8 +10,8 @@ use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::Mission;
 
 impl Pilot {
-    /// The same memory under another mission: another vehicle as it is known, other gains, limits and settings. The length
-    /// of a frame, the estimator's configuration and the start stay what they were.
+    /// The same memory with another mission: other vehicle data, gains, limits and settings. The frame length, the
+    /// estimator's configuration and the start stay as they were.
     #[must_use]
     pub fn reconfigured(&self, mission: &Mission) -> Self {
         let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
@@ -23,13 +23,14 @@ impl Pilot {
         }
     }
 
-    /// The states of the plan that is flown, one step apart, s, if there is one: in that plane, in the frame that moves with
-    /// the wind along it and was the ground's where the plan began.
+    /// The states of the plan being flown and the step between them, s, if there is a plan. They lie in the plane of
+    /// the landing, in the frame that moves with the wind along that plane and coincided with the ground's when the
+    /// plan began.
     pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
         self.powered.planned()
     }
 
-    /// The plane of its landing, once there is one.
+    /// The plane of the landing, once it is chosen.
     pub fn plane(&self) -> Option<&Plane> {
         self.powered.plane()
     }
@@ -39,7 +40,8 @@ impl Pilot {
         &self.known.mission
     }
 
-    /// The landing that `before`, this pilot a frame earlier, planned in this frame, solved alone; none if it planned none.
+    /// The landing planned in this frame, solved separately; `None` if none was planned. `before` is this pilot one
+    /// frame earlier.
     pub(crate) fn landing_planned(
         &self,
         before: &Self,
@@ -49,7 +51,7 @@ impl Pilot {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
         let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
         let estimate = self.estimate.as_ref()?;
-        // As in the frame itself.
+        // As in the frame itself, `Pilot::step`.
         let density_kg_m3 =
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         let mass = self.known.mass_now(Some(burning_s));

@@ -1,4 +1,4 @@
-//! What the pilot knows of its vehicle, and has learnt of motor and drag.
+//! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and drag.
 
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::MotorEstimate;
@@ -13,17 +13,17 @@ use crate::vehicle::mission::Mission;
 pub(super) struct Known {
     pub(super) mission: Mission,
     pub(super) mass: MassModel,
-    /// Motor and scale of the air's forces, as felt.
+    /// Estimated motor and scale of the aerodynamic forces.
     pub(super) motor: MotorEstimate,
 }
 
-/// The burning vehicle of a frame.
+/// The vehicle with its motor burning, in one frame.
 #[expect(clippy::struct_field_names, reason = "the time since thrust began is called that everywhere")]
 pub(super) struct Burning {
     pub(super) burning_s: f64,
     pub(super) mass: MassProperties,
     pub(super) density_kg_m3: f64,
-    /// After an abort: on the ground below, wherever the pad is.
+    /// After an abort: land on the ground below, wherever the pad is.
     pub(super) lands_here: bool,
 }
 
@@ -55,7 +55,7 @@ impl Known {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
     }
 
-    /// Whether the motor has burnt as long as it does: also one that went out early is not called burnt out before.
+    /// Whether the whole burn time has passed. A motor that went out early is not called burnt out before that either.
     pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
         let whole_s = self.motor.burn_time_stretch() * self.mission.motor_curve.burn_time_s();
         self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
@@ -73,9 +73,9 @@ impl Known {
         }
     }
 
-    /// The motor that is so many standard deviations weaker (below zero) or stronger than expected in what it has yet
-    /// to give until its thrust falls through the weight. What is measured tells thrust, not how long it lasts: while
-    /// that is so, the weaker motor burns out sooner.
+    /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected from now until its
+    /// thrust falls below the weight. Measurements show the thrust, not how long it lasts; as long as that holds, the
+    /// weaker motor burns out sooner.
     pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
         let burn = self.burn();
         let carried_until_s =
@@ -111,7 +111,7 @@ impl Known {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
-    /// The burning vehicle with a motor, and with its fins this far open as certified.
+    /// The burning vehicle with this motor, and with this drag area of the fins as certified.
     pub(super) fn powered_situation<'a>(
         &'a self,
         estimate: &Estimate,

@@ -1,7 +1,8 @@
-//! What flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
+//! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
 //!
-//! It is a part of the [flight computer](crate::computer) and deterministic as that is. A frame is 5 ms: estimate, watch the
-//! motor, move through the phases, point fins and gimbal. Every tenth frame the outlook and the landing are planned.
+//! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms: estimate, watch
+//! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the outlook and plans the
+//! landing.
 
 mod assumed;
 mod digest;
@@ -34,11 +35,11 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 /// Frames between plans.
 pub const FRAMES_PER_PLAN: u64 = 10;
 
-/// What the flight computer knows of its motion.
+/// The input about the vehicle's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "plain data, one a frame, so that a log of it is whole")]
 pub enum Sensed {
-    /// Sensors, through the estimator.
+    /// Measurements, for the estimator.
     Measured(Measurements),
     /// The truth as the estimate: for studies of guidance alone.
     Known(Estimate),
@@ -51,9 +52,8 @@ pub struct PilotInput {
     pub frame: u64,
     /// End of the frame, s.
     pub time_s: f64,
-    /// What was sensed.
     pub sensed: Sensed,
-    /// Fin angles that the servos report, rad.
+    /// Fin angles reported by the servos, rad.
     pub fins_rad: [f64; 4],
     /// A foot touches the ground.
     pub contact: bool,
@@ -89,7 +89,7 @@ pub struct Pilot {
     ignited_at_s: Option<f64>,
     outlook: Outlook,
     powered: PoweredGuidance,
-    /// The law that flies the landing burn instead of a plan.
+    /// The law that flies the landing burn instead of a plan, if any.
     baseline: Option<Baseline>,
     aim_loop: AimLoop,
     fin_share: f64,
@@ -97,12 +97,12 @@ pub struct Pilot {
     fin_watch: FinWatch,
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
-    /// Since when something lasting has stood in the gate's way, s.
+    /// Since when a lasting reason has kept the gate shut, s.
     gate_shut_since_s: Option<f64>,
 }
 
 impl Pilot {
-    /// A pilot that is released at apogee, with its idea of where it is and how sure it is of that.
+    /// A pilot released at apogee, with its estimate of its state and the uncertainty of that estimate.
     pub fn at_apogee(
         mission: &Mission,
         time_s: f64,
@@ -133,7 +133,7 @@ impl Pilot {
         }
     }
 
-    /// Who flies the landing burn from now on.
+    /// Sets the law that flies the landing burn from now on.
     pub(crate) fn set_law(&mut self, law: Law) {
         self.baseline = match law {
             Law::Nmpc => None,
@@ -151,12 +151,12 @@ impl Pilot {
         &self.estimator
     }
 
-    /// The guidance of the landing burn, with the plan that is flown.
+    /// The guidance of the landing burn, with the plan being flown.
     pub fn powered(&self) -> &PoweredGuidance {
         &self.powered
     }
 
-    /// What the last plan found.
+    /// Report of the last plan.
     pub fn report(&self) -> &PoweredReport {
         self.powered.report()
     }
@@ -171,7 +171,7 @@ impl Pilot {
         &self.known.mission.motor_curve
     }
 
-    /// The motor as estimated in flight, and the scale of the air's forces.
+    /// The motor as estimated in flight, and the scale of the aerodynamic forces.
     pub fn motor(&self) -> &MotorEstimate {
         &self.known.motor
     }
@@ -186,7 +186,7 @@ impl Pilot {
         self.ignited_at_s
     }
 
-    /// The gate check that stands in the way, if one did at the last evaluation.
+    /// The gate check that failed at the last evaluation, if any.
     pub fn gate_refusal(&self) -> Option<&'static str> {
         self.gate_refusal
     }

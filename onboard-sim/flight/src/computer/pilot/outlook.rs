@@ -1,4 +1,4 @@
-//! What the flight computer expects of the next seconds.
+//! The pilot's forecast for the next seconds.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -7,32 +7,32 @@ use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
 use crate::vehicle::atmosphere::Air;
 
-/// Room the parachute needs, times this, is left above the ground.
+/// The commit height is the height that the parachute needs, times this.
 const COMMIT_MARGIN: f64 = 1.5;
 
-/// A fall is taken to be no slower than this, m/s: at apogee the time to the ground is not without end.
+/// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at apogee.
 const FALL_MIN_M_S: f64 = 5.0;
 
-/// Expectations before ignition, made anew five or twenty times a second.
+/// The forecast before ignition, renewed five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outlook {
     pub ignition: IgnitionOutlook,
-    /// Feet's height below which the parachute has no room any more, m.
+    /// Height of the feet below which the parachute has no room left, m.
     pub commit_height_m: f64,
     /// Height of the feet, m.
     pub height_m: f64,
     /// Speed predicted for this moment from the fall alone, m/s.
     pub predicted_speed_m_s: f64,
-    /// Where the vehicle would touch down if steered no more, distance from the pad, m.
+    /// Distance from the pad at which the vehicle would touch down without further steering, m.
     pub touchdown_distance_m: f64,
 }
 
-/// Height that a parachute needs at a speed: the fall until it is out and the distance it inflates over.
+/// Height that a parachute needs at a speed: the fall until it is ejected, plus the distance over which it inflates.
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }
 
-/// Where a vehicle would touch down if it were steered no more, m, in the world's horizontal axes: from a place, m, with
+/// Where a vehicle would touch down without further steering, m, in the world's horizontal axes: from a place, m, with
 /// a velocity, m/s, and its feet at a height, m.
 pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m: f64) -> Vector2<f64> {
     let to_ground_s = height_m.max(0.0) / (-velocity_m_s.z).max(FALL_MIN_M_S);
@@ -40,7 +40,7 @@ pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m
 }
 
 impl Pilot {
-    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, falling positive;
+    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, positive downwards;
     /// `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {
         let state = self.estimate.as_ref()?.state;
@@ -65,14 +65,14 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_in_the_first_frame_knows_how_high_it_is() {
+    fn an_abort_in_the_first_frame_knows_the_height() {
         let pilot = falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
         assert!(abort_releases(&mut pilot.restarted(0.1), 21));
     }
 
     #[test]
-    fn a_fall_leads_on_along_its_velocity_and_a_slow_one_not_for_ever() {
+    fn touchdown_lies_along_the_velocity_and_the_time_of_a_slow_fall_is_limited() {
         let place_m = Vector3::new(10.0, -4.0, 80.4);
         let falling = touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, -40.0), 80.0);
         assert_eq!(falling, Vector2::new(6.0, -2.0));

@@ -1,4 +1,4 @@
-//! The flight computer after a restart in the air.
+//! The pilot after a restart in the air.
 
 use super::{Outlook, Pilot};
 use crate::control::aim::AimLoop;
@@ -6,11 +6,11 @@ use crate::estimation::estimator::{Estimator, StartUncertainty};
 use crate::guidance::powered::PoweredGuidance;
 
 impl Pilot {
-    /// What is left of a pilot that starts again at `time_s`.
+    /// This pilot after a restart at `time_s`.
     ///
-    /// Kept, as in memory that outlives the power: what is known of motor and drag, the last
-    /// commands, and the last estimate, which is carried on by what was last felt over the time that was lost, and
-    /// believed no better than at apogee. Estimator, outlook, plan and gimbal loop begin anew.
+    /// Kept, as if in memory that survives a power loss: the knowledge of motor and drag, the last commands, and the
+    /// last estimate. The estimate is extrapolated over the lost time with the last measured rates and forces, and gets
+    /// the same uncertainty as at apogee. Estimator, outlook, plan and gimbal loop start afresh.
     #[must_use]
     pub fn restarted(&self, time_s: f64) -> Self {
         let mission = &self.known.mission;
@@ -20,7 +20,7 @@ impl Pilot {
             |estimate| {
                 let lost_s = (time_s - estimate.time_s).max(0.0);
                 let mut believed = estimate.state;
-                // Turning on as it turned last; the force as it points halfway.
+                // It keeps its last rotation rate; the force has the direction at half of the lost time.
                 let half = nalgebra::UnitQuaternion::from_scaled_axis(believed.rate_rad_s * (0.5 * lost_s));
                 believed.world_from_body *= half;
                 let force = believed.world_from_body * estimate.specific_force_m_s2;
@@ -52,10 +52,10 @@ mod tests {
     use crate::computer::pilot::sample::{falling, input, released};
 
     #[test]
-    fn it_has_turned_on_meanwhile() {
+    fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
         pilot.step(&mut released(), &input(1, 0.0));
-        let mut estimate = pilot.estimate.expect("it has felt something");
+        let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);
         let found = pilot.restarted(estimate.time_s + 0.2).estimator.estimate().state.world_from_body;

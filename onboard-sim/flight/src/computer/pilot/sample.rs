@@ -1,4 +1,4 @@
-//! A pilot about to fall, and what its sensors may tell it: for the tests of these rooms.
+//! A pilot about to fall, and inputs for it: for the tests of these modules.
 
 use nalgebra::Vector3;
 
@@ -22,7 +22,7 @@ pub(super) fn falling() -> Pilot {
     Pilot::at_apogee(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
 }
 
-/// A frame in which it hardly feels anything, turning at a rate.
+/// The input of a frame with almost no specific force, turning at a rate.
 pub(super) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
     let imu = ImuSample {
         gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),

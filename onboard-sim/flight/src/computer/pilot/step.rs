@@ -20,18 +20,18 @@ use crate::vehicle::fins::Moments;
 
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
-/// A fin that is farther than this from its command is not there, rad.
+/// A fin farther than this from its command has not reached it, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
-/// Less thrust than this turns nothing, N.
+/// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
-/// Lying across the air by more than this, the body turns the vehicle harder than a fin that gives way lets it be
-/// turned back, rad: all of them are opened then.
+/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
+/// fins can set against it: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
-/// Slower than this, air turns nothing, m/s.
+/// Below this airspeed the air cannot turn the vehicle, m/s.
 const AIR_TURNS_M_S: f64 = 12.0;
 
-/// Whether the air comes so much from the side that only open fins turn the vehicle back.
+/// Whether the air comes so far from the side that only fully open fins turn the vehicle back.
 fn lies_across_the_air(estimate: &Estimate) -> bool {
     let through_air = estimate.velocity_through_air_m_s();
     let airspeed_m_s = through_air.norm();
@@ -51,7 +51,8 @@ impl Pilot {
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         let far = table.mode().phase == Phase::AeroDescent;
         let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
-        // Without one, right after apogee and after a restart, an abort would not know whether the parachute has room.
+        // Without an outlook, right after apogee and after a restart, an abort would not know whether the parachute has
+        // room.
         let looking = looking || self.outlook == Outlook::default();
         if looking && table.mode().phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
@@ -95,7 +96,7 @@ impl Pilot {
         }
     }
 
-    /// What a simpler law commands, if one flies the landing burn: gimbal and fins, rad.
+    /// Commands of the simpler law, if one flies the landing burn: gimbal and fins, rad.
     fn baseline_commands(&mut self, burning_s: f64, estimate: &Estimate) -> Option<([f64; 2], [f64; 4])> {
         let baseline = self.baseline.as_mut()?;
         Some(baseline.commands_rad(burning_s, estimate, &self.known.motor))
@@ -122,7 +123,7 @@ impl Pilot {
         }
     }
 
-    /// Motor and drag from the specific force along the axis. On the ground it says nothing about either.
+    /// Estimates motor and drag from the specific force along the axis; not on the ground or under the parachute.
     fn feel(&mut self, phase: Phase, input: &PilotInput, estimate: &Estimate, density_kg_m3: f64) {
         if input.contact || phase == Phase::Chute {
             return;
@@ -165,7 +166,7 @@ impl Pilot {
         );
         let parachute = &self.known.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
-        // What the fall from apogee has made of the speed so far, by drag as certified.
+        // The speed after the fall from apogee so far, with drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let fallen_m = (self.known.mission.start.height_m - state.position_m.z).max(0.0);
         let shed =
@@ -231,7 +232,7 @@ impl Pilot {
         }
     }
 
-    /// The chosen instant is now when thrust, commanded at the next frame, would begin below the chosen height.
+    /// Ignition is due now if thrust commanded at the next frame would begin below the chosen height.
     fn consider_ignition(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
         let ignition = &self.outlook.ignition;
         let height_m = estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
@@ -244,7 +245,7 @@ impl Pilot {
         }
     }
 
-    /// An abort in the next frame, as far as the last one tells, if there was one.
+    /// The event that an abort in the next frame would be, from the findings of the last frame, if there was one.
     pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&PilotInput>) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open =
@@ -273,7 +274,8 @@ impl Pilot {
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
             speed_m_s: state.velocity_m_s.norm(),
             predicted_speed_m_s: self.outlook.predicted_speed_m_s,
-            // One source left is no disagreement; whether it may be relied on is the estimator's health.
+            // With one source left there is no disagreement; the estimator's health says whether that source is
+            // reliable.
             height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
             landing_feasible: ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.outlook.touchdown_distance_m,
@@ -290,7 +292,7 @@ impl Pilot {
         fins_rad.iter().zip(&self.fins_rad).all(|(there, wanted)| (there - wanted).abs() < FIN_THERE_RAD)
     }
 
-    /// Events that the table refuses change nothing.
+    /// Applies an event. If the table refuses it, nothing changes.
     fn happen(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
         if table.happen(event).is_ok_and(|effects| effects.contains(Effect::IgniteLandingMotor)) {
             self.ignited_at_s = Some(time_s);
@@ -353,11 +355,11 @@ impl Pilot {
         burning: bool,
     ) -> [f64; 4] {
         let fins = &self.known.airframe().fins;
-        // Without a landing to steer to they brake, fully open.
+        // If no landing is steered for, the fins brake, fully open.
         let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
             && !mode.interlocks.landing_motor_inhibited;
         if !(steering || burning) {
-            // On the ground they stay where they are: nobody needs a servo moving there.
+            // On the ground they stay where they are: no servo needs to move there.
             let keep = matches!(mode.phase, Phase::Touchdown | Phase::Safed);
             return if keep { self.fins_rad } else { [fins.open_rad(); 4] };
         }
@@ -377,7 +379,7 @@ impl Pilot {
         let demand =
             self.known.mission.descent.demand(&estimate.state, &situation, self.known.mission.steered);
         let (moments, drag_area_m2, min_rad) = if burning {
-            // The gimbal turns the vehicle now; the fins brake, and keep it from rolling.
+            // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
         } else if self.known.mission.steered && !lies_across_the_air(estimate) {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())

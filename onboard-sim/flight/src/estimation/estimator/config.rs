@@ -98,9 +98,7 @@ impl Default for EstimatorConfig {
 #[error("estimator: {field} is {found}, accepted is {accepted}")]
 pub struct EstimatorConfigError {
     pub field: &'static str,
-    /// The value found.
     pub found: f64,
-    /// What would be accepted.
     pub accepted: &'static str,
 }
 

@@ -38,7 +38,6 @@ remembers!(Covariance { rows });
 /// Propagation of the error over one interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Transition {
-    /// Its length, s.
     pub(super) interval_s: f64,
     /// Velocity gained from the specific force, world, m/s: `dv -= [felt]x dphi`.
     pub(super) felt_m_s: Vector3<f64>,

@@ -10,14 +10,14 @@ pub struct GateCounters {
     pub accepted: u32,
     /// Measurements rejected, because they did not fit or were not numbers.
     pub rejected: u32,
-    /// Measurements rejected since the last one that was used.
+    /// Measurements rejected since the last accepted measurement.
     pub rejected_in_a_row: u32,
 }
 
 /// The counts of all gates, one for each sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gates {
-    /// Inertial samples; an impossible one is replaced by the one before.
+    /// Inertial samples; an impossible sample is replaced by the sample before it.
     pub imu: GateCounters,
     pub barometer: GateCounters,
     /// Satellite velocity, three numbers a fix.

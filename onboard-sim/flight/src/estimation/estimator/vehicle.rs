@@ -9,7 +9,6 @@ use crate::vehicle::fins::{COS_30, PITCH, ROLL, SIN_30, YAW};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleNow {
     pub mass_kg: f64,
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
     /// Axial drag coefficient of the body times its area, m^2.
     pub body_drag_area_m2: f64,

@@ -22,7 +22,7 @@ pub(super) struct Detector {
 remembers!(Detector { last, crossed_s });
 
 impl Detector {
-    /// Whether the last frame was above the threshold; the next one then decides.
+    /// Whether the last frame was above the threshold; the next frame then decides.
     pub(super) fn suspects(&self) -> bool {
         self.crossed_s.is_some()
     }

@@ -183,7 +183,7 @@ impl MotorEstimate {
         (self.stage != MotorStage::Waiting).then_some(self.mean[IGNITION])
     }
 
-    /// True air force divided by the modelled one.
+    /// True air force divided by modelled air force.
     pub fn air_scale(&self) -> f64 {
         self.mean[AIR]
     }

@@ -23,7 +23,6 @@ pub struct PoweredSituation<'a> {
     /// Centre of gravity above the feet when upright, m.
     pub feet_below_cg_m: f64,
     pub gravity_m_s2: f64,
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
     /// Drag area of the body along its axis, m^2.

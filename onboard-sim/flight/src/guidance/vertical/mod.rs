@@ -44,7 +44,6 @@ pub struct Column {
     /// Mass before ignition, kg.
     pub mass_at_ignition_kg: f64,
     pub gravity_m_s2: f64,
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
     /// Drag area of the body along its axis, m^2.
     pub body_drag_area_m2: f64,
@@ -218,13 +217,13 @@ mod tests {
 
     #[test]
     fn a_weak_motor_narrows_the_band_and_a_very_weak_one_leaves_none() {
-        let curve = motors::builtin("H45W").expect("built in");
+        let curve = motors::builtin("H45W").expect("a built-in motor");
         let column = column();
         let speed_m_s = -column.terminal_speed_m_s(0.0267);
         let band = |impulse_scale| {
             column.band(&Burn { curve: &curve, impulse_scale, time_scale: 1.0 }, 0.0, speed_m_s)
         };
-        let (nominal, weak) = (band(1.0).expect("lands"), band(0.92).expect("lands"));
+        let (nominal, weak) = (band(1.0).expect("a landing exists"), band(0.92).expect("a landing exists"));
         assert!(nominal.low_m < 58.0 && nominal.high_m > 72.0, "{nominal:?}");
         assert!(weak.high_m - weak.low_m < 0.5 * (nominal.high_m - nominal.low_m), "{weak:?}");
         assert_eq!(nominal.and(&weak), Some(weak), "a start that suits the weak motor suits the nominal one");
@@ -233,11 +232,11 @@ mod tests {
 
     #[test]
     fn every_way_of_braking_begins_inside_the_band_and_arrives_at_the_touchdown_speed() {
-        let curve = motors::builtin("H45W").expect("built in");
+        let curve = motors::builtin("H45W").expect("a built-in motor");
         let column = column();
         let burn = Burn::nominal(&curve);
-        let band = column.band(&burn, 1.0, -25.0).expect("lands");
-        let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("carried");
+        let band = column.band(&burn, 1.0, -25.0).expect("a landing exists");
+        let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("the thrust carries the vehicle");
         let fall = Fall::new(&column, &burn, 1.0, end_s, -25.0);
         let mut found = 0;
         for height_m in fall.heights_m().into_iter().flatten() {

@@ -10,7 +10,6 @@ use super::{HoldCause, Phase, StartPoint};
 /// Something that happened or was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
-    /// The self-test passed.
     SelfTestPassed,
     /// The physical pin was pulled.
     PinPulled,
@@ -30,7 +29,6 @@ pub enum Event {
     },
     /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a hold.
     Hold {
-        /// Why.
         cause: HoldCause,
     },
     /// A hold has lasted for [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).

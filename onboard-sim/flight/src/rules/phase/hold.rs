@@ -14,14 +14,13 @@ pub const HOLD_LIMIT_S: f64 = 60.0;
 pub enum HoldCause {
     /// No frame of the station that armed the vehicle was accepted for [`UPLINK_SILENT_S`].
     UplinkSilent = 1,
-    /// A station asked for it.
+    /// A station asked for a hold.
     Commanded = 2,
 }
 
-/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start leads on.
+/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hold {
-    /// Why.
     pub cause: HoldCause,
     /// When the countdown was held, vehicle time, s.
     pub at_s: f64,

@@ -25,10 +25,7 @@ pub enum Motor {
     /// Its thrust is confirmed.
     Burning,
     /// Burnt out at this vehicle time, s.
-    BurntOut {
-        /// When, s.
-        at_s: f64,
-    },
+    BurntOut { at_s: f64 },
 }
 
 /// The motor's state for a person near the vehicle.

@@ -7,7 +7,6 @@ use super::{Effect, Effects, Event, Hold, Interlocks, Mode, Motor, Phase, Refusa
 pub struct Transition {
     /// The mode afterwards; unchanged if refused.
     pub mode: Mode,
-    /// The effects.
     pub effects: Effects,
     /// The reason, if refused.
     pub refusal: Option<Refusal>,
@@ -71,8 +70,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }
         (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
-        // After the flight a person may put the pin back and pull it again. Without it a motor that was not lit is
-        // live.
+        // After the flight a person may put the pin back and pull it again. Without the pin, a motor that was not lit
+        // is live.
         (P::Touchdown | P::Safed, E::PinInserted) => {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }

@@ -39,9 +39,7 @@ pub struct Airframe {
 #[error("{key} is {found}; {required} is accepted")]
 pub struct BadValue {
     pub key: &'static str,
-    /// The value found.
     pub found: f64,
-    /// What would be accepted.
     pub required: &'static str,
 }
 

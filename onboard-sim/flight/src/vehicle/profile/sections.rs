@@ -38,7 +38,6 @@ impl Vehicle {
 #[serde(deny_unknown_fields)]
 pub struct Environment {
     pub gravity_m_s2: f64,
-    /// Air density, kg/m^3.
     pub air_density_kg_m3: f64,
 }
 

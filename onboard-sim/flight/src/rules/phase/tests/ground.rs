@@ -129,7 +129,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_arrives_safed_is_claimed_only_of_a_motor_that_is_safe(
+    fn no_sequence_of_events_leads_to_safed_with_a_dangerous_motor(
         events in prop::collection::vec((likely_event(), 0.0_f64..40.0), 0..60),
     ) {
         let (mut mode, mut time_s) = (Mode::power_up(0.0), 0.0);

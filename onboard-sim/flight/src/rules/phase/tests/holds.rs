@@ -110,7 +110,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_arrives_a_hold_never_resumes_by_itself_and_lights_nothing(
+    fn in_any_sequence_of_events_a_hold_never_resumes_by_itself_and_lights_nothing(
         events in prop::collection::vec((likely_event(), 0.0_f64..40.0), 0..60),
     ) {
         let (mut mode, mut time_s) = (Mode::power_up(0.0), 0.0);

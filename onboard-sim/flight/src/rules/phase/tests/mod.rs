@@ -311,7 +311,7 @@ fn any_event() -> impl Strategy<Value = Event> {
     prop::sample::select(every_event())
 }
 
-/// Events that lead on, so that random sequences reach the late phases too.
+/// Events that advance the flight, so that random sequences reach the late phases too.
 fn likely_event() -> impl Strategy<Value = Event> {
     let leading = with_arm(&[
         Event::StartRequested { countdown_s: 1.0 },
@@ -333,7 +333,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_arrives_the_landing_motor_is_lit_at_most_once_and_behind_every_gate(
+    fn in_any_sequence_of_events_the_landing_motor_is_lit_at_most_once_and_after_every_gate(
         events in prop::collection::vec(likely_event(), 0..60),
     ) {
         let mut mode = Mode::power_up(0.0);
