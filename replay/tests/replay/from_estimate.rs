@@ -28,7 +28,7 @@ fn the_vehicle_is_where_the_estimate_was() {
 fn a_start_without_an_estimate_is_refused() {
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.frames.last().unwrap().input.frame;
-    for (tick, reason) in [(1, "estimated nothing yet"), (last, "on the ground already")] {
+    for (tick, reason) in [(1, "estimated nothing yet"), (last, "already on the ground")] {
         let options =
             ReflyOptions { start: StartAt::Tick(tick), from: From::Estimate, ..ReflyOptions::default() };
         let refusal = refly(&recording, &options).unwrap_err().to_string();
