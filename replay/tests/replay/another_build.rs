@@ -31,7 +31,10 @@ fn forged() -> Recording {
 #[test]
 fn an_evaluation_counts_differences_caused_by_the_build() {
     let forged = forged();
-    let said = format!("with nothing changed this build decides 2 of {} ticks differently from the record", forged.ticks.len());
+    let said = format!(
+        "with nothing changed this build decides 2 of {} ticks differently from the record",
+        forged.ticks.len()
+    );
     for given in [&[][..], &["nmpc.weights.w=120"]] {
         let report = evaluate(&forged, &settings(given)).unwrap();
         assert_eq!(report.unchanged_different, 2, "{given:?}");
