@@ -37,6 +37,15 @@ pub struct ApogeeStart {
     pub tilt_deg: f64,
 }
 
+/// What the exhaust is expected to take away of the drag while the motor burns, as fractions.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exhaust {
+    /// Of the body along its axis.
+    pub body_loss: f64,
+    pub fin_loss: f64,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegLimits {
@@ -74,6 +83,8 @@ pub struct Mission {
     pub steered: bool,
     /// Position of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
+    #[serde(default)]
+    pub exhaust: Exhaust,
     /// The prior of the motor before ignition.
     #[serde(default)]
     pub motor: MotorPrior,

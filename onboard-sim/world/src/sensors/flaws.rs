@@ -35,8 +35,10 @@ pub(super) struct Flaws {
     /// Accelerometer bias while the motor burns, m/s^2.
     pub(super) burning_bias_m_s2: Vector3<f64>,
     pub(super) gnss_tag_s: f64,
+    pub(super) barometer_late_s: f64,
     pub(super) barometer_plume_m: f64,
     pub(super) barometer_ejection_m: f64,
+    pub(super) lidar_late_s: f64,
     pub(super) continuity_lost: bool,
     pub(super) fin_feedback_rad: [f64; 4],
     vibration: Normal,
@@ -53,8 +55,10 @@ impl Flaws {
             unit_m: drawn.next3() * imu.off_cg_m,
             burning_bias_m_s2: drawn.next3() * (imu.vibration_bias_mg * 1e-3 * GRAVITY_M_S2),
             gnss_tag_s: params.gnss.time_tag_s * drawn.next(),
+            barometer_late_s: barometer.late_s * drawn.next(),
             barometer_plume_m: barometer.plume_m * drawn.next(),
             barometer_ejection_m: barometer.ejection_m * drawn.next(),
+            lidar_late_s: params.lidar.late_s * drawn.next(),
             continuity_lost: drawn.unit() < params.switches.continuity_lost_share,
             fin_feedback_rad: core::array::from_fn(|_| {
                 params.switches.fin_feedback_deg.to_radians() * drawn.next()

@@ -274,7 +274,7 @@ impl Sensors {
         self.errors.barometer_offset_m += walk * self.barometer_noise.next();
         // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
         let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
-        let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * barometer.late_s;
+        let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * self.flaws.barometer_late_s;
         let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };
         let ejection_m = truth
             .ejected_for_s
@@ -329,7 +329,8 @@ impl Sensors {
         }
         // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
         // distance from it.
-        let then_m = truth.state.position_m.z - truth.ground_m - truth.state.velocity_m_s.z * lidar.late_s;
+        let then_m =
+            truth.state.position_m.z - truth.ground_m - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
         let slant_m = then_m / libm::cos(tilt_rad);
         let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
         // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens

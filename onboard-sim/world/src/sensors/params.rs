@@ -61,7 +61,7 @@ pub struct BarometerParams {
     pub offset_walk_m_sqrt_s: f64,
     /// Ram coefficient: the pressure error divided by the dynamic pressure.
     pub ram_coefficient: f64,
-    /// Age of a sample that the flight computer takes for new, s.
+    /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
     pub late_s: f64,
     /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
     pub plume_m: f64,
@@ -118,7 +118,7 @@ pub struct LidarParams {
     pub ahead_of_feet_m: f64,
     /// Below this height of the feet there is no echo while the motor burns, m: dust.
     pub blind_below_m: f64,
-    /// Age of a range that the flight computer takes for new, s.
+    /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
     pub late_s: f64,
     /// Probability that a range is lost.
     pub dropout_share: f64,

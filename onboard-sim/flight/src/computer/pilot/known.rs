@@ -41,6 +41,15 @@ impl Known {
         self.airframe().drag_area_m2(0.0)
     }
 
+    fn burning_body_drag_area_m2(&self) -> f64 {
+        self.body_drag_area_m2() * (1.0 - self.mission.exhaust.body_loss)
+    }
+
+    /// What the exhaust leaves of a drag area of the fins, m^2.
+    fn burning_fins(&self, fin_drag_area_m2: f64) -> f64 {
+        fin_drag_area_m2 * (1.0 - self.mission.exhaust.fin_loss)
+    }
+
     pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
         let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
         each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
@@ -98,9 +107,13 @@ impl Known {
             gravity_m_s2: mission.gravity_m_s2,
             air_density_kg_m3: density_kg_m3,
             body_drag_area_m2: scaled(self.body_drag_area_m2()),
+            burning_body_drag_area_m2: scaled(self.burning_body_drag_area_m2()),
             crossflow_area_m2: self.crossflow_area_m2(),
             soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
-            hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: scaled(self.largest_fin_drag_area_m2()) },
+            hard: Braking {
+                tilt_rad: 0.0,
+                fin_drag_area_m2: scaled(self.burning_fins(self.largest_fin_drag_area_m2())),
+            },
             touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
             latest_after_s: mission.powered.latest_after_s,
             settle_s: mission.settle_s,
@@ -129,9 +142,9 @@ impl Known {
             gravity_m_s2: self.mission.gravity_m_s2,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            body_drag_area_m2: self.motor.air_scale() * self.body_drag_area_m2(),
+            body_drag_area_m2: self.motor.air_scale() * self.burning_body_drag_area_m2(),
             crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.motor.air_scale() * fin_drag_area_m2,
+            fin_drag_area_m2: self.motor.air_scale() * self.burning_fins(fin_drag_area_m2),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
             lands_here: situation.lands_here,
         }

@@ -47,7 +47,8 @@ impl Pilot {
         let known = &self.known;
         let density_kg_m3 = Air::at_height_m(known.mission.pad_altitude_m + state.position_m.z).density_kg_m3;
         let column = known.column(density_kg_m3, known.mission.soft_tilt_deg);
-        let terminal_m_s = column.terminal_speed_m_s(column.hard.fin_drag_area_m2);
+        let fins_m2 = known.motor.air_scale() * known.largest_fin_drag_area_m2();
+        let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
         Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s, known.mission.gravity_m_s2))
     }

@@ -9,7 +9,7 @@ use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
 use crate::estimation::estimator::{Estimate, VehicleNow};
-use crate::estimation::motor_estimate::MotorSample;
+use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::guidance::controller::ControlLevel;
 use crate::guidance::descent::DescentSituation;
 use crate::rules::gate::{GateInput, gate_checks};
@@ -138,6 +138,8 @@ impl Pilot {
             burning,
             self.known.mission.lidar_ahead_of_feet_m,
         );
+        let burns = self.known.motor.stage() == MotorStage::Burning;
+        let vehicle = if burns { vehicle.in_exhaust(&self.known.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
         let sample = MotorSample {

@@ -21,6 +21,10 @@ pub struct EstimatorConfig {
     pub gyro_bias_walk_deg_s_sqrt_s: f64,
     /// Accelerometer noise density, mg/sqrt(Hz).
     pub accelerometer_noise_mg_sqrt_hz: f64,
+    /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
+    pub burning_gyro_deg_s_sqrt_hz: f64,
+    /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
+    pub burning_accelerometer_mg_sqrt_hz: f64,
     /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
     pub accelerometer_bias_walk_mg_sqrt_s: f64,
     /// Barometer noise of one sample, m.
@@ -35,6 +39,8 @@ pub struct EstimatorConfig {
     pub gnss_vertical_m: f64,
     /// Noise of a satellite velocity, m/s.
     pub gnss_velocity_m_s: f64,
+    /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the tags.
+    pub gnss_time_tag_s: f64,
     /// Wander of the satellite position's offset, horizontal, m in one second.
     pub gnss_horizontal_walk_m_sqrt_s: f64,
     /// Wander of the satellite position's offset, vertical, m in one second.
@@ -74,6 +80,8 @@ impl Default for EstimatorConfig {
             gyro_noise_deg_s_sqrt_hz: 0.05,
             gyro_bias_walk_deg_s_sqrt_s: 0.002,
             accelerometer_noise_mg_sqrt_hz: 0.65,
+            burning_gyro_deg_s_sqrt_hz: 0.0,
+            burning_accelerometer_mg_sqrt_hz: 0.0,
             accelerometer_bias_walk_mg_sqrt_s: 0.4,
             barometer_m: 0.08,
             barometer_offset_walk_m_sqrt_s: 0.03,
@@ -81,6 +89,7 @@ impl Default for EstimatorConfig {
             gnss_horizontal_m: 0.2,
             gnss_vertical_m: 0.3,
             gnss_velocity_m_s: 0.05,
+            gnss_time_tag_s: 0.0,
             gnss_horizontal_walk_m_sqrt_s: 0.15,
             gnss_vertical_walk_m_sqrt_s: 0.25,
             lidar_m: 0.06,
@@ -133,6 +142,9 @@ impl EstimatorConfig {
             }
         }
         let walks = [
+            ("gnss_time_tag_s", self.gnss_time_tag_s),
+            ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),
+            ("burning_accelerometer_mg_sqrt_hz", self.burning_accelerometer_mg_sqrt_hz),
             ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
             ("accelerometer_bias_walk_mg_sqrt_s", self.accelerometer_bias_walk_mg_sqrt_s),
             ("barometer_offset_walk_m_sqrt_s", self.barometer_offset_walk_m_sqrt_s),

@@ -31,6 +31,8 @@ pub(super) struct Since {
     pub(super) gained_m_s: Vector3<f64>,
     /// Distance moved since, m.
     pub(super) moved_m: Vector3<f64>,
+    /// Acceleration then, m/s^2.
+    pub(super) acceleration_m_s2: Vector3<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,6 +83,11 @@ impl History {
                     age_s: age_s.max(0.0),
                     gained_m_s: now.velocity_m_s - then_m_s,
                     moved_m: (velocity_m_s - now.velocity_m_s) * age_s + now.position_m - then_m,
+                    acceleration_m_s2: if gap_s > 0.0 {
+                        (later.velocity_m_s - sums.velocity_m_s) / gap_s
+                    } else {
+                        Vector3::zeros()
+                    },
                 });
             }
             later = sums;

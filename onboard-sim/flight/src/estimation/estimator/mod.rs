@@ -2,8 +2,8 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 22 numbers, is corrected by scalar measurements: barometer with offset and ram
-//! error, late satellite fixes with a slowly wandering offset, lidar, and the sideways force that shows the wind.
+//! every frame. The error of the state, 23 numbers, is corrected by scalar measurements: barometer with offset and ram
+//! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
 //!   same bits again.
@@ -34,8 +34,8 @@ use nalgebra::{Vector2, Vector3};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GYRO_BIAS, N,
-    POSITION, Row, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GNSS_TIME_TAG,
+    GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
 };
 use self::gates::Surprise;
 pub use self::gates::{GateCounters, Gates};
@@ -162,7 +162,7 @@ impl Estimator {
             start_s: time_s,
             frames: 0,
             nominal,
-            covariance: start_covariance(start),
+            covariance: start_covariance(start, config),
             pending: Pending::default(),
             history: History::new(time_s),
             heights: HeightChannel::new(state.position_m.z, start.height_m, start.gnss_vertical_offset_m),
@@ -195,7 +195,7 @@ impl Estimator {
     /// Runs one frame: propagates the state with the inertial sample, then corrects it with the other measurements.
     pub fn step(&mut self, measurements: &Measurements, vehicle: &VehicleNow) -> Estimate {
         self.frames += 1;
-        self.carry_forward(&measurements.imu);
+        self.carry_forward(&measurements.imu, vehicle.motor_burning);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.take_barometer(altitude_m);
         }
@@ -283,7 +283,7 @@ impl Estimator {
         self.restarts = self.restarts.saturating_add(1);
         self.restarted_at_s = time_s;
         self.nominal = self.last_good;
-        self.covariance = start_covariance(&self.start);
+        self.covariance = start_covariance(&self.start, &self.config);
         self.pending = Pending::default();
         self.history = History::new(time_s);
         self.sideways.clear();
@@ -295,7 +295,7 @@ impl Estimator {
     }
 }
 
-fn start_covariance(start: &StartUncertainty) -> Covariance {
+fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covariance {
     let milli_g = 1e-3 * GRAVITY_M_S2;
     let mut sigmas: Row = [0.0; N];
     sigmas[POSITION..VELOCITY].copy_from_slice(start.position_m().as_slice());
@@ -306,6 +306,7 @@ fn start_covariance(start: &StartUncertainty) -> Covariance {
     sigmas[WIND..BAROMETER_OFFSET].fill(start.wind_m_s);
     sigmas[BAROMETER_OFFSET] = start.barometer_offset_m;
     sigmas[BAROMETER_RAM] = start.barometer_ram;
-    sigmas[GNSS_OFFSET..].copy_from_slice(start.gnss_offset_m().as_slice());
+    sigmas[GNSS_OFFSET..GNSS_TIME_TAG].copy_from_slice(start.gnss_offset_m().as_slice());
+    sigmas[GNSS_TIME_TAG] = config.gnss_time_tag_s;
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
 }

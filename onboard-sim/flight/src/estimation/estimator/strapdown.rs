@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GYRO_BIAS, N, Row,
-    Transition, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, N,
+    Row, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::computer::memory::remembers;
@@ -27,6 +27,7 @@ pub(super) struct Nominal {
     pub(super) barometer_offset_m: f64,
     pub(super) barometer_ram: f64,
     pub(super) gnss_offset_m: Vector3<f64>,
+    pub(super) gnss_time_tag_s: f64,
 }
 
 impl Nominal {
@@ -41,6 +42,7 @@ impl Nominal {
             barometer_offset_m: 0.0,
             barometer_ram: 0.0,
             gnss_offset_m: Vector3::zeros(),
+            gnss_time_tag_s: 0.0,
         }
     }
 
@@ -56,6 +58,7 @@ impl Nominal {
         self.barometer_offset_m += error[BAROMETER_OFFSET];
         self.barometer_ram += error[BAROMETER_RAM];
         self.gnss_offset_m += three(GNSS_OFFSET);
+        self.gnss_time_tag_s += error[GNSS_TIME_TAG];
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -67,7 +70,7 @@ impl Nominal {
             .chain(self.accelerometer_bias_m_s2.iter())
             .chain(self.wind_m_s.iter())
             .chain(self.gnss_offset_m.iter())
-            .chain([&self.barometer_offset_m, &self.barometer_ram])
+            .chain([&self.barometer_offset_m, &self.barometer_ram, &self.gnss_time_tag_s])
             .all(|value| value.is_finite())
     }
 }
@@ -76,8 +79,9 @@ impl Nominal {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
     pub(super) accelerometer_m_s2_sqrt_hz: f64,
-    /// Variance that each error gains in a second.
+    /// Variance that each error gains in a second: in the fall, and while the motor shakes the inertial unit.
     per_second: Row,
+    burning_per_second: Row,
 }
 
 impl Noise {
@@ -95,7 +99,18 @@ impl Noise {
         sigmas[GNSS_OFFSET] = config.gnss_horizontal_walk_m_sqrt_s;
         sigmas[GNSS_OFFSET + 1] = config.gnss_horizontal_walk_m_sqrt_s;
         sigmas[GNSS_OFFSET + 2] = config.gnss_vertical_walk_m_sqrt_s;
-        Self { accelerometer_m_s2_sqrt_hz: accelerometer, per_second: sigmas.map(|sigma| sigma * sigma) }
+        let per_second = sigmas.map(|sigma| sigma * sigma);
+        let mut burning_per_second = per_second;
+        let shaken = [
+            (VELOCITY, config.burning_accelerometer_mg_sqrt_hz * milli_g),
+            (ATTITUDE, config.burning_gyro_deg_s_sqrt_hz.to_radians()),
+        ];
+        for (first, sigma) in shaken {
+            for variance in &mut burning_per_second[first..first + 3] {
+                *variance += sigma * sigma;
+            }
+        }
+        Self { accelerometer_m_s2_sqrt_hz: accelerometer, per_second, burning_per_second }
     }
 }
 
@@ -106,20 +121,27 @@ pub(super) struct Pending {
     felt_m_s: Vector3<f64>,
     world_from_body_s: Matrix3<f64>,
     wind_factor: f64,
+    burning: bool,
 }
 
-remembers!(Pending { frames, felt_m_s, world_from_body_s, wind_factor });
+remembers!(Pending { frames, felt_m_s, world_from_body_s, wind_factor, burning });
 
 impl Default for Pending {
     fn default() -> Self {
-        Self { frames: 0, felt_m_s: Vector3::zeros(), world_from_body_s: Matrix3::zeros(), wind_factor: 1.0 }
+        Self {
+            frames: 0,
+            felt_m_s: Vector3::zeros(),
+            world_from_body_s: Matrix3::zeros(),
+            wind_factor: 1.0,
+            burning: false,
+        }
     }
 }
 
 impl Estimator {
     /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force turned by the
     /// attitude in the middle of the frame.
-    pub(super) fn carry_forward(&mut self, imu: &ImuSample) {
+    pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool) {
         let interval_s = self.config.frame_s;
         if self.gates.imu.count(imu.is_plausible()) {
             self.last_imu = *imu;
@@ -152,6 +174,7 @@ impl Estimator {
         self.pending.felt_m_s += felt_m_s;
         self.pending.world_from_body_s += middle.matrix() * interval_s;
         self.pending.wind_factor *= wind_factor;
+        self.pending.burning = burning;
         let time_s = self.time_s();
         self.history.push(time_s, interval_s, &gained_m_s);
         let velocity_m2_s2 = self.covariance.variance(VELOCITY + 2);
@@ -167,12 +190,14 @@ impl Estimator {
             return;
         }
         let interval_s = f64::from(self.pending.frames) * self.config.frame_s;
+        let noise = &self.noise;
+        let per_second = if self.pending.burning { &noise.burning_per_second } else { &noise.per_second };
         self.covariance.propagate(&Transition {
             interval_s,
             felt_m_s: self.pending.felt_m_s,
             world_from_body_s: self.pending.world_from_body_s,
             wind_factor: self.pending.wind_factor,
-            noise: self.noise.per_second.map(|variance| variance * interval_s),
+            noise: per_second.map(|variance| variance * interval_s),
         });
         self.pending = Pending::default();
     }

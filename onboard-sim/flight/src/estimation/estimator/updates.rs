@@ -1,9 +1,10 @@
 //! Corrections by barometer, satellites and lidar, one scalar after the other.
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GYRO_BIAS, POSITION,
-    VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS,
+    POSITION, VELOCITY, WIND,
 };
+use super::history::Since;
 use super::{Estimator, GnssFix};
 
 /// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height.
@@ -97,7 +98,7 @@ impl Estimator {
     pub(super) fn take_gnss(&mut self, fix: &GnssFix) {
         self.catch_up();
         for axis in 0..3 {
-            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+            let Some(since) = self.since_fix(fix) else {
                 self.gates.gnss_velocity.count(false);
                 continue;
             };
@@ -114,10 +115,12 @@ impl Estimator {
                 (ACCELEROMETER_BIAS, by_bias[(axis, 0)]),
                 (ACCELEROMETER_BIAS + 1, by_bias[(axis, 1)]),
                 (ACCELEROMETER_BIAS + 2, by_bias[(axis, 2)]),
+                (GNSS_TIME_TAG, -since.acceleration_m_s2[axis]),
             ];
+            let sensitivity = self.with_or_without_tag(&sensitivity);
             let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
             let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s;
-            let correction = self.correct(&sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
+            let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
             self.gates.gnss_velocity.count(correction.accepted);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
             {
@@ -125,17 +128,23 @@ impl Estimator {
             }
         }
         for axis in 0..3 {
-            let Some(since) = self.history.since(fix.valid_at_s, &self.nominal.velocity_m_s) else {
+            let Some(since) = self.since_fix(fix) else {
                 self.gates.gnss_position.count(false);
                 continue;
             };
-            let sensitivity =
-                [(POSITION + axis, 1.0), (VELOCITY + axis, -since.age_s), (GNSS_OFFSET + axis, 1.0)];
+            let then_m_s = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
+            let sensitivity = [
+                (POSITION + axis, 1.0),
+                (VELOCITY + axis, -since.age_s),
+                (GNSS_OFFSET + axis, 1.0),
+                (GNSS_TIME_TAG, -then_m_s),
+            ];
+            let sensitivity = self.with_or_without_tag(&sensitivity);
             let predicted =
                 self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
             let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
             let correction =
-                self.correct(&sensitivity, fix.position_m[axis] - predicted, sigma * sigma, |_| true);
+                self.correct(sensitivity, fix.position_m[axis] - predicted, sigma * sigma, |_| true);
             self.gates.gnss_position.count(correction.accepted);
             if axis == 2 && fix.position_m.z.is_finite() {
                 self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z);
@@ -148,6 +157,17 @@ impl Estimator {
                 self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
             }
         }
+    }
+
+    /// The motion since a fix was valid, by its time tag less the tag's estimated error.
+    fn since_fix(&self, fix: &GnssFix) -> Option<Since> {
+        self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &self.nominal.velocity_m_s)
+    }
+
+    /// A fix's sensitivity; its last entry, the time tag's, counts only where the tags are not trusted.
+    fn with_or_without_tag<'s>(&self, sensitivity: &'s [(usize, f64)]) -> &'s [(usize, f64)] {
+        let trusted = self.config.gnss_time_tag_s <= 0.0;
+        &sensitivity[..sensitivity.len() - usize::from(trusted)]
     }
 
     /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the

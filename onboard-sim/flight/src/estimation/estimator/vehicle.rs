@@ -4,6 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::vehicle::airframe::{Airframe, MassProperties};
 use crate::vehicle::fins::{COS_30, PITCH, ROLL, SIN_30, YAW};
+use crate::vehicle::mission::Exhaust;
 
 /// The data of the vehicle that the estimator needs in this frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +62,18 @@ impl VehicleNow {
             crossflow_area_m2: body.crossflow_drag_coefficient * body.length_m * body.diameter_m,
             motor_burning,
             lidar_behind_cg_m: airframe.above_feet_m(mass.cg_station_m) - lidar_ahead_of_feet_m,
+        }
+    }
+
+    /// The vehicle with what its exhaust leaves of the drag of body and fins.
+    #[must_use]
+    pub fn in_exhaust(self, exhaust: &Exhaust) -> Self {
+        let fins = 1.0 - exhaust.fin_loss;
+        Self {
+            body_drag_area_m2: self.body_drag_area_m2 * (1.0 - exhaust.body_loss),
+            fin_drag_area_m2: self.fin_drag_area_m2 * fins,
+            fin_lift_area_m2: self.fin_lift_area_m2 * fins,
+            ..self
         }
     }
 

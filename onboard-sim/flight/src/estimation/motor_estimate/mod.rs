@@ -3,16 +3,18 @@
 //!
 //! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4 %. With the nominal
 //! curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the instant of ignition `t0`, the thrust is
-//! `T(t) = s / b T0((t - t0) / b)`. The specific force along the nose contains the thrust and the air force:
+//! `T(t) = (1 + n) s / b T0((t - t0) / b)`. The deviation `n` from the certified shape wanders: it is a first-order
+//! Gauss-Markov process with mean zero. Without it a shape error would pass for an error of impulse and burn time that
+//! the filter is ever surer of. The specific force along the nose contains the thrust and the air force:
 //! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
-//! extended Kalman filter over `(s, b, t0, d)` finds all four; it finds `d` before ignition, while the vehicle falls.
+//! extended Kalman filter over `(s, b, t0, d, n)` finds all five; it finds `d` before ignition, while the vehicle falls.
 
 mod digest;
 mod ignition;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix5, Vector2, Vector5};
 use serde::Deserialize;
 
 use self::ignition::Detector;
@@ -68,6 +70,12 @@ pub struct MotorPrior {
     pub accelerometer_m_s2: f64,
     /// Roughness of the burn around its curve, as a fraction of the thrust.
     pub roughness_share: f64,
+    /// Deviation of the thrust from the certified shape, as a fraction of the thrust; 0 trusts the shape.
+    pub shape_sigma: f64,
+    /// Correlation time of that deviation, s.
+    pub shape_lasts_s: f64,
+    /// What the exhaust may change of the air force beyond what is assumed, as a fraction of the air force.
+    pub exhaust_sigma: f64,
 }
 
 impl Default for MotorPrior {
@@ -80,6 +88,9 @@ impl Default for MotorPrior {
             air_sigma: 0.1,
             accelerometer_m_s2: 0.09,
             roughness_share: 0.02,
+            shape_sigma: 0.0,
+            shape_lasts_s: 1.0,
+            exhaust_sigma: 0.0,
         }
     }
 }
@@ -110,9 +121,9 @@ pub struct MotorEstimate {
     prior: MotorPrior,
     detector: Detector,
     stage: MotorStage,
-    /// Impulse scale, burn-time stretch, ignition, s, air scale.
-    mean: Vector4<f64>,
-    covariance: Matrix4<f64>,
+    /// Impulse scale, burn-time stretch, ignition, s, air scale, deviation from the shape.
+    mean: Vector5<f64>,
+    covariance: Matrix5<f64>,
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
 }
@@ -121,6 +132,7 @@ const IMPULSE: usize = 0;
 const STRETCH: usize = 1;
 const IGNITION: usize = 2;
 const AIR: usize = 3;
+const SHAPE: usize = 4;
 
 /// The igniter and the first pressure peak are not in the curve, so samples within this time after ignition are not
 /// used, s.
@@ -151,14 +163,19 @@ const STRETCH_RANGE: [f64; 2] = [0.8, 1.25];
 impl MotorEstimate {
     /// The filter before ignition, with the prior only.
     pub fn new(prior: &MotorPrior) -> Self {
-        let sigmas =
-            Vector4::new(prior.impulse_sigma, prior.burn_time_sigma, ignition::SIGMA_S, prior.air_sigma);
+        let sigmas = Vector5::new(
+            prior.impulse_sigma,
+            prior.burn_time_sigma,
+            ignition::SIGMA_S,
+            prior.air_sigma,
+            prior.shape_sigma,
+        );
         Self {
             prior: *prior,
             detector: Detector::default(),
             stage: MotorStage::Waiting,
-            mean: Vector4::new(1.0, 1.0, 0.0, 1.0),
-            covariance: Matrix4::from_diagonal(&sigmas.component_mul(&sigmas)),
+            mean: Vector5::new(1.0, 1.0, 0.0, 1.0, 0.0),
+            covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
             starved_frames: 0,
         }
     }
@@ -188,8 +205,13 @@ impl MotorEstimate {
         self.mean[AIR]
     }
 
-    /// Standard deviations of impulse scale, burn-time stretch, ignition, s, and air scale.
-    pub fn sigmas(&self) -> [f64; 4] {
+    /// True thrust over that of the scaled curve at this moment, less 1.
+    pub fn shape_deviation(&self) -> f64 {
+        self.mean[SHAPE]
+    }
+
+    /// Standard deviations of impulse scale, burn-time stretch, ignition, s, air scale and shape.
+    pub fn sigmas(&self) -> [f64; 5] {
         core::array::from_fn(|index| libm::sqrt(self.covariance[(index, index)].max(0.0)))
     }
 
@@ -230,11 +252,12 @@ impl MotorEstimate {
             if let Some(ignition_s) = self.detector.take(curve, middle_s, thrust_n) {
                 self.stage = MotorStage::Burning;
                 self.mean[IGNITION] = ignition_s;
+                self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
             }
         }
         // Rising thrust must not be mistaken for air force.
         if !self.detector.suspects() && air_n.abs() > SMALLEST_AIR_N {
-            self.learn(sample, Vector4::new(0.0, 0.0, 0.0, air_n), thrust_n, 0.0);
+            self.learn(sample, Vector5::new(0.0, 0.0, 0.0, air_n, 0.0), thrust_n, 0.0);
         }
     }
 
@@ -248,16 +271,18 @@ impl MotorEstimate {
             MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
         };
         let (thrust_n, sensitivity) = self.thrust(curve, time_s - ignition_s);
-        let variance = sensitivity.dot(&(self.covariance * sensitivity));
+        let variance = product(&sensitivity, &(self.covariance * sensitivity));
         PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
     }
 
     /// Thrust and its derivatives by the four, at a time since ignition.
-    fn thrust(&self, curve: &impl NominalThrust, since_s: f64) -> (f64, Vector4<f64>) {
+    fn thrust(&self, curve: &impl NominalThrust, since_s: f64) -> (f64, Vector5<f64>) {
         let (scale, stretch) = (self.mean[IMPULSE], self.mean[STRETCH]);
         let nominal_s = since_s / stretch;
         let nominal_n = curve.thrust_n(nominal_s);
-        let thrust_n = scale / stretch * nominal_n;
+        let as_certified_n = scale / stretch * nominal_n;
+        let shape = 1.0 + self.mean[SHAPE];
+        let thrust_n = as_certified_n * shape;
         // Only points inside the burn are used, because the curve has steps at its ends.
         let (from_s, to_s) = ((nominal_s - SLOPE_SPAN_S).max(0.0), nominal_s + SLOPE_SPAN_S);
         let slope_n_s = if nominal_n > 0.0 {
@@ -265,13 +290,19 @@ impl MotorEstimate {
         } else {
             0.0
         };
-        let by_time = scale / (stretch * stretch) * slope_n_s;
-        let sensitivity =
-            Vector4::new(nominal_n / stretch, -thrust_n / stretch - by_time * nominal_s, -by_time, 0.0);
+        let by_time = scale / (stretch * stretch) * slope_n_s * shape;
+        let sensitivity = Vector5::new(
+            nominal_n / stretch * shape,
+            -thrust_n / stretch - by_time * nominal_s,
+            -by_time,
+            0.0,
+            as_certified_n,
+        );
         (thrust_n, sensitivity)
     }
 
     fn follow(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64, cosine: f64) {
+        self.wander();
         let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_n() {
@@ -295,7 +326,23 @@ impl MotorEstimate {
         self.learn(sample, sensitivity, innovation_n, thrust_n);
     }
 
-    fn learn(&mut self, sample: &MotorSample, sensitivity: Vector4<f64>, innovation_n: f64, thrust_n: f64) {
+    /// The deviation from the shape over one frame.
+    fn wander(&mut self) {
+        let sigma = self.prior.shape_sigma;
+        if sigma <= 0.0 {
+            return;
+        }
+        let kept = libm::exp(-self.prior.frame_s / self.prior.shape_lasts_s);
+        self.mean[SHAPE] *= kept;
+        for index in 0..SHAPE {
+            self.covariance[(SHAPE, index)] *= kept;
+            self.covariance[(index, SHAPE)] *= kept;
+        }
+        let variance = &mut self.covariance[(SHAPE, SHAPE)];
+        *variance = kept * kept * *variance + (1.0 - kept * kept) * sigma * sigma;
+    }
+
+    fn learn(&mut self, sample: &MotorSample, sensitivity: Vector5<f64>, innovation_n: f64, thrust_n: f64) {
         let white_n = sample.mass_kg * self.prior.accelerometer_m_s2;
         let frames = |lasts_s: f64| (lasts_s / self.prior.frame_s).max(1.0);
         let rough_n = self.prior.roughness_share * thrust_n;
@@ -304,7 +351,7 @@ impl MotorEstimate {
             + rough_n * rough_n * frames(ROUGHNESS_LASTS_S)
             + gust_n * gust_n * frames(GUST_LASTS_S);
         let with = self.covariance * sensitivity;
-        let variance = sensitivity.dot(&with) + noise;
+        let variance = product(&sensitivity, &with) + noise;
         if innovation_n * innovation_n > GATE_SIGMAS * GATE_SIGMAS * variance {
             return;
         }
@@ -312,10 +359,16 @@ impl MotorEstimate {
         self.mean += gain * innovation_n;
         // P h' h P / s is exactly symmetric, so the difference stays symmetric.
         self.covariance -= with * with.transpose() / variance;
-        for index in 0..4 {
+        for index in 0..SHAPE {
             self.covariance[(index, index)] = self.covariance[(index, index)].max(1e-12);
         }
         self.mean[IMPULSE] = self.mean[IMPULSE].clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]);
         self.mean[STRETCH] = self.mean[STRETCH].clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]);
     }
+}
+
+/// The scalar product. The first four terms are added as in a product of four, so that a filter that trusts the shape
+/// gives the same bits as one without a fifth state: logs of that filter still verify.
+fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
+    one.fixed_rows::<4>(0).dot(&other.fixed_rows::<4>(0)) + one[SHAPE] * other[SHAPE]
 }

@@ -22,7 +22,7 @@ struct Share {
 impl Share {
     fn new(column: &Column, braking: &Braking) -> Self {
         let (sin, cos) = libm::sincos(braking.tilt_rad);
-        let area_m2 = column.body_drag_area_m2 * cos * cos
+        let area_m2 = column.burning_body_drag_area_m2 * cos * cos
             + braking.fin_drag_area_m2
             + column.crossflow_area_m2 * sin * sin * sin;
         Self { thrust: cos, drag_per_v2: 0.5 * column.air_density_kg_m3 * area_m2 }

@@ -47,6 +47,8 @@ pub struct Column {
     pub air_density_kg_m3: f64,
     /// Drag area of the body along its axis, m^2.
     pub body_drag_area_m2: f64,
+    /// The same while the motor burns, m^2.
+    pub burning_body_drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
     /// The softest braking that is still controllable.
@@ -206,6 +208,7 @@ mod tests {
             gravity_m_s2: 9.80665,
             air_density_kg_m3: 1.2,
             body_drag_area_m2: 0.0043,
+            burning_body_drag_area_m2: 0.0043,
             crossflow_area_m2: 0.0622,
             soft: Braking { tilt_rad: 40_f64.to_radians(), fin_drag_area_m2: 0.0 },
             hard: Braking { tilt_rad: 0.0, fin_drag_area_m2: 0.0267 },
