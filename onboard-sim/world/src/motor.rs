@@ -156,6 +156,22 @@ mod tests {
     }
 
     #[test]
+    fn val_hand_a_shape_changes_the_thrust_and_keeps_the_impulse() {
+        let truth =
+            Truth { thrust_shape: [0.1, -0.05, 0.0, 0.02, 0.0], ignition_delay_s: 0.0, ..Truth::default() };
+        let motor = motor(&truth);
+        // The curve gives 20 N s up to 1 s, 80 N s to 3 s, 20 N s to 4 s. At 2 s half of the impulse is given: the
+        // cosines are 0, -1, 0, 1.
+        assert!((motor.thrust_n(12.0) - 40.0 * (1.0 + 0.05 + 0.02)).abs() < 1e-9);
+        let thrusts_n = (0..40_000).map(|i| motor.thrust_n(10.0 + 1e-4 * (f64::from(i) + 0.5)));
+        let impulse_n_s: f64 = thrusts_n.map(|thrust_n| thrust_n * 1e-4).sum();
+        assert!((impulse_n_s - 120.0).abs() < 1e-4, "{impulse_n_s}");
+        // Half of the propellant, and 0.1 sin(pi/2) / pi + 0 + 0 - 0 of it more.
+        assert!((motor.burnt_kg(12.0) - 0.12 * (0.5 + 0.1 / PI)).abs() < 1e-12);
+        assert!((motor.burnt_kg(20.0) - 0.12).abs() < 1e-12);
+    }
+
+    #[test]
     fn only_the_first_command_counts() {
         let mut motor = motor(&Truth::default());
         motor.ignite(11.0);

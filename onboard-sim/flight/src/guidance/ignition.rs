@@ -60,7 +60,7 @@ impl IgnitionSettings {
         let (onset_height_m, onset_vertical_m_s) =
             column.fallen(height_m, vertical_m_s, fin_drag_area_m2, self.delay_s);
         let band = |impulse_scale, time_scale| {
-            column.band(&Burn { curve, impulse_scale, time_scale }, 0.0, onset_vertical_m_s)
+            column.band(&Burn { impulse_scale, time_scale, ..Burn::nominal(curve) }, 0.0, onset_vertical_m_s)
         };
         let certified = band(1.0, 1.0);
         let [weak, strong] = self.impulse_scales;

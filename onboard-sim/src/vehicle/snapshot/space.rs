@@ -7,7 +7,6 @@ use flight::guidance::powered::{Plane, PoweredReport};
 use flight::rules::phase::Phase;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::airframe::MassModel;
-use flight::vehicle::burn::Burn;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
@@ -69,11 +68,7 @@ impl Vehicle {
         let &Airborne { released_at_s, frame, flight_s, output, estimate, mass } = since;
         let pilot = space.sortie.pilot();
         let motor = pilot.motor();
-        let burn = Burn {
-            curve: pilot.curve(),
-            impulse_scale: motor.impulse_scale(),
-            time_scale: motor.burn_time_stretch(),
-        };
+        let burn = motor.burn(pilot.curve());
         let burning_s = pilot.burning_s(flight_s);
         let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
         let feet_m = space.sortie.mission().airframe.above_feet_m(mass.at(burnt_kg).cg_station_m);

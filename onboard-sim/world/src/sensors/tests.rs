@@ -114,3 +114,113 @@ fn over_many_flights_the_ram_error_has_its_size() {
     let sigma = (squares / n as f64).sqrt();
     assert!((sigma / 2.316 - 1.0).abs() < 4.0 / (2.0 * n as f64).sqrt(), "{sigma}");
 }
+
+fn flawed(params: &SensorParams) -> Sensors {
+    Sensors::new(params, 9, 0.0).unwrap()
+}
+
+/// Without noise and bias.
+fn quiet() -> SensorParams {
+    let none = SensorParams::default();
+    SensorParams {
+        imu: ImuParams {
+            gyro_noise_deg_s_sqrt_hz: 0.0,
+            gyro_bias_deg_s: 0.0,
+            gyro_bias_walk_deg_s_sqrt_s: 0.0,
+            accelerometer_noise_mg_sqrt_hz: 0.0,
+            accelerometer_bias_mg: 0.0,
+            accelerometer_scale_share: 0.0,
+            ..none.imu
+        },
+        ..none
+    }
+}
+
+fn one_frame(sensors: &mut Sensors, truth: &SensorTruth) -> Measurements {
+    (0..FRAME_MS).find_map(|_| sensors.observe(truth, &SensorFaults::default())).unwrap()
+}
+
+#[test]
+fn val_hand_a_unit_beside_the_centre_of_gravity_feels_the_turning_and_a_turned_one_mixes_the_axes() {
+    let mut sensors = flawed(&quiet());
+    sensors.flaws.unit_m = Vector3::new(0.1, 0.0, 0.0);
+    let mut truth = falling(10.0, 50.0);
+    truth.state.rate_rad_s = Vector3::new(0.0, 0.0, 2.0);
+    truth.angular_acceleration_rad_s2 = Vector3::new(0.0, 0.0, 5.0);
+    // Centripetal -w^2 r along x, tangential a r along y.
+    let felt = one_frame(&mut sensors, &truth).imu.specific_force_m_s2;
+    assert!((felt - Vector3::new(9.8 - 0.4, 0.1 + 0.5, -0.2)).norm() < 1e-12, "{felt}");
+    let mut turned = flawed(&quiet());
+    // The unit is turned by 90 degrees about x: its y axis lies along the body's z.
+    turned.flaws.unit_from_body = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
+        1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0,
+    ));
+    let imu = one_frame(&mut turned, &falling(10.0, 50.0)).imu;
+    assert!((imu.specific_force_m_s2 - Vector3::new(9.8, -0.2, -0.1)).norm() < 1e-12);
+}
+
+#[test]
+fn vibration_shakes_the_unit_while_the_motor_burns() {
+    let params =
+        SensorParams { imu: ImuParams { vibration_g: 0.05, vibration_deg_s: 0.1, ..quiet().imu }, ..quiet() };
+    let rms = |burning: bool| {
+        let mut sensors = flawed(&params);
+        let truth = SensorTruth { burning, ..falling(10.0, 50.0) };
+        let n = 4000;
+        let squares: f64 = (0..n)
+            .map(|_| one_frame(&mut sensors, &truth).imu.specific_force_m_s2.x - 9.8)
+            .map(|off| off * off)
+            .sum();
+        libm::sqrt(squares / f64::from(n))
+    };
+    assert!(rms(false) < 1e-9);
+    // Four standard errors of 4,000 samples are 4.5 %.
+    assert!((rms(true) / (0.05 * GRAVITY_M_S2) - 1.0).abs() < 0.045, "{}", rms(true));
+}
+
+#[test]
+fn late_samples_wrong_tags_dust_dropouts_and_switches() {
+    let quiet = quiet();
+    let params = SensorParams {
+        barometer: BarometerParams {
+            noise_m: 0.0,
+            offset_m: 0.0,
+            offset_walk_m_sqrt_s: 0.0,
+            ram_coefficient: 0.0,
+            ..quiet.barometer
+        },
+        lidar: LidarParams { blind_below_m: 2.0, noise_m: 0.0, dropout_share: 0.25, ..quiet.lidar },
+        switches: SwitchParams { contact_late_ms: 12, ..quiet.switches },
+        ..quiet
+    };
+    let truth = falling(10.0, 5.0);
+    let mut sensors = flawed(&params);
+    sensors.flaws.barometer_late_s = 0.02;
+    sensors.flaws.lidar_late_s = 0.01;
+    sensors.flaws.barometer_plume_m = 0.5;
+    sensors.flaws.barometer_ejection_m = 8.0;
+    sensors.flaws.gnss_tag_s = 0.03;
+    let frames: Vec<Measurements> = (0..800).map(|_| one_frame(&mut sensors, &truth)).collect();
+    // 20 ms ago the vehicle was 0.2 m higher; for the lidar 10 ms and 0.1 m, and 0.45 m from the lidar to the centre.
+    assert!(frames.iter().filter_map(|m| m.pressure_altitude_m).all(|m| (m - 5.2).abs() < 1e-9));
+    let ranges: Vec<f64> = frames.iter().filter_map(|m| m.lidar_range_m).collect();
+    assert!(ranges.iter().all(|range_m| (range_m - (5.1 - 0.45)).abs() < 1e-9));
+    // 400 ranges, a quarter lost; four standard deviations are 35.
+    assert!((265..=335).contains(&ranges.len()), "{}", ranges.len());
+    let fix = frames.iter().position(|m| m.gnss.is_some()).unwrap();
+    let age_s = (fix + 1) as f64 * 0.005 - frames[fix].gnss.unwrap().valid_at_s;
+    assert!((0.12 - 0.03 - 1e-9..0.125 - 0.03).contains(&age_s), "{age_s}");
+
+    let burning = SensorTruth { burning: true, ejected_for_s: Some(0.3), ..falling(10.0, 2.5) };
+    let altitude_m = (0..4).find_map(|_| one_frame(&mut sensors, &burning).pressure_altitude_m).unwrap();
+    // The plume, and the ejection's pressure after one time constant.
+    assert!((altitude_m - (2.7 + 0.5 + 8.0 * (-1.0_f64).exp())).abs() < 1e-9, "{altitude_m}");
+    assert!((0..40).all(|_| one_frame(&mut sensors, &burning).lidar_range_m.is_none()), "dust below 2 m");
+
+    assert!(!sensors.contact(false) && !sensors.contact(true), "reported late");
+    one_frame(&mut sensors, &truth);
+    one_frame(&mut sensors, &truth);
+    assert!(!sensors.contact(true), "after 10 ms");
+    one_frame(&mut sensors, &truth);
+    assert!(sensors.contact(true), "after 15 ms");
+}

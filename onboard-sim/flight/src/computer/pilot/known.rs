@@ -75,11 +75,7 @@ impl Known {
     }
 
     pub(super) fn burn(&self) -> Burn<'_> {
-        Burn {
-            curve: &self.mission.motor_curve,
-            impulse_scale: self.motor.impulse_scale(),
-            time_scale: self.motor.burn_time_stretch(),
-        }
+        self.motor.burn(&self.mission.motor_curve)
     }
 
     /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected from now until its
@@ -94,9 +90,9 @@ impl Known {
         let derivatives = [
             to_come_n_s / burn.impulse_scale,
             (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
+            burn.fading_n_s(burning_s, until_s),
         ];
-        let [impulse_scale, time_scale] = self.motor.doubted(derivatives, sigmas);
-        Burn { impulse_scale, time_scale, ..burn }
+        self.motor.doubted(&self.mission.motor_curve, derivatives, sigmas)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {

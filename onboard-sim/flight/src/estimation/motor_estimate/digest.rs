@@ -4,7 +4,7 @@ use super::{MotorEstimate, MotorStage};
 use crate::computer::memory::{Memory, Remembers, remembers};
 
 // The prior is constant; everything that changes is in the mean and the covariance.
-remembers!(MotorEstimate { detector, stage, mean, covariance, starved_frames } but { prior });
+remembers!(MotorEstimate { detector, stage, mean, covariance, felt_at_s, starved_frames } but { prior });
 
 impl Remembers for MotorStage {
     fn remember(&self, memory: &mut Memory) {

@@ -18,6 +18,7 @@ use nalgebra::{Matrix5, Vector2, Vector5};
 use serde::Deserialize;
 
 use self::ignition::Detector;
+use crate::vehicle::burn::{Burn, Deviation};
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// The data sheet's thrust by time since ignition, s to N; zero before 0 and after the burn.
@@ -124,6 +125,8 @@ pub struct MotorEstimate {
     /// Impulse scale, burn-time stretch, ignition, s, air scale, deviation from the shape.
     mean: Vector5<f64>,
     covariance: Matrix5<f64>,
+    /// When the deviation from the shape was last brought forward, s.
+    felt_at_s: f64,
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
 }
@@ -176,6 +179,7 @@ impl MotorEstimate {
             stage: MotorStage::Waiting,
             mean: Vector5::new(1.0, 1.0, 0.0, 1.0, 0.0),
             covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
+            felt_at_s: 0.0,
             starved_frames: 0,
         }
     }
@@ -215,16 +219,42 @@ impl MotorEstimate {
         core::array::from_fn(|index| libm::sqrt(self.covariance[(index, index)].max(0.0)))
     }
 
-    /// Impulse scale and burn-time stretch of the worst motor at this many standard deviations: the one that changes a
-    /// quantity most, given the quantity's derivatives by the two. A positive deviation raises the quantity.
-    pub fn doubted(&self, derivatives: [f64; 2], sigmas: f64) -> [f64; 2] {
-        let with = self.covariance.fixed_view::<2, 2>(0, 0) * Vector2::from(derivatives);
-        let variance = with.dot(&Vector2::from(derivatives));
-        let moved = if variance > 0.0 { with * (sigmas / libm::sqrt(variance)) } else { Vector2::zeros() };
-        [
-            (self.mean[IMPULSE] + moved.x).clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]),
-            (self.mean[STRETCH] + moved.y).clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]),
-        ]
+    /// The burn as estimated.
+    pub fn burn<'a>(&self, curve: &'a ThrustCurve) -> Burn<'a> {
+        Burn {
+            curve,
+            impulse_scale: self.impulse_scale(),
+            time_scale: self.burn_time_stretch(),
+            deviation: self.deviation(self.mean[SHAPE]),
+        }
+    }
+
+    fn deviation(&self, share: f64) -> Deviation {
+        if self.stage == MotorStage::Waiting {
+            return Deviation::NONE;
+        }
+        Deviation { share, at_s: self.felt_at_s - self.mean[IGNITION], lasts_s: self.prior.shape_lasts_s }
+    }
+
+    /// The worst burn at this many standard deviations: the one that changes a quantity most, given the quantity's
+    /// derivatives by impulse scale, burn-time stretch and deviation from the shape. A positive number of deviations
+    /// raises the quantity.
+    pub fn doubted<'a>(&self, curve: &'a ThrustCurve, derivatives: [f64; 3], sigmas: f64) -> Burn<'a> {
+        let [by_impulse, by_stretch, by_shape] = derivatives;
+        let by_scales = Vector2::new(by_impulse, by_stretch);
+        let covariance = &self.covariance;
+        let with_shape = Vector2::new(covariance[(IMPULSE, SHAPE)], covariance[(STRETCH, SHAPE)]);
+        let with = covariance.fixed_view::<2, 2>(0, 0) * by_scales + with_shape * by_shape;
+        let shape_with = with_shape.dot(&by_scales) + covariance[(SHAPE, SHAPE)] * by_shape;
+        let variance = with.dot(&by_scales) + shape_with * by_shape;
+        let share = if variance > 0.0 { sigmas / libm::sqrt(variance) } else { 0.0 };
+        let moved = with * share;
+        Burn {
+            curve,
+            impulse_scale: (self.mean[IMPULSE] + moved.x).clamp(IMPULSE_RANGE[0], IMPULSE_RANGE[1]),
+            time_scale: (self.mean[STRETCH] + moved.y).clamp(STRETCH_RANGE[0], STRETCH_RANGE[1]),
+            deviation: self.deviation(self.mean[SHAPE] + shape_with * share),
+        }
     }
 
     /// Takes one frame. A sample that is not finite is ignored.
@@ -303,6 +333,7 @@ impl MotorEstimate {
 
     fn follow(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64, cosine: f64) {
         self.wander();
+        self.felt_at_s = sample.time_s;
         let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_n() {

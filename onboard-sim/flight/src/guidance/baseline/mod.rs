@@ -181,11 +181,7 @@ impl Baseline {
         let mass = self.mass.at(self.mission.motor_curve.propellant_burnt_kg(burning_s));
         let state = &estimate.state;
         let height_m = state.position_m.z - self.mission.airframe.above_feet_m(mass.cg_station_m);
-        let burn = Burn {
-            curve: &self.mission.motor_curve,
-            impulse_scale: motor.impulse_scale(),
-            time_scale: motor.burn_time_stretch(),
-        };
+        let burn = motor.burn(&self.mission.motor_curve);
         if self.controller == Controller::Oscillating {
             if self.frames.is_multiple_of(FRAMES_PER_SETTING) {
                 let most = self.largest_swing_rad;

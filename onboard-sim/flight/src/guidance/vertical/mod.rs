@@ -223,9 +223,8 @@ mod tests {
         let curve = motors::builtin("H45W").expect("a built-in motor");
         let column = column();
         let speed_m_s = -column.terminal_speed_m_s(0.0267);
-        let band = |impulse_scale| {
-            column.band(&Burn { curve: &curve, impulse_scale, time_scale: 1.0 }, 0.0, speed_m_s)
-        };
+        let band =
+            |impulse_scale| column.band(&Burn { impulse_scale, ..Burn::nominal(&curve) }, 0.0, speed_m_s);
         let (nominal, weak) = (band(1.0).expect("a landing exists"), band(0.92).expect("a landing exists"));
         assert!(nominal.low_m < 58.0 && nominal.high_m > 72.0, "{nominal:?}");
         assert!(weak.high_m - weak.low_m < 0.5 * (nominal.high_m - nominal.low_m), "{weak:?}");

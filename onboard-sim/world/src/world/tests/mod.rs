@@ -7,6 +7,7 @@ use super::*;
 
 mod invariants;
 mod landing;
+mod mismatch;
 mod planar;
 
 const OPEN: Actuators =
