@@ -97,42 +97,113 @@ mod tests {
         Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
     }
 
-    /// Height of the parachute's release in a fall, m, with or without fins that answer.
-    fn released_m(fins_answer: bool) -> Option<f64> {
-        let mission =
-            crate::vehicles::mission::builtin("mk2").expect("a built-in mission").expect("a valid mission");
+    /// What is wrong in a fall, at the height of the centre of gravity, m.
+    type Wrong = fn(f64, &mut Estimate, &mut PilotInput);
+
+    const NOTHING: Wrong = |_, _, _| {};
+
+    /// How a fall at 38 m/s ended.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Ended {
+        /// With the parachute, released at a height, m; whether the loss was recorded.
+        Parachute(f64, bool),
+        /// With the ignition, commanded at a height, m.
+        Ignition(f64),
+        /// With neither.
+        Unbraked,
+    }
+
+    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m.
+    fn fall(wrong: Wrong) -> Ended {
+        let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee());
         let (mut table, mut fins_rad) = (released(), [0.0; 4]);
-        // Down to 80 m: below the commit height, above the ignition.
-        (1..900).find_map(|frame| {
+        let ended = (1..1300).find_map(|frame| {
             let time_s = frame as f64 * 0.005;
-            let estimate = falling(time_s);
-            let output = pilot.step(
-                &mut table,
-                &PilotInput {
-                    frame,
-                    time_s,
-                    sensed: Sensed::Known(estimate),
-                    fins_rad,
-                    contact: false,
-                    igniter_continuity: true,
-                    abort: false,
-                },
-            );
-            if fins_answer {
-                fins_rad = output.fins_rad;
-            }
-            output.parachute.then_some(estimate.state.position_m.z)
-        })
+            let mut estimate = falling(time_s);
+            let height_m = estimate.state.position_m.z;
+            let mut input = PilotInput {
+                frame,
+                time_s,
+                sensed: Sensed::Known(estimate),
+                fins_rad,
+                contact: false,
+                igniter_continuity: true,
+                abort: false,
+            };
+            wrong(height_m, &mut estimate, &mut input);
+            let output = pilot.step(&mut table, &PilotInput { sensed: Sensed::Known(estimate), ..input });
+            fins_rad = output.fins_rad;
+            let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
+            let parachute = output.parachute.then_some(Ended::Parachute(height_m, lost));
+            parachute.or_else(|| output.ignite.then_some(Ended::Ignition(height_m)))
+        });
+        ended.unwrap_or(Ended::Unbraked)
+    }
+
+    #[track_caller]
+    fn assert_parachute(wrong: Wrong, between_m: core::ops::Range<f64>) {
+        let ended = fall(wrong);
+        let filled = matches!(ended, Ended::Parachute(at_m, false) if between_m.contains(&at_m));
+        assert!(filled, "{ended:?}, not between {between_m:?} m");
+    }
+
+    /// 1.5 times a second's fall and 20 m of inflation, and the feet below the centre of gravity.
+    const AT_COMMIT_HEIGHT_M: core::ops::Range<f64> = 87.0..93.0;
+
+    #[test]
+    fn a_fall_with_nothing_wrong_ends_with_the_ignition() {
+        let ended = fall(NOTHING);
+        assert!(matches!(ended, Ended::Ignition(at_m) if (60.0..80.0).contains(&at_m)), "{ended:?}");
     }
 
     #[test]
-    fn the_parachute_is_released_in_time_only_if_the_fins_do_not_answer() {
-        assert_eq!(released_m(true), None);
-        let released_m = released_m(false).expect("the parachute is released");
-        // 1.5 times the sum of one second's fall and 20 m of inflation, plus the feet's distance below the centre of
-        // gravity.
-        assert!((87.0..93.0).contains(&released_m), "{released_m}");
+    fn what_lasts_brings_the_parachute_above_the_commit_height() {
+        assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
+        assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
+        // The fence is at 120 m.
+        assert_parachute(|_, estimate, _| estimate.state.position_m.x = 121.0, AT_COMMIT_HEIGHT_M);
+        let drifting_out: Wrong = |height_m, estimate, _| {
+            estimate.state.velocity_m_s.x = 5.0;
+            estimate.state.position_m.x = 121.0 - 5.0 * height_m / 38.0;
+        };
+        assert_parachute(drifting_out, AT_COMMIT_HEIGHT_M);
+    }
+
+    #[test]
+    fn inside_the_fence_it_lands() {
+        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0);
+        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
+    }
+
+    #[test]
+    fn a_gate_shut_after_the_commit_height_brings_the_parachute_while_it_fills() {
+        let filling_m = 58.0..75.0;
+        let out_of_the_fence: Wrong = |height_m, estimate, _| {
+            estimate.state.position_m.y = if height_m < 80.0 { 121.0 } else { 119.0 };
+        };
+        assert_parachute(out_of_the_fence, filling_m.clone());
+        let open_circuit: Wrong = |height_m, _, input| input.igniter_continuity = height_m > 73.0;
+        assert_parachute(open_circuit, filling_m.clone());
+        let turning: Wrong = |height_m, estimate, _| {
+            estimate.state.rate_rad_s.y = if height_m < 80.0 { 1.2 } else { 0.0 };
+        };
+        assert_parachute(turning, filling_m);
+    }
+
+    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for somewhat longer.
+    #[test]
+    fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
+        let Ended::Ignition(due_m) = fall(NOTHING) else { panic!("no ignition") };
+        let ended = fall(|height_m, estimate, _| {
+            estimate.state.rate_rad_s.y = if height_m > 66.0 && height_m < 80.0 { 1.2 } else { 0.0 };
+        });
+        assert!(matches!(ended, Ended::Ignition(at_m) if at_m < 66.0 && at_m < due_m), "{ended:?}");
+    }
+
+    #[test]
+    fn an_operators_abort_with_the_gate_shut_brings_the_parachute_while_it_fills() {
+        assert_parachute(|height_m, _, input| input.abort = height_m < 86.0, 85.0..86.0);
     }
 }
