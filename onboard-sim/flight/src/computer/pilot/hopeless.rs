@@ -29,10 +29,10 @@ impl Pilot {
         estimate: &Estimate,
     ) -> Option<Event> {
         let found = self.gate_input(mode, input, estimate);
-        if !(mode.phase.in_descent() && self.is_shut_by_what_lasts(&found)) {
-            self.gate_shut_since_s = None;
-        } else {
+        if mode.phase.in_descent() && self.is_shut_by_what_lasts(&found) {
             self.gate_shut_since_s.get_or_insert(input.time_s);
+        } else {
+            self.gate_shut_since_s = None;
         }
         if !mode.phase.in_descent() || self.outlook.commit_height_m <= 0.0 {
             return None;
@@ -54,7 +54,9 @@ impl Pilot {
             let outside = found.predicted_touchdown_x_m > self.known.mission.gate.fence_radius_m;
             let too_low = self.outlook.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
             (lasts && (refused || last_room))
-                || (refused && last_room && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= OVERDUE_S)))
+                || (refused
+                    && last_room
+                    && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= OVERDUE_S)))
                 || too_low
         };
         // Any lower, the parachute reaches the ground before it is ejected.
