@@ -17,7 +17,7 @@ const FALL_MIN_M_S: f64 = 5.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outlook {
     pub ignition: IgnitionOutlook,
-    /// Height of the feet below which the parachute has no room left, m.
+    /// Height of the feet below which the parachute has no room to spare, m.
     pub commit_height_m: f64,
     /// Height of the feet, m.
     pub height_m: f64,
@@ -27,7 +27,15 @@ pub struct Outlook {
     pub touchdown_distance_m: f64,
 }
 
-/// Height that a parachute needs at a speed: the fall until it is ejected, plus the distance over which it inflates.
+impl Outlook {
+    /// Height of the feet below which the parachute does not fill before it reaches the ground, m.
+    pub(super) fn filling_height_m(&self) -> f64 {
+        self.commit_height_m / COMMIT_MARGIN
+    }
+}
+
+/// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the distance over which
+/// it inflates.
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }

@@ -190,11 +190,11 @@ impl Pilot {
         let time_s = input.time_s;
         if input.abort {
             let gate_open = self.gate_open(table.mode(), input, estimate);
-            let above_commit_height = self.above_commit_height();
+            let above_commit_height = self.parachute_has_room(gate_open);
             self.happen(table, Event::AbortRequested { above_commit_height, gate_open }, time_s);
         }
-        if self.gate_will_not_open(table.mode().phase, input, estimate) {
-            self.happen(table, Event::AbortRequested { above_commit_height: true, gate_open: false }, time_s);
+        if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate) {
+            self.happen(table, hopeless, time_s);
         }
         match table.mode().phase {
             Phase::Deploy if self.fins_there(&input.fins_rad) => {
@@ -234,43 +234,56 @@ impl Pilot {
         }
     }
 
-    /// Ignition is due now if thrust commanded at the next frame would begin below the chosen height.
     fn consider_ignition(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
-        let ignition = &self.outlook.ignition;
-        let height_m = estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
-        let fallen_since_m = self.outlook.height_m - height_m;
-        let due =
-            ignition.chosen_m.is_some_and(|chosen_m| ignition.onset_height_m - fallen_since_m <= chosen_m);
-        if due {
+        if self.ignition_overdue_s(estimate).is_some() {
             let open = self.gate_open(table.mode(), input, estimate);
             self.happen(table, Event::IgnitionGate { open }, input.time_s);
         }
     }
 
+    /// Height of the feet, m.
+    pub(super) fn feet_height_m(&self, estimate: &Estimate) -> f64 {
+        estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0))
+    }
+
+    /// Height at which thrust, commanded at the next frame, would begin, m.
+    pub(super) fn onset_m(&self, estimate: &Estimate) -> f64 {
+        self.outlook.ignition.onset_height_m - (self.outlook.height_m - self.feet_height_m(estimate))
+    }
+
+    /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin
+    /// below the chosen height.
+    pub(super) fn ignition_overdue_s(&self, estimate: &Estimate) -> Option<f64> {
+        let ignition = &self.outlook.ignition;
+        let below_m = ignition.chosen_m? - self.onset_m(estimate);
+        (below_m >= 0.0).then(|| below_m / (-ignition.onset_vertical_m_s).max(1.0))
+    }
+
     /// The event that an abort in the next frame would be, from the findings of the last frame, if there was one.
     pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&PilotInput>) -> Event {
         let found = last.zip(self.estimate.as_ref());
-        let gate_open =
-            found.is_some_and(|(input, estimate)| self.gate_shut_by(mode, input, estimate).is_none());
-        Event::AbortRequested { above_commit_height: self.above_commit_height(), gate_open }
+        let gate_open = found.is_some_and(|(input, estimate)| {
+            self.gate_shut_by(&self.gate_input(mode, input, estimate)).is_none()
+        });
+        Event::AbortRequested { above_commit_height: self.parachute_has_room(gate_open), gate_open }
     }
 
-    fn above_commit_height(&self) -> bool {
-        self.outlook.height_m > self.outlook.commit_height_m
+    /// Room to spare where the motor is another way down, and just enough where it is not.
+    fn parachute_has_room(&self, gate_open: bool) -> bool {
+        let outlook = &self.outlook;
+        let enough_m = if gate_open { outlook.commit_height_m } else { outlook.filling_height_m() };
+        outlook.height_m > enough_m
     }
 
     fn gate_open(&mut self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> bool {
-        self.gate_refusal = self.gate_shut_by(mode, input, estimate);
+        self.gate_refusal = self.gate_shut_by(&self.gate_input(mode, input, estimate));
         self.gate_refusal.is_none()
     }
 
-    /// The first check that keeps the gate shut.
-    fn gate_shut_by(&self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> Option<&'static str> {
+    pub(super) fn gate_input(&self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> GateInput {
         let state = &estimate.state;
-        let ignition = &self.outlook.ignition;
-        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
-        let onset_m = ignition.onset_height_m - (self.outlook.height_m - height_m);
-        let gate = GateInput {
+        let onset_m = self.onset_m(estimate);
+        GateInput {
             tilt_rad: state.tilt_rad(),
             vertical_speed_m_s: state.velocity_m_s.z,
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
@@ -279,14 +292,18 @@ impl Pilot {
             // With one source left there is no disagreement; the estimator's health says whether that source is
             // reliable.
             height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
-            landing_feasible: ignition.band.is_some_and(|band| band.contains(onset_m)),
+            landing_feasible: self.outlook.ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.outlook.touchdown_distance_m,
             fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
             parachute_stowed: mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
             estimator_healthy: estimate.health.is_good(),
-        };
-        let checks = gate_checks(&self.known.mission.gate, &gate);
+        }
+    }
+
+    /// The first check that keeps the gate shut.
+    pub(super) fn gate_shut_by(&self, found: &GateInput) -> Option<&'static str> {
+        let checks = gate_checks(&self.known.mission.gate, found);
         checks.iter().find(|check| !check.passed).map(|check| check.name)
     }
 

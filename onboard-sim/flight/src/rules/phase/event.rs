@@ -57,9 +57,14 @@ pub enum Event {
     ThrustConfirmed,
     /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition command.
     NoThrustTimeout,
-    /// Abort: by radio, or by the vehicle itself when its ignition gate cannot open any more.
+    /// The vehicle itself finds, in its descent, that its ignition gate will not open any more.
+    GateShutForGood {
+        /// The parachute fills before the ground is reached.
+        parachute_fills: bool,
+    },
+    /// Abort by radio.
     AbortRequested {
-        /// The height is still sufficient for the parachute.
+        /// The height is still sufficient for the parachute: with a margin if the gate is open, else without.
         above_commit_height: bool,
         /// The ignition gate is open at this moment.
         gate_open: bool,
@@ -96,6 +101,7 @@ impl Event {
             Self::IgnitionGate { .. } => "ignition gate",
             Self::ThrustConfirmed => "thrust confirmed",
             Self::NoThrustTimeout => "no thrust",
+            Self::GateShutForGood { .. } => "gate shut for good",
             Self::AbortRequested { .. } => "abort",
             Self::Contact { .. } => "contact",
             Self::SafingDone => "safing done",
@@ -158,6 +164,12 @@ impl Effects {
     /// The set of these effects.
     pub fn of(effects: &[Effect]) -> Self {
         Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
+    }
+
+    /// The set with one more effect.
+    #[must_use]
+    pub fn with(self, effect: Effect) -> Self {
+        Self(self.0 | 1 << (effect as u16))
     }
 
     /// Whether the effect is in the set.

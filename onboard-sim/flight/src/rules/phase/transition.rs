@@ -175,6 +175,13 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             may_light(locks, || go_with(P::Ignition, &[Effect::IgniteLandingMotor]))
         }
         (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
+        // Without the motor only the parachute brakes: too low to fill, it still takes off some of the speed.
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::GateShutForGood { parachute_fills }) => {
+            let effects = Effects::of(&TO_THE_PARACHUTE);
+            let effects = if parachute_fills { effects } else { effects.with(Effect::RecordLoss) };
+            Row::Go(inhibited(mode), P::Chute, effects)
+        }
+        (_, E::GateShutForGood { .. }) => wrong("give up the ignition", "only a descent waits for it"),
 
         // Landing burn. A late light after "no light" counts as thrust, too.
         (P::Ignition, E::ThrustConfirmed) => {
@@ -214,6 +221,18 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
     }
 }
 
+/// What leads from a descent to the parachute.
+const TO_THE_PARACHUTE: [Effect; 3] = [Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute];
+
+/// The landing motor will not be lit any more.
+fn inhibited(mode: &Mode) -> Mode {
+    Mode {
+        interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..mode.interlocks },
+        countdown_end_s: None,
+        ..*mode
+    }
+}
+
 /// The abort column: the effect of an abort in each phase.
 #[expect(
     clippy::match_same_arms,
@@ -224,11 +243,7 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
     let phase = mode.phase;
     let locks = mode.interlocks;
     let may_burn = gate_open && locks.armed && !locks.landing_motor_inhibited && !locks.abort_latched;
-    let inhibited = Mode {
-        interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..locks },
-        countdown_end_s: None,
-        ..*mode
-    };
+    let inhibited = inhibited(mode);
     match phase {
         P::Touchdown | P::Safed => {
             Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the vehicle is on the ground" })
@@ -253,11 +268,9 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
         P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
         P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
         // A repeated abort on the way down may still have enough height for the parachute.
-        P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => Row::Go(
-            inhibited,
-            P::Chute,
-            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute]),
-        ),
+        P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => {
+            Row::Go(inhibited, P::Chute, Effects::of(&TO_THE_PARACHUTE))
+        }
         P::Deploy | P::AeroDescent | P::LandArmed if locks.abort_latched => {
             Row::Refuse(Refusal::AlreadyAborted)
         }

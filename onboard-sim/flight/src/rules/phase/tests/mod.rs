@@ -31,6 +31,7 @@ fn every_event() -> Vec<Event> {
         events.push(Event::ArmRequested { checks_passed: flag });
         events.push(Event::IgnitionGate { open: flag });
         events.push(Event::Contact { thrust_below_weight: flag });
+        events.push(Event::GateShutForGood { parachute_fills: flag });
         for gate_open in flags {
             events.push(Event::AbortRequested { above_commit_height: flag, gate_open });
         }
@@ -85,6 +86,12 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
         (P::LandArmed, E::IgnitionGate { open: true }) => (P::Ignition, &[IgniteLandingMotor]),
         (P::Ignition, E::ThrustConfirmed) => (P::Powered, &[]),
         (P::Ignition, E::NoThrustTimeout) => (P::Ignition, &[InhibitLandingMotor, FinsOpen, RecordLoss]),
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::GateShutForGood { parachute_fills: true }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
+        }
+        (P::Deploy | P::AeroDescent | P::LandArmed, E::GateShutForGood { parachute_fills: false }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute, RecordLoss])
+        }
         (P::Safe | P::PadIdle, E::AbortRequested { .. }) => {
             (phase, &[InhibitLandingMotor, Disarm, ShowPadWait])
         }
