@@ -220,6 +220,12 @@ row! {
     error_height_m: f64,
     /// Largest error of the estimated direction of the nose below 10 m, degrees.
     error_nose_deg: f64,
+    /// Normalised error squared of the estimated impulse and burn time 3 s after the first thrust: chi-square with 2
+    /// degrees of freedom in a consistent filter.
+    nees_of_motor: Option<f64>,
+    /// Normalised error squared of estimated position, velocity and attitude, mean from the first thrust to contact: 9 in a
+    /// consistent filter.
+    nees_of_motion: Option<f64>,
     /// Faults that happened.
     faults: u64,
     /// Time from apogee until the vehicle was at rest, s.

@@ -12,6 +12,8 @@ use sim::sortie::{SetUpError, Sortie};
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
+/// By then the filter has seen most of the burn, and the plan can still use what it knows, s.
+const MOTOR_KNOWN_S: f64 = 3.0;
 
 /// A running flight, and the values collected for its row.
 pub struct Tally {
@@ -21,6 +23,9 @@ pub struct Tally {
     gimbal_limit_rad: f64,
     ignition: Option<AtIgnition>,
     onset: Option<(f64, f64)>,
+    nees_of_motor: Option<f64>,
+    /// Sum over frames, and their number.
+    nees_of_motion: (f64, u32),
     plans: [u64; ControlLevel::ALL.len()],
     solver_iterations: u64,
     solver_failures: u64,
@@ -50,6 +55,8 @@ impl Tally {
             gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
             ignition: None,
             onset: None,
+            nees_of_motor: None,
+            nees_of_motion: (0.0, 0),
             plans: [0; ControlLevel::ALL.len()],
             solver_iterations: 0,
             solver_failures: 0,
@@ -86,6 +93,15 @@ impl Tally {
         }
         if self.onset.is_none() && world.thrust_n() > 0.0 {
             self.onset = Some((world.height_m(), world.state().velocity_m_s.z));
+        }
+        let burning_s = world.thrust_begins_s().map_or(-1.0, |begins_s| world.time_s() - begins_s);
+        if burning_s >= 0.0 && world.touchdown().is_none() {
+            if let Some(nees) = flight.nees_of_motion() {
+                self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
+            }
+            if burning_s >= MOTOR_KNOWN_S && self.nees_of_motor.is_none() {
+                self.nees_of_motor = flight.nees_of_motor();
+            }
         }
         let piloted = flight.computer().piloted().filter(|_| !flight.computer_is_dead());
         let Some((_, output)) = piloted else { return };
@@ -169,6 +185,9 @@ impl Tally {
             error_lateral_m_s: errors.lateral_m_s,
             error_height_m: errors.height_m,
             error_nose_deg: errors.nose_rad.to_degrees(),
+            nees_of_motor: self.nees_of_motor,
+            nees_of_motion: (self.nees_of_motion.1 > 0)
+                .then(|| self.nees_of_motion.0 / f64::from(self.nees_of_motion.1)),
             faults: self.flight.faults_happened(),
             flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
         }

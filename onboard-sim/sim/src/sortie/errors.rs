@@ -39,6 +39,19 @@ impl Sortie {
         self.pilot().estimator().nees_of_motion(self.world.state())
     }
 
+    /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
+    /// `None` if the pilot gets the truth instead of an estimate, and before the motor has lit. The accelerometer cannot
+    /// tell more impulse from less mass.
+    ///
+    /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
+    pub fn nees_of_motor(&self) -> Option<f64> {
+        self.measured.filter(|_| !self.dead)?;
+        let motor = self.pilot().motor();
+        motor.ignition_s()?;
+        let truth = self.world.truth();
+        motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
+    }
+
     /// Errors of the estimate at this moment.
     pub fn errors(&self) -> EstimatorErrors {
         let Some(estimate) = self.pilot().estimate() else { return EstimatorErrors::default() };
