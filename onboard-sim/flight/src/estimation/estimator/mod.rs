@@ -34,8 +34,8 @@ use nalgebra::{Vector2, Vector3};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GNSS_TIME_TAG,
-    GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
 };
 use self::gates::Surprise;
 pub use self::gates::{GateCounters, Gates};
@@ -217,9 +217,10 @@ impl Estimator {
         let sigmas = Sigmas {
             position_m: self.covariance.sigmas(POSITION),
             velocity_m_s: self.covariance.sigmas(VELOCITY),
-            attitude_rad: self.covariance.sigmas(ATTITUDE).map(|sigma| {
-                if mounting_rad > 0.0 { libm::hypot(sigma, mounting_rad) } else { sigma }
-            }),
+            attitude_rad: self
+                .covariance
+                .sigmas(ATTITUDE)
+                .map(|sigma| if mounting_rad > 0.0 { libm::hypot(sigma, mounting_rad) } else { sigma }),
             gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),
             accelerometer_bias_m_s2: self.covariance.sigmas(ACCELEROMETER_BIAS),
             wind_m_s: self.covariance.sigmas(WIND).xy(),

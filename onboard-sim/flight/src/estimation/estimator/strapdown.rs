@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, N,
-    Row, Transition, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, N, Row, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::computer::memory::remembers;
@@ -73,7 +73,12 @@ impl Nominal {
             .chain(self.accelerometer_bias_m_s2.iter())
             .chain(self.wind_m_s.iter())
             .chain(self.gnss_offset_m.iter())
-            .chain([&self.barometer_offset_m, &self.barometer_ram, &self.gnss_time_tag_s, &self.barometer_late_s])
+            .chain([
+                &self.barometer_offset_m,
+                &self.barometer_ram,
+                &self.gnss_time_tag_s,
+                &self.barometer_late_s,
+            ])
             .all(|value| value.is_finite())
     }
 }

@@ -1,8 +1,8 @@
 //! Corrections by barometer, satellites and lidar, one scalar after the other.
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS,
-    POSITION, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY, WIND,
 };
 use super::history::Since;
 use super::{Estimator, GnssFix};
@@ -96,8 +96,9 @@ impl Estimator {
         if altitude_m.is_finite() {
             let state = &self.nominal;
             let late_m = state.barometer_late_s * state.velocity_m_s.z;
-            self.heights
-                .take_barometer(altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m);
+            self.heights.take_barometer(
+                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m,
+            );
         }
         if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
             self.gates.barometer.rejected_in_a_row = 0;

@@ -310,7 +310,8 @@ impl MotorEstimate {
         let by_shape_n = sensitivity[SHAPE];
         sensitivity[SHAPE] *= kept;
         let wandered = self.prior.shape_sigma * self.prior.shape_sigma * (1.0 - kept * kept);
-        let variance = product(&sensitivity, &(self.covariance * sensitivity)) + by_shape_n * by_shape_n * wandered;
+        let variance =
+            product(&sensitivity, &(self.covariance * sensitivity)) + by_shape_n * by_shape_n * wandered;
         PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
     }
 

@@ -49,8 +49,15 @@ struct Motor {
     wave: (f64, f64),
 }
 
-const GOOD: Motor =
-    Motor { impulse: 1.0, stretch: 1.0, ignition_s: 4.0, air: 1.0, spike: 1.0, out_s: f64::INFINITY, wave: (0.0, 1.0) };
+const GOOD: Motor = Motor {
+    impulse: 1.0,
+    stretch: 1.0,
+    ignition_s: 4.0,
+    air: 1.0,
+    spike: 1.0,
+    out_s: f64::INFINITY,
+    wave: (0.0, 1.0),
+};
 
 impl Motor {
     fn drawn(normal: &mut Normal) -> Self {
