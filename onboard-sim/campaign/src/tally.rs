@@ -6,6 +6,7 @@ use flight::rules::phase::Phase;
 use nmpc::SolveStatus;
 use world::{RestOutcome, Touchdown};
 
+use crate::attainable;
 use crate::row::Row;
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
@@ -131,6 +132,7 @@ impl Tally {
         let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
+        let attainable = attainable::window(self.flight.mission(), drawn);
         Row {
             number: self.number,
             impulse_scale: truth.impulse_scale,
@@ -149,6 +151,8 @@ impl Tally {
             apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
             apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
+            attainable_low_m: attainable.map(|window| window.low_m),
+            attainable_high_m: attainable.map(|window| window.high_m),
             ignited: ignition.is_some(),
             ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
             parachute: world.parachute_ejected(),
