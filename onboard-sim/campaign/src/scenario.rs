@@ -99,8 +99,8 @@ pub const EXPECTATIONS: &[Expectation] = &[
     expectation("fin-stuck:1@armed", Expected::Parachute, "the same, even seconds before the ignition"),
     expectation(
         "gimbal-slow:0.3@ignition",
-        Expected::Land,
-        "the gimbal loop has enough margin for a slow servo",
+        Expected::Degrade,
+        "three of four `field` flights land; the others are still turning at contact",
     ),
     expectation("gimbal-stuck@powered+0.5", Expected::Degrade, "the thrust brakes, but nothing steers"),
     expectation("no-light@0", Expected::Inhibit, "no thrust within half a second latches the inhibit"),
