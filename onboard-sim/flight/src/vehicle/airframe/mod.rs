@@ -120,7 +120,8 @@ mod tests {
     fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
         let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
         assert_eq!(airframe.igniter, Igniter { scatter_scale: 1.0 });
-        for (scale, ok) in [(0.0, true), (0.5, true), (3.0, true), (-0.1, false), (3.1, false), (f64::NAN, false)]
+        for (scale, ok) in
+            [(0.0, true), (0.5, true), (3.0, true), (-0.1, false), (3.1, false), (f64::NAN, false)]
         {
             airframe.igniter.scatter_scale = scale;
             let checked = airframe.validate();
