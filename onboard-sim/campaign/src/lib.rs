@@ -1,5 +1,6 @@
 //! Simulates thousands of flights on several threads and summarises how they end.
 //!
+//! * [`attainable`]: whether a clairvoyant could have landed a flight.
 //! * [`order`]: everything that a campaign's results depend on.
 //! * [`tally`]: flies one flight of a campaign and collects the values of its row.
 //! * [`row`]: one flight as a row of a table.
@@ -14,6 +15,7 @@
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
 //! run on any number of threads with the same results.
 
+pub mod attainable;
 pub mod order;
 pub mod picture;
 pub mod results;

@@ -34,8 +34,8 @@ impl Order {
     }
 }
 
-/// Version of the directory's layout and of the columns.
-const FORMAT: u32 = 1;
+/// Version of the directory's layout and of the columns. 2: the window of an attainable landing.
+pub(crate) const FORMAT: u32 = 2;
 
 /// The inputs from which the results in a directory were made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,6 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::attainable::Window;
+
 /// A cell's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value<'a> {
@@ -153,6 +155,11 @@ row! {
     apogee_tilt_deg: f64,
     /// Drawn: size of the rotation rate at apogee, degrees per second.
     apogee_rate_deg_s: f64,
+    /// Lowest height of the feet at the ignition command from which a clairvoyant lands this draw, m (see
+    /// [`crate::attainable`]); empty if there is none.
+    attainable_low_m: Option<f64>,
+    /// Highest such height, m.
+    attainable_high_m: Option<f64>,
     /// The landing motor was commanded to light.
     ignited: bool,
     /// The motor was commanded to light while a check of the ignition gate failed. This must never happen.
@@ -220,6 +227,12 @@ row! {
     error_height_m: f64,
     /// Largest error of the estimated direction of the nose below 10 m, degrees.
     error_nose_deg: f64,
+    /// Normalised error squared of the estimated impulse and burn time 3 s after the first thrust: chi-square with 2
+    /// degrees of freedom in a consistent filter.
+    nees_of_motor: Option<f64>,
+    /// Normalised error squared of estimated position, velocity and attitude, mean from the first thrust to contact: 9 in a
+    /// consistent filter.
+    nees_of_motion: Option<f64>,
     /// Faults that happened.
     faults: u64,
     /// Time from apogee until the vehicle was at rest, s.
@@ -227,6 +240,12 @@ row! {
 }
 
 impl Row {
+    /// The command heights from which a clairvoyant lands this draw.
+    pub fn attainable(&self) -> Option<Window> {
+        let (low_m, high_m) = (self.attainable_low_m?, self.attainable_high_m?);
+        Some(Window { low_m, high_m })
+    }
+
     /// The drawn columns in order, each with its nominal value if it has one.
     pub const DRAWN: [(&'static str, Option<f64>); 15] = [
         ("impulse_scale", Some(1.0)),

@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::order::{Manifest, Order, Shard};
+use crate::order::{FORMAT, Manifest, Order, Shard};
 use crate::picture::PICTURES;
 use crate::row::Row;
 use crate::table;
@@ -40,6 +40,15 @@ pub enum StoreError {
         /// The directory.
         path: PathBuf,
         difference: String,
+    },
+    /// A part of a campaign has the columns of another version of this program.
+    #[error(
+        "{path} has format {found}, this program merges format {FORMAT}; merge it with the program that flew it"
+    )]
+    OtherFormat {
+        /// The directory.
+        path: PathBuf,
+        found: u32,
     },
     /// A new campaign would overwrite an existing file.
     #[error("{path} already exists and belongs to no campaign; give another directory")]
@@ -234,6 +243,9 @@ pub fn merge(
         Ok(Manifest { shard: Shard::WHOLE, ..read_manifest(directory)? })
     };
     let manifest = whole(first)?;
+    if manifest.format != FORMAT {
+        return Err(StoreError::OtherFormat { path: first.clone(), found: manifest.format });
+    }
     for part in parts {
         if let Some(difference) = whole(part)?.difference(&manifest) {
             return Err(StoreError::OtherOrder { path: part.clone(), difference });

@@ -6,12 +6,15 @@ use flight::rules::phase::Phase;
 use nmpc::SolveStatus;
 use world::{RestOutcome, Touchdown};
 
+use crate::attainable;
 use crate::row::Row;
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
+/// By then the filter has seen most of the burn, and the plan can still use what it knows, s.
+const MOTOR_KNOWN_S: f64 = 3.0;
 
 /// A running flight, and the values collected for its row.
 pub struct Tally {
@@ -21,6 +24,9 @@ pub struct Tally {
     gimbal_limit_rad: f64,
     ignition: Option<AtIgnition>,
     onset: Option<(f64, f64)>,
+    nees_of_motor: Option<f64>,
+    /// Sum over frames, and their number.
+    nees_of_motion: (f64, u32),
     plans: [u64; ControlLevel::ALL.len()],
     solver_iterations: u64,
     solver_failures: u64,
@@ -50,6 +56,8 @@ impl Tally {
             gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
             ignition: None,
             onset: None,
+            nees_of_motor: None,
+            nees_of_motion: (0.0, 0),
             plans: [0; ControlLevel::ALL.len()],
             solver_iterations: 0,
             solver_failures: 0,
@@ -87,6 +95,15 @@ impl Tally {
         if self.onset.is_none() && world.thrust_n() > 0.0 {
             self.onset = Some((world.height_m(), world.state().velocity_m_s.z));
         }
+        let burning_s = world.thrust_begins_s().map_or(-1.0, |begins_s| world.time_s() - begins_s);
+        if burning_s >= 0.0 && world.touchdown().is_none() {
+            if let Some(nees) = flight.nees_of_motion() {
+                self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
+            }
+            if burning_s >= MOTOR_KNOWN_S && self.nees_of_motor.is_none() {
+                self.nees_of_motor = flight.nees_of_motor();
+            }
+        }
         let piloted = flight.computer().piloted().filter(|_| !flight.computer_is_dead());
         let Some((_, output)) = piloted else { return };
         if output.phase != Phase::Powered || world.touchdown().is_some() {
@@ -115,6 +132,7 @@ impl Tally {
         let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
+        let attainable = attainable::window(self.flight.mission(), drawn);
         Row {
             number: self.number,
             impulse_scale: truth.impulse_scale,
@@ -133,6 +151,8 @@ impl Tally {
             apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
             apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
+            attainable_low_m: attainable.map(|window| window.low_m),
+            attainable_high_m: attainable.map(|window| window.high_m),
             ignited: ignition.is_some(),
             ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
             parachute: world.parachute_ejected(),
@@ -169,6 +189,9 @@ impl Tally {
             error_lateral_m_s: errors.lateral_m_s,
             error_height_m: errors.height_m,
             error_nose_deg: errors.nose_rad.to_degrees(),
+            nees_of_motor: self.nees_of_motor,
+            nees_of_motion: (self.nees_of_motion.1 > 0)
+                .then(|| self.nees_of_motion.0 / f64::from(self.nees_of_motion.1)),
             faults: self.flight.faults_happened(),
             flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
         }

@@ -104,6 +104,10 @@ fn read_them(out: &Path) {
     let summary: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["legs"]["of"], FLIGHTS);
+    assert_eq!(summary["attainable"]["attainable"]["of"], FLIGHTS);
+    assert_eq!(summary["attainable"]["landed"]["of"], summary["attainable"]["attainable"]["count"]);
+    let markdown = fs::read_to_string(out.join("summary.md")).unwrap();
+    assert!(markdown.contains("landed of attainable"), "{markdown}");
     for file in
         FILES.iter().filter(|file| std::path::Path::new(file).extension().is_some_and(|kind| kind == "svg"))
     {
@@ -131,6 +135,15 @@ fn a_directory_of_another_order_or_in_use_is_refused_with_the_reason() {
     assert!(message.contains("its seed is `1`, this run's is `2`"), "{message}");
     let message = refused(&order_1, "other", Shard::WHOLE);
     assert!(message.contains("its program is `test`, this run's is `other`"), "{message}");
+    let manifest_json = root.path().join("manifest.json");
+    let text = fs::read_to_string(&manifest_json).unwrap();
+    fs::write(&manifest_json, text.replace("\"format\": 2", "\"format\": 1")).unwrap();
+    let message = refused(&order_1, "test", Shard::WHOLE);
+    assert!(message.contains("its format is `1`, this run's is `2`"), "{message}");
+    let parts = [root.path().to_owned()];
+    let error = merge(&parts, &root.path().join("whole"), |_, _, _| Ok(order_1.clone())).unwrap_err();
+    assert!(error.to_string().contains("format 1"), "{error}");
+    fs::write(&manifest_json, text).unwrap();
     let message = refused(&order_1, "test", Shard { index: 1, count: 2 });
     assert!(message.contains("its shard is `1/1`, this run's is `1/2`"), "{message}");
     let mut heavier = order_1.clone();

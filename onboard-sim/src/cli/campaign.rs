@@ -30,7 +30,7 @@ pub(crate) struct CampaignArguments {
     /// Built-in mission or TOML file.
     #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
     profile: String,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Number of flights; they are numbered from 0.

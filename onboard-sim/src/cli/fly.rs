@@ -57,7 +57,7 @@ pub(crate) struct FlyArguments {
     /// From apogee: which flight of the seed, as in campaign --only.
     #[arg(long, value_name = "NUMBER")]
     flight: Option<u64>,
-    /// From apogee: built-in set of dispersions (none, thrust-only, field, harsh) or TOML file [default: field].
+    /// From apogee: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
     #[arg(long, value_name = "NAME|FILE")]
     dispersion: Option<String>,
     /// From apogee: mean wind 10 m above the ground, m/s, instead of the set's.

@@ -37,6 +37,19 @@ pub(crate) struct Plume {
     pub(crate) fins: f64,
 }
 
+impl Plume {
+    /// The jet points upstream and pushes the air aside: wholly when its thrust exceeds the dynamic pressure on the base,
+    /// and in proportion below that. The ratio is the usual one for jets against the wind; that the effect is full at 1
+    /// is an assumption (this vehicle burns at about 15 until the tail-off).
+    pub(crate) fn new(truth: &Truth, thrust_n: f64, on_base_n: f64) -> Self {
+        if thrust_n <= 0.0 {
+            return Self { body: 1.0, fins: 1.0 };
+        }
+        let strength = if thrust_n > on_base_n { 1.0 } else { thrust_n / on_base_n };
+        Self { body: 1.0 - truth.plume_body_loss * strength, fins: 1.0 - truth.plume_fin_loss * strength }
+    }
+}
+
 /// The air and the vehicle's moving parts at one instant.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Flow {
@@ -97,6 +110,17 @@ impl Shape {
             fin_scale: truth.fin_drag_scale,
             scale: truth.drag_scale,
         }
+    }
+
+    /// Drag areas of a vehicle whose equally open fins have this sine: along the body, of the fins, and across the body,
+    /// m^2.
+    pub(crate) fn drag_areas_m2(&self, fin_sine: f64) -> [f64; 3] {
+        let fins_m2 = 4.0 * self.fins.reference_area_m2 * self.fins.drag_coefficient * fin_sine;
+        [
+            self.scale * self.axial_area_m2,
+            self.scale * self.fin_scale * fins_m2,
+            self.scale * STRIPS as f64 * self.strip_area_m2,
+        ]
     }
 
     /// The total force and moment of the air.

@@ -8,6 +8,7 @@
 //! * `body`, `aero`, `motor`, `servo`, `linkage`, `parachute`, [`ground`]: the parts, one model each.
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
+//! * [`vertical`]: the true vehicle's forces in a vertical fall through still air, for bounds on what is possible.
 //! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data.
 //! * [`fault`]: what can break in flight.
 
@@ -21,11 +22,13 @@ mod parachute;
 pub mod sensors;
 mod servo;
 pub mod truth;
+pub mod vertical;
 pub mod wind;
 pub mod world;
 
 pub use fault::Fault;
 pub use ground::{Rest, RestOutcome, Touchdown};
+pub use motor::TrueBurn;
 pub use truth::Truth;
 pub use world::{Actuators, World};
 

@@ -9,80 +9,47 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use crate::fault::Fault;
 use crate::truth::{SHAPE_TERMS, Truth};
 
-/// The true motor.
+/// The true burn over the time since the thrust began.
 #[derive(Debug, Clone)]
-pub(crate) struct Motor {
+pub struct TrueBurn {
     curve: ThrustCurve,
     impulse_scale: f64,
     burn_time_scale: f64,
-    ignition_delay_s: f64,
     shape: [f64; SHAPE_TERMS],
-    /// Time of the ignition command, s.
-    commanded_s: Option<f64>,
-    no_light: bool,
-    out_after_s: f64,
 }
 
-impl Motor {
-    pub(crate) fn new(curve: &ThrustCurve, truth: &Truth) -> Self {
+impl TrueBurn {
+    /// The burn of a motor file's curve as the truth changes it.
+    pub fn new(curve: &ThrustCurve, truth: &Truth) -> Self {
         Self {
             curve: curve.clone(),
             impulse_scale: truth.impulse_scale,
             burn_time_scale: truth.burn_time_scale,
-            ignition_delay_s: truth.ignition_delay_s,
             shape: truth.thrust_shape,
-            commanded_s: None,
-            no_light: false,
-            out_after_s: f64::INFINITY,
         }
     }
 
-    /// This motor with the curve and scales of `after`; `before` is the truth that it was built from. Faults stay, with
-    /// the same factor and delay.
-    pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
-        // Unchanged values keep their bits.
-        let impulse_scale = if after.impulse_scale.to_bits() == before.impulse_scale.to_bits() {
-            self.impulse_scale
-        } else {
-            after.impulse_scale * (self.impulse_scale / before.impulse_scale)
-        };
-        let ignition_delay_s = if after.ignition_delay_s.to_bits() == before.ignition_delay_s.to_bits() {
-            self.ignition_delay_s
-        } else {
-            after.ignition_delay_s + (self.ignition_delay_s - before.ignition_delay_s)
-        };
-        Self {
-            curve: after.curve.clone(),
-            impulse_scale,
-            burn_time_scale: after.burn_time_scale,
-            ignition_delay_s,
-            shape: after.shape,
-            ..self.clone()
-        }
-    }
-
-    /// Fires the igniter; only the first command counts.
-    pub(crate) fn ignite(&mut self, time_s: f64) {
-        self.commanded_s.get_or_insert(time_s);
-    }
-
-    /// When the thrust begins, s; `None` before the command, and for a motor that does not light.
-    pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
-        self.commanded_s.filter(|_| !self.no_light).map(|commanded_s| commanded_s + self.ignition_delay_s)
-    }
-
-    /// Time on the file's curve, s; negative before the thrust begins.
-    fn curve_time_s(&self, time_s: f64) -> f64 {
-        self.thrust_begins_s().map_or(-1.0, |begins_s| (time_s - begins_s) / self.burn_time_scale)
-    }
-
-    /// Thrust at a time, N.
-    pub(crate) fn thrust_n(&self, time_s: f64) -> f64 {
-        let curve_s = self.curve_time_s(time_s);
-        if curve_s * self.burn_time_scale >= self.out_after_s {
-            return 0.0;
-        }
+    /// Thrust, N; zero before and after the burn.
+    pub fn thrust_n(&self, burning_s: f64) -> f64 {
+        let curve_s = burning_s / self.burn_time_scale;
         self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s) * self.shape_at(curve_s).0
+    }
+
+    /// Propellant burnt so far, kg.
+    pub fn burnt_kg(&self, burning_s: f64) -> f64 {
+        let curve_s = burning_s / self.burn_time_scale;
+        let more_kg = self.shape_at(curve_s).1 * self.curve.propellant_mass_kg();
+        self.curve.propellant_burnt_kg(curve_s) + more_kg
+    }
+
+    /// How long the motor burns, s.
+    pub fn lasts_s(&self) -> f64 {
+        self.curve.burn_time_s() * self.burn_time_scale
+    }
+
+    /// Propellant burnt for each newton second, kg: the mass flow divided by the thrust.
+    fn flow_kg_n_s(&self) -> f64 {
+        self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
     }
 
     /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the impulse by which the
@@ -103,24 +70,85 @@ impl Motor {
         }
         (factor, more)
     }
+}
+
+/// The true motor with its igniter.
+#[derive(Debug, Clone)]
+pub(crate) struct Motor {
+    burn: TrueBurn,
+    ignition_delay_s: f64,
+    /// Time of the ignition command, s.
+    commanded_s: Option<f64>,
+    no_light: bool,
+    out_after_s: f64,
+}
+
+impl Motor {
+    pub(crate) fn new(curve: &ThrustCurve, truth: &Truth) -> Self {
+        Self {
+            burn: TrueBurn::new(curve, truth),
+            ignition_delay_s: truth.ignition_delay_s,
+            commanded_s: None,
+            no_light: false,
+            out_after_s: f64::INFINITY,
+        }
+    }
+
+    /// This motor with the curve and scales of `after`; `before` is the truth that it was built from. Faults stay, with
+    /// the same factor and delay.
+    pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
+        // Unchanged values keep their bits.
+        let (own_scale, new_scale) = (self.burn.impulse_scale, after.burn.impulse_scale);
+        let impulse_scale = if new_scale.to_bits() == before.impulse_scale.to_bits() {
+            own_scale
+        } else {
+            new_scale * (own_scale / before.impulse_scale)
+        };
+        let ignition_delay_s = if after.ignition_delay_s.to_bits() == before.ignition_delay_s.to_bits() {
+            self.ignition_delay_s
+        } else {
+            after.ignition_delay_s + (self.ignition_delay_s - before.ignition_delay_s)
+        };
+        let burn = TrueBurn { impulse_scale, ..after.burn.clone() };
+        Self { burn, ignition_delay_s, ..self.clone() }
+    }
+
+    /// Fires the igniter; only the first command counts.
+    pub(crate) fn ignite(&mut self, time_s: f64) {
+        self.commanded_s.get_or_insert(time_s);
+    }
+
+    /// When the thrust begins, s; `None` before the command, and for a motor that does not light.
+    pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
+        self.commanded_s.filter(|_| !self.no_light).map(|commanded_s| commanded_s + self.ignition_delay_s)
+    }
+
+    /// Time since the thrust began, s; negative before that.
+    fn burning_s(&self, time_s: f64) -> f64 {
+        self.thrust_begins_s().map_or(-1.0, |begins_s| time_s - begins_s)
+    }
+
+    /// Thrust at a time, N.
+    pub(crate) fn thrust_n(&self, time_s: f64) -> f64 {
+        let burning_s = self.burning_s(time_s);
+        if burning_s >= self.out_after_s { 0.0 } else { self.burn.thrust_n(burning_s) }
+    }
 
     /// Propellant burnt up to a time, kg. After an early burn-out the unburnt rest is not counted.
     pub(crate) fn burnt_kg(&self, time_s: f64) -> f64 {
-        let curve_s = self.curve_time_s(time_s).min(self.out_after_s / self.burn_time_scale);
-        let more_kg = self.shape_at(curve_s).1 * self.curve.propellant_mass_kg();
-        self.curve.propellant_burnt_kg(curve_s) + more_kg
+        self.burn.burnt_kg(self.burning_s(time_s).min(self.out_after_s))
     }
 
-    /// Propellant burnt for each newton second, kg: the mass flow divided by the thrust.
+    /// Propellant burnt for each newton second, kg.
     pub(crate) fn flow_kg_n_s(&self) -> f64 {
-        self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
+        self.burn.flow_kg_n_s()
     }
 
     pub(crate) fn break_down(&mut self, fault: &Fault) {
         match *fault {
             Fault::NoLight => self.no_light = true,
             Fault::LateLight { delay_s } => self.ignition_delay_s += delay_s.max(0.0),
-            Fault::WeakMotor { scale } => self.impulse_scale *= scale.clamp(0.01, 1.0),
+            Fault::WeakMotor { scale } => self.burn.impulse_scale *= scale.clamp(0.01, 1.0),
             Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
             Fault::GimbalStuck | Fault::GimbalSlow { .. } | Fault::FinStuck { .. } => {}
         }

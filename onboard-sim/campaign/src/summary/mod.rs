@@ -8,6 +8,7 @@ pub use text::{to_markdown, to_text};
 
 use serde::Serialize;
 
+use crate::attainable::{Window, best_height_m};
 use crate::order::Manifest;
 use crate::row::{Row, column};
 use crate::statistics::{Share, quantile, rank_correlation, sorted};
@@ -39,6 +40,8 @@ pub struct Summary {
     pub legs: Share,
     /// Flights that landed inside the landing paper's Table 2.
     pub strict: Share,
+    /// What a clairvoyant lands; `None` if it lands no flight.
+    pub attainable: Option<Attainable>,
     /// Why the others did not land within the limits of the legs, the most frequent reason first.
     pub failures: Vec<Failures>,
     /// Ignitions while a check of the gate failed. This must be zero.
@@ -48,6 +51,40 @@ pub struct Summary {
     pub distributions: Vec<Distribution>,
     /// Drawn quantities, beginning with the one that costs most landings.
     pub sensitivity: Vec<Sensitivity>,
+}
+
+/// What a clairvoyant lands, which commands the ignition at one height for all flights (see [`crate::attainable`]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Attainable {
+    /// Height of the feet at the command from which it lands most flights, m.
+    pub command_height_m: f64,
+    /// Flights that it lands.
+    pub attainable: Share,
+    /// Of these, the flights that landed within the limits of the legs.
+    pub landed: Share,
+    /// Flights that landed although they are not attainable from that height. Their controller chose another height for
+    /// each flight.
+    pub landed_from_another_height: u64,
+    /// Flights that landed although they are not attainable from any height. The bound leaves out wind and place, so
+    /// there can be a few.
+    pub landed_beyond: u64,
+}
+
+impl Attainable {
+    fn of(rows: &[Row]) -> Option<Self> {
+        let windows: Vec<Window> = rows.iter().filter_map(Row::attainable).collect();
+        let (command_height_m, _) = best_height_m(&windows)?;
+        let is = |row: &Row| row.attainable().is_some_and(|window| window.contains(command_height_m));
+        let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let attainable = count(&is);
+        Some(Self {
+            command_height_m,
+            attainable: Share::new(attainable, rows.len() as u64),
+            landed: Share::new(count(&|row| row.legs && is(row)), attainable),
+            landed_from_another_height: count(&|row| row.legs && !is(row) && row.attainable().is_some()),
+            landed_beyond: count(&|row| row.legs && row.attainable().is_none()),
+        })
+    }
 }
 
 /// A reason and the number of flights with it.
@@ -128,6 +165,7 @@ impl Summary {
             manifest: manifest.clone(),
             legs: Share::new(count(|row| row.legs), of),
             strict: Share::new(count(|row| row.strict), of),
+            attainable: Attainable::of(rows),
             failures: failures(rows),
             ignitions_outside_gate: count(|row| row.ignition_outside_gate),
             plans: Plans {

@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write};
 
-use super::{Distribution, Summary};
+use super::{Attainable, Distribution, Summary};
 use crate::order::{Manifest, Shard};
 use crate::statistics::Share;
 
@@ -30,6 +30,26 @@ fn percent(share: &Share) -> String {
         100.0 * share.low,
         100.0 * share.high
     )
+}
+
+/// What attainable means.
+const CLAIRVOYANT: &str = "attainable: a clairvoyant lands it with the legs. Its command height is the same for all \
+                           flights; once the thrust begins it knows the motor, the mass and the drag, and uses fins and \
+                           tilt as a throttle. Motion is vertical: wind, place and attitude dynamics are left out";
+
+/// The landings that the clairvoyant does not have.
+fn others(attainable: &Attainable) -> String {
+    match [attainable.landed_from_another_height, attainable.landed_beyond] {
+        [0, 0] => String::new(),
+        [chosen, beyond] => {
+            format!("; besides, {chosen} landed from another height, and {beyond} beyond what is attainable")
+        }
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let (first, rest) = text.split_at(1);
+    first.to_uppercase() + rest
 }
 
 fn what(manifest: &Manifest) -> String {
@@ -68,6 +88,16 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     writeln!(out, "{}", what(&summary.manifest))?;
     writeln!(out, "legs    {}", percent(&summary.legs))?;
     writeln!(out, "strict  {}", percent(&summary.strict))?;
+    if let Some(attainable) = &summary.attainable {
+        let Attainable { command_height_m, .. } = attainable;
+        writeln!(
+            out,
+            "attainable, ignition command at {command_height_m:.1} m  {}",
+            percent(&attainable.attainable)
+        )?;
+        writeln!(out, "landed of attainable  {}{}", percent(&attainable.landed), others(attainable))?;
+        writeln!(out, "({CLAIRVOYANT})")?;
+    }
     writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
     if !summary.failures.is_empty() {
         writeln!(out, "\nwhy not:")?;
@@ -123,6 +153,17 @@ fn markdown(summary: &Summary, out: &mut String) -> fmt::Result {
     writeln!(out, "Program `{}`. Intervals are Wilson's, 95 %.\n", manifest.build)?;
     writeln!(out, "| verdict | landed |\n|---|---|")?;
     writeln!(out, "| legs | {} |\n| strict | {} |\n", percent(&summary.legs), percent(&summary.strict))?;
+    if let Some(attainable) = &summary.attainable {
+        writeln!(out, "| one ignition height for all flights | flights |\n|---|---|")?;
+        let Attainable { command_height_m, .. } = attainable;
+        writeln!(
+            out,
+            "| attainable, command at {command_height_m:.1} m | {} |",
+            percent(&attainable.attainable)
+        )?;
+        writeln!(out, "| landed of attainable | {}{} |\n", percent(&attainable.landed), others(attainable))?;
+        writeln!(out, "{}.\n", capitalised(CLAIRVOYANT))?;
+    }
     writeln!(out, "Ignitions outside the gate: {}.\n", summary.ignitions_outside_gate)?;
     if !summary.failures.is_empty() {
         writeln!(out, "| why not | flights |\n|---|---|")?;

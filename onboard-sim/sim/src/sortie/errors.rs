@@ -1,6 +1,7 @@
 //! The estimate against the truth.
 
 use flight::estimation::estimator::Estimate;
+use flight::vehicle::rigid::RigidState;
 use world::World;
 
 use super::Sortie;
@@ -36,13 +37,33 @@ impl Sortie {
     /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
     pub fn nees_of_motion(&self) -> Option<f64> {
         self.measured.filter(|_| !self.dead)?;
-        self.pilot().estimator().nees_of_motion(self.world.state())
+        self.pilot().estimator().nees_of_motion(&self.over_the_ground())
+    }
+
+    /// The true state with its height above the ground below it, which is what a landing needs and what the lidar shows.
+    fn over_the_ground(&self) -> RigidState {
+        let mut state = *self.world.state();
+        state.position_m.z -= self.world.truth().ground_m(state.position_m.x, state.position_m.y);
+        state
+    }
+
+    /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
+    /// `None` if the pilot gets the truth instead of an estimate, and before the motor has lit. The accelerometer cannot
+    /// tell more impulse from less mass.
+    ///
+    /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
+    pub fn nees_of_motor(&self) -> Option<f64> {
+        self.measured.filter(|_| !self.dead)?;
+        let motor = self.pilot().motor();
+        motor.ignition_s()?;
+        let truth = self.world.truth();
+        motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
     }
 
     /// Errors of the estimate at this moment.
     pub fn errors(&self) -> EstimatorErrors {
         let Some(estimate) = self.pilot().estimate() else { return EstimatorErrors::default() };
-        let truth = self.world.state();
+        let truth = self.over_the_ground();
         let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
         EstimatorErrors {
             vertical_m_s: velocity.z.abs(),

@@ -184,21 +184,11 @@ impl World {
         Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + Vector3::from(self.truth.cg_offset_m)
     }
 
-    /// The exhaust's effect on the drag. The jet points upstream and pushes the air aside: wholly when its thrust exceeds
-    /// the dynamic pressure on the base, and in proportion below that. The ratio is the usual one for jets against the
-    /// wind; that the effect is full at 1 is an assumption (this vehicle burns at about 15 until the tail-off).
+    /// The exhaust's effect on the drag.
     fn plume(&self, time_s: f64, density_kg_m3: f64) -> Plume {
-        let thrust_n = self.motor.thrust_n(time_s);
-        if thrust_n <= 0.0 {
-            return Plume { body: 1.0, fins: 1.0 };
-        }
         let pressure_pa = 0.5 * density_kg_m3 * self.air_velocity_m_s().norm_squared();
         let on_base_n = pressure_pa * self.airframe.body.reference_area_m2;
-        let strength = if thrust_n > on_base_n { 1.0 } else { thrust_n / on_base_n };
-        Plume {
-            body: 1.0 - self.truth.plume_body_loss * strength,
-            fins: 1.0 - self.truth.plume_fin_loss * strength,
-        }
+        Plume::new(&self.truth, self.motor.thrust_n(time_s), on_base_n)
     }
 
     fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {

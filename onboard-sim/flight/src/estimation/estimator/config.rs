@@ -29,6 +29,8 @@ pub struct EstimatorConfig {
     pub accelerometer_bias_walk_mg_sqrt_s: f64,
     /// Barometer noise of one sample, m.
     pub barometer_m: f64,
+    /// Age of a barometer sample, the same for all of a flight, s; 0 takes samples for new.
+    pub barometer_late_s: f64,
     /// Wander of the barometer's offset, m in one second.
     pub barometer_offset_walk_m_sqrt_s: f64,
     /// Wander of the ram coefficient, in one second.
@@ -47,6 +49,11 @@ pub struct EstimatorConfig {
     pub gnss_vertical_walk_m_sqrt_s: f64,
     /// Lidar noise of one sample, m.
     pub lidar_m: f64,
+    /// Age of a lidar sample, the same for all of a flight, s.
+    pub lidar_late_s: f64,
+    /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor shows it: it is added to the
+    /// uncertainty of the attitude.
+    pub mounting_deg: f64,
     /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers that it falls through.
     pub wind_walk_m_s_sqrt_s: f64,
     /// Exponent of the wind's power law over height; the estimated wind decreases with it.
@@ -84,6 +91,7 @@ impl Default for EstimatorConfig {
             burning_accelerometer_mg_sqrt_hz: 0.0,
             accelerometer_bias_walk_mg_sqrt_s: 0.4,
             barometer_m: 0.08,
+            barometer_late_s: 0.0,
             barometer_offset_walk_m_sqrt_s: 0.03,
             barometer_ram_walk_sqrt_s: 0.001,
             gnss_horizontal_m: 0.2,
@@ -93,6 +101,8 @@ impl Default for EstimatorConfig {
             gnss_horizontal_walk_m_sqrt_s: 0.15,
             gnss_vertical_walk_m_sqrt_s: 0.25,
             lidar_m: 0.06,
+            lidar_late_s: 0.0,
+            mounting_deg: 0.0,
             wind_walk_m_s_sqrt_s: 0.5,
             wind_shear_exponent: 1.0 / 7.0,
             sideways_force_share: 0.1,
@@ -142,6 +152,9 @@ impl EstimatorConfig {
             }
         }
         let walks = [
+            ("barometer_late_s", self.barometer_late_s),
+            ("lidar_late_s", self.lidar_late_s),
+            ("mounting_deg", self.mounting_deg),
             ("gnss_time_tag_s", self.gnss_time_tag_s),
             ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),
             ("burning_accelerometer_mg_sqrt_hz", self.burning_accelerometer_mg_sqrt_hz),

@@ -3,14 +3,15 @@
 //! Error state, all small: position (0..3, world, m), velocity (3..6, world, m/s), attitude (6..9, rotation vector in
 //! the world, rad, `R = exp(dphi) R_est`), gyro bias (9..12, body, rad/s), accelerometer bias (12..15, body, m/s^2),
 //! wind (15..17, world x and y, m/s), barometer offset (17, m), ram coefficient (18), offset of the satellite position
-//! (19..22, world, m), error of the satellite fixes' time tags (22, s).
+//! (19..22, world, m), error of the satellite fixes' time tags (22, s),
+//! age of a barometer sample (23, s).
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::computer::memory::remembers;
 
 /// Length of the error state.
-pub(super) const N: usize = 23;
+pub(super) const N: usize = 24;
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -21,6 +22,7 @@ pub(super) const BAROMETER_OFFSET: usize = 17;
 pub(super) const BAROMETER_RAM: usize = 18;
 pub(super) const GNSS_OFFSET: usize = 19;
 pub(super) const GNSS_TIME_TAG: usize = 22;
+pub(super) const BAROMETER_LATE: usize = 23;
 
 /// A row of the covariance, and any other vector over the error state.
 pub(super) type Row = [f64; N];

@@ -23,6 +23,7 @@ remembers!(Nominal {
     barometer_ram,
     gnss_offset_m,
     gnss_time_tag_s,
+    barometer_late_s,
 });
 remembers!(Gates { imu, barometer, gnss_velocity, gnss_position, lidar, wind });
 remembers!(GateCounters { accepted, rejected, rejected_in_a_row });

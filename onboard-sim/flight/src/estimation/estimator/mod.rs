@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 23 numbers, is corrected by scalar measurements: barometer with offset and ram
+//! every frame. The error of the state, 24 numbers, is corrected by scalar measurements: barometer with offset, age and ram
 //! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
@@ -34,8 +34,8 @@ use nalgebra::{Vector2, Vector3};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET, GNSS_TIME_TAG,
-    GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
 };
 use self::gates::Surprise;
 pub use self::gates::{GateCounters, Gates};
@@ -213,10 +213,14 @@ impl Estimator {
     /// The estimate now.
     pub fn estimate(&self) -> Estimate {
         let time_s = self.time_s();
+        let mounting_rad = self.config.mounting_deg.to_radians();
         let sigmas = Sigmas {
             position_m: self.covariance.sigmas(POSITION),
             velocity_m_s: self.covariance.sigmas(VELOCITY),
-            attitude_rad: self.covariance.sigmas(ATTITUDE),
+            attitude_rad: self
+                .covariance
+                .sigmas(ATTITUDE)
+                .map(|sigma| if mounting_rad > 0.0 { libm::hypot(sigma, mounting_rad) } else { sigma }),
             gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),
             accelerometer_bias_m_s2: self.covariance.sigmas(ACCELEROMETER_BIAS),
             wind_m_s: self.covariance.sigmas(WIND).xy(),
@@ -264,8 +268,11 @@ impl Estimator {
         let error = nalgebra::SVector::<f64, 9>::from_iterator(
             position.iter().chain(velocity.iter()).chain(turn.iter()).copied(),
         );
-        let covariance =
-            nalgebra::SMatrix::<f64, 9, 9>::from_fn(|row, column| self.covariance.covariance(row, column));
+        let mounting_rad = self.config.mounting_deg.to_radians();
+        let covariance = nalgebra::SMatrix::<f64, 9, 9>::from_fn(|row, column| {
+            let mounted = if row == column && row >= ATTITUDE { mounting_rad * mounting_rad } else { 0.0 };
+            self.covariance.covariance(row, column) + mounted
+        });
         Some(error.dot(&covariance.cholesky()?.solve(&error)))
     }
 
@@ -308,5 +315,6 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[BAROMETER_RAM] = start.barometer_ram;
     sigmas[GNSS_OFFSET..GNSS_TIME_TAG].copy_from_slice(start.gnss_offset_m().as_slice());
     sigmas[GNSS_TIME_TAG] = config.gnss_time_tag_s;
+    sigmas[BAROMETER_LATE] = config.barometer_late_s;
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
 }

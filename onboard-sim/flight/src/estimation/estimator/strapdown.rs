@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, N,
-    Row, Transition, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, N, Row, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::computer::memory::remembers;
@@ -28,6 +28,7 @@ pub(super) struct Nominal {
     pub(super) barometer_ram: f64,
     pub(super) gnss_offset_m: Vector3<f64>,
     pub(super) gnss_time_tag_s: f64,
+    pub(super) barometer_late_s: f64,
 }
 
 impl Nominal {
@@ -43,6 +44,7 @@ impl Nominal {
             barometer_ram: 0.0,
             gnss_offset_m: Vector3::zeros(),
             gnss_time_tag_s: 0.0,
+            barometer_late_s: 0.0,
         }
     }
 
@@ -59,6 +61,7 @@ impl Nominal {
         self.barometer_ram += error[BAROMETER_RAM];
         self.gnss_offset_m += three(GNSS_OFFSET);
         self.gnss_time_tag_s += error[GNSS_TIME_TAG];
+        self.barometer_late_s += error[BAROMETER_LATE];
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -70,7 +73,12 @@ impl Nominal {
             .chain(self.accelerometer_bias_m_s2.iter())
             .chain(self.wind_m_s.iter())
             .chain(self.gnss_offset_m.iter())
-            .chain([&self.barometer_offset_m, &self.barometer_ram, &self.gnss_time_tag_s])
+            .chain([
+                &self.barometer_offset_m,
+                &self.barometer_ram,
+                &self.gnss_time_tag_s,
+                &self.barometer_late_s,
+            ])
             .all(|value| value.is_finite())
     }
 }

@@ -1,12 +1,14 @@
 //! Corrections by barometer, satellites and lidar, one scalar after the other.
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS,
-    POSITION, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
+    GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY, WIND,
 };
 use super::history::Since;
 use super::{Estimator, GnssFix};
 
+/// A late range is wrong in the same way in as many samples as come while the speed is about the same: 20 in 0.2 s.
+const LATE_SAMPLES: f64 = 20.0;
 /// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height.
 const LIDAR_COS_TILT: f64 = 0.65;
 /// Standard deviations that the filter adds when satellite velocities do not fit on average.
@@ -31,6 +33,11 @@ pub(super) struct Correction {
     /// Innovation squared divided by its variance; its expected value is 1.
     pub(super) normalised_squared: f64,
     pub(super) accepted: bool,
+}
+
+/// A sensitivity whose last entry is that of an error which the configuration may rule out.
+fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> &[(usize, f64)] {
+    &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
 }
 
 impl Estimator {
@@ -68,8 +75,9 @@ impl Estimator {
         let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
         let state = &self.nominal;
         let by_velocity = through_air * (-state.barometer_ram / gravity);
-        let predicted_m =
-            state.position_m.z + state.barometer_offset_m - state.barometer_ram * speed_height_m;
+        let predicted_m = state.position_m.z + state.barometer_offset_m
+            - state.barometer_ram * speed_height_m
+            - state.barometer_late_s * state.velocity_m_s.z;
         let sensitivity = [
             (POSITION + 2, 1.0),
             (VELOCITY, by_velocity.x),
@@ -79,14 +87,18 @@ impl Estimator {
             (WIND + 1, -by_velocity.y),
             (BAROMETER_OFFSET, 1.0),
             (BAROMETER_RAM, -speed_height_m),
+            (BAROMETER_LATE, -state.velocity_m_s.z),
         ];
+        let sensitivity = without_last_if(self.config.barometer_late_s <= 0.0, &sensitivity);
         let noise = self.config.barometer_m * self.config.barometer_m;
-        let correction = self.correct(&sensitivity, altitude_m - predicted_m, noise, |_| true);
+        let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
         self.gates.barometer.count(correction.accepted);
         if altitude_m.is_finite() {
             let state = &self.nominal;
-            self.heights
-                .take_barometer(altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m);
+            let late_m = state.barometer_late_s * state.velocity_m_s.z;
+            self.heights.take_barometer(
+                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m,
+            );
         }
         if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
             self.gates.barometer.rejected_in_a_row = 0;
@@ -117,7 +129,7 @@ impl Estimator {
                 (ACCELEROMETER_BIAS + 2, by_bias[(axis, 2)]),
                 (GNSS_TIME_TAG, -since.acceleration_m_s2[axis]),
             ];
-            let sensitivity = self.with_or_without_tag(&sensitivity);
+            let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
             let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
             let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s;
             let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
@@ -139,7 +151,7 @@ impl Estimator {
                 (GNSS_OFFSET + axis, 1.0),
                 (GNSS_TIME_TAG, -then_m_s),
             ];
-            let sensitivity = self.with_or_without_tag(&sensitivity);
+            let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
             let predicted =
                 self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
             let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
@@ -164,12 +176,6 @@ impl Estimator {
         self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &self.nominal.velocity_m_s)
     }
 
-    /// A fix's sensitivity; its last entry, the time tag's, counts only where the tags are not trusted.
-    fn with_or_without_tag<'s>(&self, sensitivity: &'s [(usize, f64)]) -> &'s [(usize, f64)] {
-        let trusted = self.config.gnss_time_tag_s <= 0.0;
-        &sensitivity[..sensitivity.len() - usize::from(trusted)]
-    }
-
     /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
     /// height divided by the cosine of the tilt.
     pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
@@ -185,7 +191,8 @@ impl Estimator {
             (ATTITUDE + 1, slant_m / nose.z * nose.x),
         ];
         let measured_m = range_m + behind_cg_m;
-        let noise = self.config.lidar_m * self.config.lidar_m;
+        let late_m = self.config.lidar_late_s * self.nominal.velocity_m_s.z;
+        let noise = self.config.lidar_m * self.config.lidar_m + late_m * late_m * LATE_SAMPLES;
         // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
         let correction = self.correct(&sensitivity, measured_m - slant_m, noise, |index| {
             !(ATTITUDE..ATTITUDE + 3).contains(&index)

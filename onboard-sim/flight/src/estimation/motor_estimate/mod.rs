@@ -300,9 +300,27 @@ impl MotorEstimate {
             }
             MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
         };
-        let (thrust_n, sensitivity) = self.thrust(curve, time_s - ignition_s);
-        let variance = product(&sensitivity, &(self.covariance * sensitivity));
+        // From the last sample on the deviation from the shape wanders.
+        let kept = match self.stage {
+            MotorStage::Waiting => 0.0,
+            _ => libm::exp(-(time_s - self.felt_at_s).max(0.0) / self.prior.shape_lasts_s),
+        };
+        let then = Self { mean: self.mean.component_mul(&Vector5::new(1.0, 1.0, 1.0, 1.0, kept)), ..*self };
+        let (thrust_n, mut sensitivity) = then.thrust(curve, time_s - ignition_s);
+        let by_shape_n = sensitivity[SHAPE];
+        sensitivity[SHAPE] *= kept;
+        let wandered = self.prior.shape_sigma * self.prior.shape_sigma * (1.0 - kept * kept);
+        let variance =
+            product(&sensitivity, &(self.covariance * sensitivity)) + by_shape_n * by_shape_n * wandered;
         PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
+    }
+
+    /// Normalised estimation error squared of impulse scale and burn-time stretch against the truth. In a consistent
+    /// filter it is chi-square with 2 degrees of freedom. `None` if the covariance has lost rank.
+    pub fn nees_of_scales(&self, impulse_scale: f64, burn_time_stretch: f64) -> Option<f64> {
+        let error = Vector2::new(impulse_scale, burn_time_stretch) - self.mean.fixed_rows::<2>(0);
+        let covariance = self.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        Some(error.dot(&covariance.cholesky()?.solve(&error)))
     }
 
     /// Thrust and its derivatives by the four, at a time since ignition.

@@ -45,10 +45,19 @@ struct Motor {
     spike: f64,
     /// The motor goes out, s after ignition.
     out_s: f64,
+    /// Deviation from the curve's shape: its size and its period, s.
+    wave: (f64, f64),
 }
 
-const GOOD: Motor =
-    Motor { impulse: 1.0, stretch: 1.0, ignition_s: 4.0, air: 1.0, spike: 1.0, out_s: f64::INFINITY };
+const GOOD: Motor = Motor {
+    impulse: 1.0,
+    stretch: 1.0,
+    ignition_s: 4.0,
+    air: 1.0,
+    spike: 1.0,
+    out_s: f64::INFINITY,
+    wave: (0.0, 1.0),
+};
 
 impl Motor {
     fn drawn(normal: &mut Normal) -> Self {
@@ -68,13 +77,17 @@ impl Motor {
             return 0.0;
         }
         let spike = if since_s < 0.05 { self.spike } else { 1.0 };
-        spike * self.impulse / self.stretch * Curve.thrust_n(since_s / self.stretch)
+        let wave = 1.0 + self.wave.0 * libm::sin(core::f64::consts::TAU * since_s / self.wave.1);
+        spike * wave * self.impulse / self.stretch * Curve.thrust_n(since_s / self.stretch)
     }
 
     /// Falls for four seconds, and burns until `end_s` after ignition.
     fn found_after(&self, end_s: f64, normal: &mut Normal) -> MotorEstimate {
-        let prior = MotorPrior::default();
-        let mut estimate = MotorEstimate::new(&prior);
+        self.found_by(&MotorPrior::default(), end_s, normal)
+    }
+
+    fn found_by(&self, prior: &MotorPrior, end_s: f64, normal: &mut Normal) -> MotorEstimate {
+        let mut estimate = MotorEstimate::new(prior);
         let frames = ((self.ignition_s + end_s) / prior.frame_s) as u32;
         for frame in 1..=frames {
             let time_s = f64::from(frame) * prior.frame_s;
@@ -151,6 +164,32 @@ fn future_thrust_is_predicted_within_its_stated_uncertainty() {
         assert!(mean < 1.0 + 4.0 * (2.0 / f64::from(n)).sqrt(), "after {end_s} s: {mean}");
         assert!(informed < before_share * before_share * ignorant, "after {end_s} s");
     }
+}
+
+/// Thrust that waves by 2 % around the curve. A filter that trusts the shape is far too sure of impulse and burn time;
+/// one that does not knows how little it knows.
+#[test]
+fn a_wrong_shape_is_no_surprise_to_a_filter_that_expects_one() {
+    let trusting = MotorPrior { roughness_share: 0.003, ..MotorPrior::default() };
+    let doubting = MotorPrior { shape_sigma: 0.015, shape_lasts_s: 0.7, ..trusting };
+    let mut normal = Normal(6);
+    let n = 100;
+    let outside = |prior: &MotorPrior, normal: &mut Normal| {
+        (0..n)
+            .filter(|number| {
+                let period_s = 1.5 + 0.02 * f64::from(*number);
+                let motor = Motor { wave: (0.02, period_s), ..Motor::drawn(normal) };
+                let estimate = motor.found_by(prior, 2.5, normal);
+                // 95 % of a chi-square with two degrees of freedom.
+                estimate.nees_of_scales(motor.impulse, motor.stretch).unwrap() > 5.991
+            })
+            .count()
+    };
+    let (trusting, doubting) = (outside(&trusting, &mut normal), outside(&doubting, &mut normal));
+    println!("truth outside the 95 % ellipse: {trusting} and {doubting} of {n}");
+    assert!(trusting > 50, "{trusting}");
+    // 5 expected; four standard deviations more are 14.
+    assert!(doubting <= 14, "{doubting}");
 }
 
 #[test]
