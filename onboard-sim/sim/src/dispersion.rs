@@ -17,9 +17,9 @@ pub struct Dispersion {
     pub impulse_even_share: f64,
     /// Burn time, as a fraction.
     pub burn_time_share: f64,
-    /// Ignition delay, s. The drawn delay is never below 20 ms.
+    /// Ignition delay of a single igniter, s; the airframe scales it. The drawn delay is never below 20 ms.
     pub ignition_delay_s: f64,
-    /// Ignition delay, s: uniform between minus and plus this value.
+    /// Ignition delay of a single igniter, s: uniform between minus and plus this value.
     pub ignition_delay_even_s: f64,
     /// Thrust misalignment in each axis, degrees.
     pub thrust_misalignment_deg: f64,

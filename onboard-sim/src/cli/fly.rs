@@ -27,7 +27,7 @@ const WIND_MAX_M_S: f64 = 30.0;
 
 #[derive(Args)]
 pub(crate) struct FlyArguments {
-    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2) at apogee.
+    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2, mk3) at apogee.
     #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
     profile: String,
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or

@@ -185,9 +185,9 @@ mod tests {
 
     #[test]
     fn a_file_that_is_neither_profile_nor_mission_is_refused() {
-        let words = load_flight("mk3").err().unwrap().to_string();
+        let words = load_flight("mk9").err().unwrap().to_string();
         assert!(
-            words.contains("mk3") && words.contains("mk2") && words.contains("paper-calibrated"),
+            words.contains("mk9") && words.contains("mk2") && words.contains("paper-calibrated"),
             "{words}"
         );
         let words = load_planar("mk2").err().unwrap().to_string();

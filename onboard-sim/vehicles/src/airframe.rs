@@ -5,6 +5,7 @@ use flight::vehicle::airframe::{Airframe, BadValue};
 /// The built-in airframes: name and TOML text.
 const BUILTIN: &[(&str, &str)] = &[
     ("mk2", include_str!("../airframes/mk2.toml")),
+    ("mk3", include_str!("../airframes/mk3.toml")),
     ("mk2-h53", include_str!("../airframes/mk2-h53.toml")),
     ("mini-f10", include_str!("../airframes/mini-f10.toml")),
 ];

@@ -19,6 +19,7 @@ const PAD_ALTITUDES_M: core::ops::RangeInclusive<f64> = -450.0..=6_000.0;
 /// The built-in missions: name and TOML text.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("mk2", include_str!("../missions/mk2.toml")),
+    ("mk3", include_str!("../missions/mk3.toml")),
     ("mk2-h53", include_str!("../missions/mk2-h53.toml")),
     ("mini-f10", include_str!("../missions/mini-f10.toml")),
 ];

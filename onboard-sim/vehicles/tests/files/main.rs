@@ -3,6 +3,7 @@
 
 mod airframe;
 mod mission;
+mod mk3_parts;
 mod motors;
 mod profile;
 mod thrust_curve;

@@ -8,7 +8,7 @@ mod sections;
 mod validate;
 
 pub use mass::{MassModel, MassProperties};
-pub use sections::{Body, FinData, Gimbal, Legs, Mass, Parachute, Servo};
+pub use sections::{Body, FinData, Gimbal, Igniter, Legs, Mass, Parachute, Servo};
 
 use alloc::string::String;
 
@@ -22,6 +22,9 @@ use crate::vehicle::fins::FinModel;
 pub struct Airframe {
     /// Name of a built-in landing motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
+    /// How the landing motor is lit. A single igniter if absent.
+    #[serde(default)]
+    pub igniter: Igniter,
     /// Masses and their positions.
     pub mass: Mass,
     /// The fuselage.
@@ -111,5 +114,19 @@ mod tests {
         airframe.gimbal.limit_deg = -3.0;
         let error = airframe.validate().unwrap_err().to_string();
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
+    }
+
+    #[test]
+    fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
+        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        assert_eq!(airframe.igniter, Igniter { scatter_scale: 1.0 });
+        for (scale, ok) in
+            [(0.0, true), (0.5, true), (3.0, true), (-0.1, false), (3.1, false), (f64::NAN, false)]
+        {
+            airframe.igniter.scatter_scale = scale;
+            let checked = airframe.validate();
+            assert_eq!(checked.is_ok(), ok, "{scale}");
+            assert!(ok || checked.unwrap_err().key == "igniter.scatter_scale");
+        }
     }
 }

@@ -2,6 +2,21 @@
 
 use serde::Deserialize;
 
+/// How the landing motor is lit.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Igniter {
+    /// Scatter of the ignition delay, as a multiple of that of a single igniter. Two in parallel have about half of it.
+    pub scatter_scale: f64,
+}
+
+impl Default for Igniter {
+    /// A single igniter.
+    fn default() -> Self {
+        Self { scatter_scale: 1.0 }
+    }
+}
+
 /// Masses with the landing motor full, and the place of the propellant.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -20,10 +20,16 @@ fn not_negative(key: &'static str, value: f64) -> Check {
 }
 
 pub(super) fn validate(airframe: &Airframe) -> Check {
+    igniter(airframe)?;
     masses(airframe)?;
     shape(airframe)?;
     actuators(airframe)?;
     recovery(airframe)
+}
+
+fn igniter(airframe: &Airframe) -> Check {
+    let scale = airframe.igniter.scatter_scale;
+    require((0.0..=3.0).contains(&scale), "igniter.scatter_scale", scale, "0 (no scatter) to 3")
 }
 
 fn masses(airframe: &Airframe) -> Check {

@@ -1,0 +1,24 @@
+//! The scatter of the ignition delay belongs to the vehicle's igniter.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use sim::draw::draw;
+use sim::recipe::Recipe;
+use world::truth::Truth;
+
+#[test]
+fn two_igniters_halve_the_deviation_of_the_delay_and_change_no_other_draw() {
+    let recipe = Recipe::built_in("mk2", "field").unwrap();
+    let single = &recipe.mission;
+    let mut double = single.clone();
+    double.airframe.igniter.scatter_scale = 0.5;
+    let nominal_s = Truth::default().ignition_delay_s;
+    for number in 0..20 {
+        let [one, two] = [single, &double].map(|mission| draw(mission, &recipe.dispersion, 1, number));
+        let (one_s, two_s) = (one.truth.ignition_delay_s, two.truth.ignition_delay_s);
+        // The least delay cuts off the tail of a single igniter.
+        let cut_off = one_s < 0.021;
+        assert!(cut_off || (two_s - nominal_s - 0.5 * (one_s - nominal_s)).abs() < 1e-12, "{number}");
+        let truth = Truth { ignition_delay_s: one_s, ..two.truth };
+        assert_eq!((truth, two.apogee, two.flight_seed), (one.truth, one.apogee, one.flight_seed));
+    }
+}
