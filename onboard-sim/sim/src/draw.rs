@@ -86,13 +86,13 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         gust_scale: sigma.gust_scale,
         ..nominal
     };
-    let truth = mismatched(truth, &sigma.mismatch, seed, number);
+    let truth = mismatched(&truth, &sigma.mismatch, seed, number);
     Draw { truth, apogee, flight_seed }
 }
 
 /// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
 /// generator of their own: a set without them draws what it always drew.
-fn mismatched(truth: Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
+fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
     let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_MISMATCH);
@@ -140,7 +140,7 @@ fn mismatched(truth: Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
         wind_exponent,
         wind_veer_rad_m,
         ground_rise,
-        ..truth
+        ..*truth
     }
 }
 

@@ -55,7 +55,7 @@ impl TrueBurn {
     /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the impulse by which the
     /// shape has changed what was given until then.
     fn shape_at(&self, curve_s: f64) -> (f64, f64) {
-        if self.shape == [0.0; SHAPE_TERMS] {
+        if self.shape.iter().all(|amplitude| *amplitude == 0.0) {
             return (1.0, 0.0);
         }
         let given = self.curve.propellant_burnt_kg(curve_s) / self.curve.propellant_mass_kg();

@@ -214,7 +214,7 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
     let burning = SensorTruth { burning: true, ejected_for_s: Some(0.3), ..falling(10.0, 2.5) };
     let altitude_m = (0..4).find_map(|_| one_frame(&mut sensors, &burning).pressure_altitude_m).unwrap();
     // The plume, and the ejection's pressure after one time constant.
-    assert!((altitude_m - (2.7 + 0.5 + 8.0 * (-1.0_f64).exp())).abs() < 1e-9, "{altitude_m}");
+    assert!((altitude_m - (2.7 + 0.5 + 8.0 * libm::exp(-1.0))).abs() < 1e-9, "{altitude_m}");
     assert!((0..40).all(|_| one_frame(&mut sensors, &burning).lidar_range_m.is_none()), "dust below 2 m");
 
     assert!(!sensors.contact(false) && !sensors.contact(true), "reported late");

@@ -99,7 +99,9 @@ fn legs_bounce_without_damping() {
 /// Ejected at full falling speed, the parachute is open after its delay and distance, and the vehicle sinks at 6 m/s.
 #[test]
 fn the_parachute_brings_the_vehicle_down_slowly() {
-    for (name, slowest, fastest) in [("mk2", 5.8, 6.3), ("mk3", 5.8, 6.3), ("mk2-h53", 5.8, 6.3), ("mini-f10", 5.8, 6.3)] {
+    for (name, slowest, fastest) in
+        [("mk2", 5.8, 6.3), ("mk3", 5.8, 6.3), ("mk2-h53", 5.8, 6.3), ("mini-f10", 5.8, 6.3)]
+    {
         let mut world = world(name, &Truth::default(), &RigidState::upright(400.0)).with_fins_at(FRAC_PI_2);
         world.advance(&OPEN, 5000);
         let from_m = world.height_m();
