@@ -1,5 +1,4 @@
 //! The scatter of the ignition delay belongs to the vehicle's igniter.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use sim::draw::draw;
 use sim::recipe::Recipe;
