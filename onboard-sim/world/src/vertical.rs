@@ -13,7 +13,6 @@ use crate::truth::Truth;
 pub struct Vertical {
     burn: TrueBurn,
     mass_model: MassModel,
-    mass_scale: f64,
     truth: Truth,
     /// Drag areas along the body, of the fins fully closed and fully open, and across the body, m^2.
     body_m2: f64,
@@ -56,7 +55,6 @@ impl Vertical {
         let cg_station_m = mass_model.at(0.0).cg_station_m + truth.cg_offset_m[0];
         Self {
             burn: TrueBurn::new(motor, truth),
-            mass_scale: truth.mass_scale,
             mass_model,
             truth: *truth,
             body_m2,
@@ -74,7 +72,7 @@ impl Vertical {
 
     /// Mass at a time since the thrust began, kg.
     pub fn mass_kg(&self, burning_s: f64) -> f64 {
-        self.mass_model.at(self.burn.burnt_kg(burning_s) * self.mass_scale).mass_kg
+        self.mass_model.at(self.burn.burnt_kg(burning_s) * self.truth.mass_scale).mass_kg
     }
 
     /// Distance from the feet up to the centre of gravity before ignition, m.

@@ -64,8 +64,8 @@ fn a_landed_vehicle_is_over_at_once_and_safed_when_its_motor_has_cooled() {
     assert!(!after.interlocks.armed);
 }
 
-#[test]
-fn a_motor_that_was_never_lit_is_live_until_its_pin_is_put_back() {
+/// A vehicle that was armed and started, and whose ignition gate will refuse its tilt.
+fn started_with_a_shut_gate() -> Told {
     let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     profile.gate.tilt_max_deg = 1.0;
     profile.dispersion.pitch_deg = 20.0;
@@ -73,6 +73,12 @@ fn a_motor_that_was_never_lit_is_live_until_its_pin_is_put_back() {
     vehicle.run_until(|v| v.phase() == Phase::PadIdle);
     vehicle.request(Asked::Arm);
     vehicle.request(Asked::Start);
+    vehicle
+}
+
+#[test]
+fn a_motor_that_was_never_lit_is_live_until_its_pin_is_put_back() {
+    let mut vehicle = started_with_a_shut_gate();
     let flown = vehicle.run_until(Vehicle::is_over);
     assert!(said(&flown, "LIVE MOTOR: do not approach for 60 s"), "{flown:?}");
     let mut later = Vec::new();
@@ -250,13 +256,7 @@ fn without_a_plan_an_abort_under_thrust_holds_upright() {
 /// Before the gate has opened nothing is left but the fall: 5 m/s at 15 m, and then hardly any drag.
 #[test]
 fn an_abort_with_the_gate_shut_says_how_hard_it_hits() {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.gate.tilt_max_deg = 1.0;
-    profile.dispersion.pitch_deg = 20.0;
-    let mut vehicle = vehicle_of(&profile);
-    vehicle.run_until(|v| v.phase() == Phase::PadIdle);
-    vehicle.request(Asked::Arm);
-    vehicle.request(Asked::Start);
+    let mut vehicle = started_with_a_shut_gate();
     vehicle.run_until(|v| v.phase() == Phase::LandArmed);
     let AbortEffect::Impact { m_s } = vehicle.snapshot().abort_effect else {
         panic!("{:?}", vehicle.snapshot().abort_effect)
@@ -281,13 +281,7 @@ fn an_abort_on_the_ground_is_refused_in_words() {
 
 #[test]
 fn a_gate_that_does_not_open_lights_nothing() {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.gate.tilt_max_deg = 1.0;
-    profile.dispersion.pitch_deg = 20.0;
-    let mut vehicle = vehicle_of(&profile);
-    vehicle.run_until(|v| v.phase() == Phase::PadIdle);
-    vehicle.request(Asked::Arm);
-    vehicle.request(Asked::Start);
+    let mut vehicle = started_with_a_shut_gate();
     let events = vehicle.run_until(Vehicle::is_over);
     assert!(!phases(&events).contains(&Phase::Ignition), "{:?}", phases(&events));
     assert!(!vehicle.judged().unwrap().landed);

@@ -1,3 +1,4 @@
+use flight::vehicle::mission::Mission;
 use flight::vehicle::site::Site;
 use vehicles::mission::{BUILTIN, from_toml, is_meant};
 
@@ -64,4 +65,14 @@ fn another_motor_brings_its_own_curve() {
     assert_eq!(other.airframe.motor, "G33");
     assert_eq!(other.motor_curve, vehicles::motors::builtin("G33").unwrap());
     assert_ne!(other.motor_curve, mission.motor_curve);
+}
+
+/// The two files repeat each other, so that each can be read and changed alone. Until a search finds better numbers for
+/// mk3, a number that changes in one of them has to change in the other.
+#[test]
+fn mk3_flies_with_the_numbers_of_mk2() {
+    let read = |name: &str| vehicles::mission::builtin(name).expect("built in").expect("sound");
+    let (mk2, mk3) = (read("mk2"), read("mk3"));
+    let (name, summary, airframe) = (mk2.name.clone(), mk2.summary.clone(), mk2.airframe.clone());
+    assert_eq!(Mission { name, summary, airframe, ..mk3 }, mk2);
 }

@@ -185,10 +185,9 @@ impl World {
     }
 
     /// The exhaust's effect on the drag.
-    fn plume(&self, time_s: f64, density_kg_m3: f64) -> Plume {
+    fn plume(&self, thrust_n: f64, density_kg_m3: f64) -> Plume {
         let pressure_pa = 0.5 * density_kg_m3 * self.air_velocity_m_s().norm_squared();
-        let on_base_n = pressure_pa * self.airframe.body.reference_area_m2;
-        Plume::new(&self.truth, self.motor.thrust_n(time_s), on_base_n)
+        Plume::new(&self.truth, thrust_n, pressure_pa * self.airframe.body.reference_area_m2)
     }
 
     fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
@@ -198,19 +197,20 @@ impl World {
             .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
         let arm_m = cg_m.x;
+        let thrust_n = [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s));
         let acting = Acting {
             shape: &self.shape,
             configuration: Configuration {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
                 parachute_area_m2: self.parachute.drag_area_m2(),
-                plume: self.plume(from_s + 0.5 * step_s, air.density_kg_m3),
+                plume: self.plume(thrust_n[1], air.density_kg_m3),
                 cg_m,
             },
             wind_m_s: self.wind.now_m_s(),
             density_kg_m3: air.density_kg_m3,
             density_gradient_kg_m4: air.density_gradient_kg_m4(),
             density_height_m: self.state.position_m.z,
-            thrust_n: [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s)),
+            thrust_n,
             thrust_direction: Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw),
             thrust_place_m: Vector3::new(0.0, self.truth.thrust_offset_m[0], self.truth.thrust_offset_m[1])
                 - cg_m,

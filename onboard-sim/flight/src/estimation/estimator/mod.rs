@@ -217,10 +217,7 @@ impl Estimator {
         let sigmas = Sigmas {
             position_m: self.covariance.sigmas(POSITION),
             velocity_m_s: self.covariance.sigmas(VELOCITY),
-            attitude_rad: self
-                .covariance
-                .sigmas(ATTITUDE)
-                .map(|sigma| if mounting_rad > 0.0 { libm::hypot(sigma, mounting_rad) } else { sigma }),
+            attitude_rad: self.covariance.sigmas(ATTITUDE).map(|sigma| libm::hypot(sigma, mounting_rad)),
             gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),
             accelerometer_bias_m_s2: self.covariance.sigmas(ACCELEROMETER_BIAS),
             wind_m_s: self.covariance.sigmas(WIND).xy(),

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 
 use super::*;
 
-const VEHICLE: VehicleNow = VehicleNow {
+/// A vehicle in its fall, with open fins.
+pub(super) const VEHICLE: VehicleNow = VehicleNow {
     mass_kg: 3.0,
     air_density_kg_m3: 1.2,
     body_drag_area_m2: 0.0043,

@@ -94,21 +94,12 @@ impl VehicleNow {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::VEHICLE;
     use super::*;
 
     #[test]
     fn val_hand_air_force() {
-        let vehicle = VehicleNow {
-            mass_kg: 3.0,
-            air_density_kg_m3: 1.2,
-            body_drag_area_m2: 0.0043,
-            fin_drag_area_m2: 0.031,
-            fin_lift_area_m2: Vector2::new(0.0, 0.002),
-            fin_ahead_of_cg_m: 0.11,
-            crossflow_area_m2: 0.09,
-            motor_burning: false,
-            lidar_behind_cg_m: 0.4,
-        };
+        let vehicle = VehicleNow { fin_lift_area_m2: Vector2::new(0.0, 0.002), ..VEHICLE };
         // 40 m/s down the axis and 3 m/s sideways: V = 40.112342. Body: 0.0043 V 40 along, 0.09 * 9 sideways.
         // Fins: 0.031 V (40, 3); lift: v x G with G = (0, 0, 0.002) is (3 * 0.002, 40 * 0.002, 0), times V.
         let force = vehicle.air_force_n(&Vector3::new(-40.0, 3.0, 0.0), &Vector3::zeros());

@@ -103,19 +103,8 @@ impl Estimator {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::VEHICLE;
     use super::*;
-
-    const VEHICLE: VehicleNow = VehicleNow {
-        mass_kg: 3.0,
-        air_density_kg_m3: 1.2,
-        body_drag_area_m2: 0.0043,
-        fin_drag_area_m2: 0.031,
-        fin_lift_area_m2: Vector2::new(0.0, 0.0),
-        fin_ahead_of_cg_m: 0.11,
-        crossflow_area_m2: 0.09,
-        motor_burning: false,
-        lidar_behind_cg_m: 0.4,
-    };
 
     #[test]
     fn the_slope_is_the_difference_quotient() {
