@@ -2,6 +2,7 @@
 //!
 //! A mission contains its airframe as a table, or names a built-in airframe.
 
+use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::airframe::BadValue;
 use flight::vehicle::mission::Mission;
 use serde::Deserialize;
@@ -42,6 +43,22 @@ pub enum MissionError {
         origin: String,
         #[source]
         source: BadValue,
+    },
+    /// What the mission expects of motor or exhaust is out of range.
+    #[error("{origin}")]
+    Expected {
+        /// Where the text came from.
+        origin: String,
+        #[source]
+        source: BadValue,
+    },
+    /// What the mission expects of the sensors is out of range.
+    #[error("{origin}")]
+    Estimator {
+        /// Where the text came from.
+        origin: String,
+        #[source]
+        source: EstimatorConfigError,
     },
     /// The countdown is out of range.
     #[error("{origin}: start.countdown_s = {found}: must be 0 to {COUNTDOWN_MAX_S}")]
@@ -84,6 +101,15 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         .airframe
         .validate()
         .map_err(|source| MissionError::Airframe { origin: origin.to_owned(), source })?;
+    mission
+        .motor
+        .validate()
+        .and_then(|()| mission.exhaust.validate())
+        .map_err(|source| MissionError::Expected { origin: origin.to_owned(), source })?;
+    mission
+        .estimator
+        .validate()
+        .map_err(|source| MissionError::Estimator { origin: origin.to_owned(), source })?;
     let countdown_s = mission.start.countdown_s;
     if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
         return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });

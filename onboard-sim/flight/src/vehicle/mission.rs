@@ -10,7 +10,7 @@ use crate::estimation::motor_estimate::MotorPrior;
 use crate::guidance::descent::DescentGains;
 use crate::guidance::ignition::IgnitionSettings;
 use crate::guidance::powered::PoweredSettings;
-use crate::vehicle::airframe::Airframe;
+use crate::vehicle::airframe::{Airframe, BadValue};
 use crate::vehicle::profile::{ArmingLimits, GateLimits, TouchdownBox};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -44,6 +44,21 @@ pub struct Exhaust {
     /// Of the body along its axis.
     pub body_loss: f64,
     pub fin_loss: f64,
+}
+
+impl Exhaust {
+    /// Checks that no more than all of the drag goes, and that it does not more than double.
+    ///
+    /// # Errors
+    /// [`BadValue`] names the first key with a wrong value.
+    pub fn validate(&self) -> Result<(), BadValue> {
+        for (key, found) in [("exhaust.body_loss", self.body_loss), ("exhaust.fin_loss", self.fin_loss)] {
+            if !(-1.0..=1.0).contains(&found) {
+                return Err(BadValue { key, found, required: "-1 to 1" });
+            }
+        }
+        Ok(())
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

@@ -76,3 +76,19 @@ fn mk3_flies_with_the_numbers_of_mk2() {
     let (name, summary, airframe) = (mk2.name.clone(), mk2.summary.clone(), mk2.airframe.clone());
     assert_eq!(Mission { name, summary, airframe, ..mk3 }, mk2);
 }
+
+#[test]
+fn an_expectation_out_of_range_is_named_in_the_error() {
+    let (name, text) = BUILTIN[0];
+    for (key, wrong, said) in [
+        ("shape_lasts_s", "0.0", "motor.shape_lasts_s is 0; a finite number above 0 is accepted"),
+        ("shape_sigma", "nan", "motor.shape_sigma is NaN; a finite number not below 0 is accepted"),
+        ("body_loss", "7.0", "exhaust.body_loss is 7; -1 to 1 is accepted"),
+        ("mounting_deg", "-2.0", "estimator: mounting_deg is -2, accepted is a finite number not below 0"),
+    ] {
+        let line = text.lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
+        let error = from_toml(&text.replace(line, &format!("{key} = {wrong}")), name).unwrap_err();
+        let source = std::error::Error::source(&error).unwrap().to_string();
+        assert_eq!(source, said);
+    }
+}
