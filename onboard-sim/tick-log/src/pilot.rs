@@ -4,6 +4,7 @@ use flight::computer::pilot::{PilotInput, PilotOutput, Sensed};
 use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
+use flight::estimation::motor_estimate::MotorEstimate;
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
@@ -147,7 +148,27 @@ pub fn estimate_to_log(estimate: &Estimate) -> v1::Estimate {
         inertial_height_sigma_m: estimate.heights.inertial_sigma_m,
         barometric_height_m: estimate.heights.barometric_m,
         health,
+        motor: None,
     }
+}
+
+/// The motor's estimate as a record; none before ignition.
+pub fn motor_to_log(motor: &MotorEstimate) -> Option<v1::MotorEstimate> {
+    let ignition_s = motor.ignition_s()?;
+    let [impulse_scale_sigma, burn_time_scale_sigma, ignition_sigma_s, air_scale_sigma, shape_deviation_sigma] =
+        motor.sigmas();
+    Some(v1::MotorEstimate {
+        impulse_scale: motor.impulse_scale(),
+        burn_time_scale: motor.burn_time_stretch(),
+        ignition_s,
+        air_scale: motor.air_scale(),
+        shape_deviation: motor.shape_deviation(),
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
+    })
 }
 
 /// The recorded estimate of a frame.

@@ -7,7 +7,7 @@ use flight::guidance::baseline::Controller;
 use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
 use nalgebra::Vector3;
-use protocol::log::flight_v1::{PilotStart, TruthSample};
+use protocol::log::flight_v1::{Estimate, PilotStart, TruthSample};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
@@ -17,7 +17,7 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use world::Touchdown;
 
-use crate::pilot::{estimate_to_log, state_to_log, tick_to_log, vector_to_log};
+use crate::pilot::{estimate_to_log, motor_to_log, state_to_log, tick_to_log, vector_to_log};
 
 /// The header of the log of a simulated flight.
 pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
@@ -63,7 +63,8 @@ pub fn frame(flight: &Sortie) -> Vec<Record> {
         let tick = tick_to_log(input, output, flight.computer().flight_digest());
         records.push(Record::PilotTick(Box::new(tick)));
         if let Some(estimate) = flight.pilot().estimate() {
-            records.push(Record::Estimate(Box::new(estimate_to_log(estimate))));
+            let motor = motor_to_log(flight.pilot().motor());
+            records.push(Record::Estimate(Box::new(Estimate { motor, ..estimate_to_log(estimate) })));
         }
     }
     records.push(Record::TruthSample(Box::new(truth(flight))));

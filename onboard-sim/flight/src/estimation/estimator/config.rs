@@ -51,6 +51,8 @@ pub struct EstimatorConfig {
     pub lidar_m: f64,
     /// Age of a lidar sample, the same for all of a flight, s.
     pub lidar_late_s: f64,
+    /// Slope of the ground about the pad, degrees; 0 takes it as level.
+    pub ground_slope_deg: f64,
     /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor shows it: it is added to the
     /// uncertainty of the attitude.
     pub mounting_deg: f64,
@@ -102,6 +104,7 @@ impl Default for EstimatorConfig {
             gnss_vertical_walk_m_sqrt_s: 0.25,
             lidar_m: 0.06,
             lidar_late_s: 0.0,
+            ground_slope_deg: 0.0,
             mounting_deg: 0.0,
             wind_walk_m_s_sqrt_s: 0.5,
             wind_shear_exponent: 1.0 / 7.0,
@@ -154,6 +157,7 @@ impl EstimatorConfig {
         let walks = [
             ("barometer_late_s", self.barometer_late_s),
             ("lidar_late_s", self.lidar_late_s),
+            ("ground_slope_deg", self.ground_slope_deg),
             ("mounting_deg", self.mounting_deg),
             ("gnss_time_tag_s", self.gnss_time_tag_s),
             ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),

@@ -4,14 +4,15 @@
 //! the world, rad, `R = exp(dphi) R_est`), gyro bias (9..12, body, rad/s), accelerometer bias (12..15, body, m/s^2),
 //! wind (15..17, world x and y, m/s), barometer offset (17, m), ram coefficient (18), offset of the satellite position
 //! (19..22, world, m), error of the satellite fixes' time tags (22, s),
-//! age of a barometer sample (23, s).
+//! age of a barometer sample (23, s), age of a lidar sample (24, s),
+//! slope of the ground (25..27, rise along world x and y).
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::computer::memory::remembers;
 
 /// Length of the error state.
-pub(super) const N: usize = 24;
+pub(super) const N: usize = 27;
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -23,6 +24,8 @@ pub(super) const BAROMETER_RAM: usize = 18;
 pub(super) const GNSS_OFFSET: usize = 19;
 pub(super) const GNSS_TIME_TAG: usize = 22;
 pub(super) const BAROMETER_LATE: usize = 23;
+pub(super) const LIDAR_LATE: usize = 24;
+pub(super) const SLOPE: usize = 25;
 
 /// A row of the covariance, and any other vector over the error state.
 pub(super) type Row = [f64; N];
@@ -65,8 +68,11 @@ impl Covariance {
         self.rows[index][index]
     }
 
-    pub(super) fn covariance(&self, row: usize, column: usize) -> f64 {
-        self.rows[row][column]
+    /// Covariance of two weighted sums of errors.
+    pub(super) fn between(&self, one: &[(usize, f64)], other: &[(usize, f64)]) -> f64 {
+        one.iter()
+            .flat_map(|(row, share)| other.iter().map(move |(column, part)| share * part * self.rows[*row][*column]))
+            .sum()
     }
 
     /// Standard deviations of three neighbouring errors.

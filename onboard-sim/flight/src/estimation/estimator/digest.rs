@@ -24,6 +24,8 @@ remembers!(Nominal {
     gnss_offset_m,
     gnss_time_tag_s,
     barometer_late_s,
+    lidar_late_s,
+    slope,
 });
 remembers!(Gates { imu, barometer, gnss_velocity, gnss_position, lidar, wind });
 remembers!(GateCounters { accepted, rejected, rejected_in_a_row });

@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 24 numbers, is corrected by scalar measurements: barometer with offset, age and ram
+//! every frame. The error of the state, 27 numbers, is corrected by scalar measurements: barometer with offset, age and ram
 //! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
@@ -35,7 +35,7 @@ use nalgebra::{Vector2, Vector3};
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET,
-    GNSS_TIME_TAG, GYRO_BIAS, N, POSITION, Row, VELOCITY, WIND,
+    GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
 };
 use self::gates::Surprise;
 pub use self::gates::{GateCounters, Gates};
@@ -215,7 +215,7 @@ impl Estimator {
         let time_s = self.time_s();
         let mounting_rad = self.config.mounting_deg.to_radians();
         let sigmas = Sigmas {
-            position_m: self.covariance.sigmas(POSITION),
+            position_m: Vector3::from_fn(|axis, _| libm::sqrt(self.over_ground_covariance(axis, axis).max(0.0))),
             velocity_m_s: self.covariance.sigmas(VELOCITY),
             attitude_rad: self.covariance.sigmas(ATTITUDE).map(|sigma| libm::hypot(sigma, mounting_rad)),
             gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),
@@ -225,7 +225,7 @@ impl Estimator {
         Estimate {
             time_s,
             state: RigidState {
-                position_m: self.nominal.position_m,
+                position_m: self.over_ground_m(),
                 velocity_m_s: self.nominal.velocity_m_s,
                 world_from_body: self.nominal.world_from_body,
                 rate_rad_s: self.rate_rad_s,
@@ -260,7 +260,7 @@ impl Estimator {
     /// it is chi-square with 9 degrees of freedom. `None` if the covariance has lost rank.
     pub fn nees_of_motion(&self, truth: &RigidState) -> Option<f64> {
         let turn = (truth.world_from_body * self.nominal.world_from_body.inverse()).scaled_axis();
-        let position = truth.position_m - self.nominal.position_m;
+        let position = truth.position_m - self.over_ground_m();
         let velocity = truth.velocity_m_s - self.nominal.velocity_m_s;
         let error = nalgebra::SVector::<f64, 9>::from_iterator(
             position.iter().chain(velocity.iter()).chain(turn.iter()).copied(),
@@ -268,9 +268,25 @@ impl Estimator {
         let mounting_rad = self.config.mounting_deg.to_radians();
         let covariance = nalgebra::SMatrix::<f64, 9, 9>::from_fn(|row, column| {
             let mounted = if row == column && row >= ATTITUDE { mounting_rad * mounting_rad } else { 0.0 };
-            self.covariance.covariance(row, column) + mounted
+            self.over_ground_covariance(row, column) + mounted
         });
         Some(error.dot(&covariance.cholesky()?.solve(&error)))
+    }
+
+    /// Position with the height over the ground below the vehicle, which a landing needs.
+    fn over_ground_m(&self) -> Vector3<f64> {
+        let position_m = self.nominal.position_m;
+        position_m - Vector3::z() * self.nominal.slope.dot(&position_m.xy())
+    }
+
+    /// Covariance of two errors of the motion, the height's over the ground below.
+    fn over_ground_covariance(&self, row: usize, column: usize) -> f64 {
+        let at_m = self.nominal.position_m;
+        let made_of = |index| match index == POSITION + 2 {
+            true => [(index, 1.0), (SLOPE, -at_m.x), (SLOPE + 1, -at_m.y)],
+            false => [(index, 1.0), (SLOPE, 0.0), (SLOPE + 1, 0.0)],
+        };
+        self.covariance.between(&made_of(row), &made_of(column))
     }
 
     fn velocity_through_air_m_s(&self) -> Vector3<f64> {
@@ -313,5 +329,7 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[GNSS_OFFSET..GNSS_TIME_TAG].copy_from_slice(start.gnss_offset_m().as_slice());
     sigmas[GNSS_TIME_TAG] = config.gnss_time_tag_s;
     sigmas[BAROMETER_LATE] = config.barometer_late_s;
+    sigmas[LIDAR_LATE] = config.lidar_late_s;
+    sigmas[SLOPE..].fill(libm::tan(config.ground_slope_deg.to_radians()));
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
 }

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
-    GNSS_TIME_TAG, GYRO_BIAS, N, Row, Transition, VELOCITY, WIND,
+    GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::computer::memory::remembers;
@@ -29,6 +29,9 @@ pub(super) struct Nominal {
     pub(super) gnss_offset_m: Vector3<f64>,
     pub(super) gnss_time_tag_s: f64,
     pub(super) barometer_late_s: f64,
+    pub(super) lidar_late_s: f64,
+    /// Rise of the ground along world x and y.
+    pub(super) slope: Vector2<f64>,
 }
 
 impl Nominal {
@@ -45,6 +48,8 @@ impl Nominal {
             gnss_offset_m: Vector3::zeros(),
             gnss_time_tag_s: 0.0,
             barometer_late_s: 0.0,
+            lidar_late_s: 0.0,
+            slope: Vector2::zeros(),
         }
     }
 
@@ -62,6 +67,8 @@ impl Nominal {
         self.gnss_offset_m += three(GNSS_OFFSET);
         self.gnss_time_tag_s += error[GNSS_TIME_TAG];
         self.barometer_late_s += error[BAROMETER_LATE];
+        self.lidar_late_s += error[LIDAR_LATE];
+        self.slope += Vector2::new(error[SLOPE], error[SLOPE + 1]);
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -73,11 +80,13 @@ impl Nominal {
             .chain(self.accelerometer_bias_m_s2.iter())
             .chain(self.wind_m_s.iter())
             .chain(self.gnss_offset_m.iter())
+            .chain(self.slope.iter())
             .chain([
                 &self.barometer_offset_m,
                 &self.barometer_ram,
                 &self.gnss_time_tag_s,
                 &self.barometer_late_s,
+                &self.lidar_late_s,
             ])
             .all(|value| value.is_finite())
     }

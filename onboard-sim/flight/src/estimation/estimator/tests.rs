@@ -155,6 +155,74 @@ fn a_state_that_is_not_a_number_restarts_from_the_last_good_one() {
     assert!((estimator.estimate().state.position_m.z - 5.0).abs() < 0.1);
 }
 
+/// Flies level over ground that rises by 2 % along x, at 8 m/s and 8 m above the pad's level, with exact sensors. Returns
+/// the estimated height over the ground less the true one, and the standard deviation that the filter has for it.
+fn height_error_over_a_slope(ground_slope_deg: f64) -> (f64, f64) {
+    const RISE: f64 = 0.02;
+    const SPEED_M_S: f64 = 8.0;
+    let config = EstimatorConfig { ground_slope_deg, ..EstimatorConfig::default() };
+    let start = RigidState { velocity_m_s: Vector3::x() * SPEED_M_S, ..RigidState::upright(8.0) };
+    let mut estimator = Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &start);
+    let mut over_ground_m = 8.0;
+    for frame in 1..=400 {
+        let time_s = frame as f64 * 0.005;
+        over_ground_m = 8.0 - RISE * SPEED_M_S * time_s;
+        let fix = |valid_at_s: f64| GnssFix {
+            position_m: Vector3::new(SPEED_M_S * valid_at_s, 0.0, 8.0),
+            velocity_m_s: Vector3::x() * SPEED_M_S,
+            valid_at_s,
+        };
+        let measurements = Measurements {
+            pressure_altitude_m: frame.is_multiple_of(4).then_some(8.0),
+            gnss: (frame > 40 && frame.is_multiple_of(40)).then(|| fix(time_s - 0.12)),
+            lidar_range_m: frame.is_multiple_of(2).then_some(over_ground_m - VEHICLE.lidar_behind_cg_m),
+            ..hovering(frame)
+        };
+        estimator.step(&measurements, &VEHICLE);
+    }
+    let estimate = estimator.estimate();
+    (estimate.state.position_m.z - over_ground_m, estimate.sigmas.position_m.z)
+}
+
+#[test]
+fn a_filter_that_expects_a_slope_is_not_deceived_by_it() {
+    let (level_m, level_sigma_m) = height_error_over_a_slope(0.0);
+    let (sloped_m, sloped_sigma_m) = height_error_over_a_slope(1.0);
+    assert!(sloped_m.abs() < 0.5 * level_m.abs(), "{sloped_m} m, level {level_m} m");
+    assert!(sloped_m.abs() < 2.0 * sloped_sigma_m, "{sloped_m} m with {sloped_sigma_m} m");
+    assert!(level_m.abs() > 2.0 * level_sigma_m, "the slope must matter: {level_m} m with {level_sigma_m} m");
+}
+
+#[test]
+fn a_filter_that_expects_a_late_lidar_finds_its_age() {
+    // Falling at 10 m/s with a lidar that is 10 ms late, the ranges are 0.1 m too long.
+    let config = EstimatorConfig { lidar_late_s: 0.005, ..EstimatorConfig::default() };
+    let start = RigidState { velocity_m_s: Vector3::z() * -20.0, ..RigidState::upright(20.0) };
+    let mut estimator = Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &start);
+    let late_s = 0.01;
+    // From 20 m/s to 8 m/s in 1.2 s: the changing speed tells the age from the height.
+    let braking_m_s2 = 10.0;
+    let at = |time_s: f64| {
+        (20.0 - 20.0 * time_s + 0.5 * braking_m_s2 * time_s * time_s, -20.0 + braking_m_s2 * time_s)
+    };
+    for frame in 1..=240 {
+        let time_s = frame as f64 * 0.005;
+        let (height_m, climb_m_s) = at(time_s);
+        let past_m = height_m - climb_m_s * late_s;
+        let mut measurements = hovering(frame);
+        measurements.imu.specific_force_m_s2.x += braking_m_s2;
+        measurements.pressure_altitude_m = None;
+        measurements.gnss = None;
+        measurements.lidar_range_m =
+            frame.is_multiple_of(2).then_some(past_m - VEHICLE.lidar_behind_cg_m);
+        estimator.step(&measurements, &VEHICLE);
+    }
+    let (height_m, _) = at(1.2);
+    let error_m = estimator.estimate().state.position_m.z - height_m;
+    assert!((estimator.nominal.lidar_late_s - late_s).abs() < 0.004, "{} s", estimator.nominal.lidar_late_s);
+    assert!(error_m.abs() < 0.05, "{error_m} m");
+}
+
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![
         5 => -50.0..50.0,
