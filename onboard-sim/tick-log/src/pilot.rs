@@ -155,8 +155,13 @@ pub fn estimate_to_log(estimate: &Estimate) -> v1::Estimate {
 /// The motor's estimate as a record; none before ignition.
 pub fn motor_to_log(motor: &MotorEstimate) -> Option<v1::MotorEstimate> {
     let ignition_s = motor.ignition_s()?;
-    let [impulse_scale_sigma, burn_time_scale_sigma, ignition_sigma_s, air_scale_sigma, shape_deviation_sigma] =
-        motor.sigmas();
+    let [
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
+    ] = motor.sigmas();
     Some(v1::MotorEstimate {
         impulse_scale: motor.impulse_scale(),
         burn_time_scale: motor.burn_time_stretch(),

@@ -71,7 +71,9 @@ impl Covariance {
     /// Covariance of two weighted sums of errors.
     pub(super) fn between(&self, one: &[(usize, f64)], other: &[(usize, f64)]) -> f64 {
         one.iter()
-            .flat_map(|(row, share)| other.iter().map(move |(column, part)| share * part * self.rows[*row][*column]))
+            .flat_map(|(row, share)| {
+                other.iter().map(move |(column, part)| share * part * self.rows[*row][*column])
+            })
             .sum()
     }
 

@@ -215,7 +215,9 @@ impl Estimator {
         let time_s = self.time_s();
         let mounting_rad = self.config.mounting_deg.to_radians();
         let sigmas = Sigmas {
-            position_m: Vector3::from_fn(|axis, _| libm::sqrt(self.over_ground_covariance(axis, axis).max(0.0))),
+            position_m: Vector3::from_fn(|axis, _| {
+                libm::sqrt(self.over_ground_covariance(axis, axis).max(0.0))
+            }),
             velocity_m_s: self.covariance.sigmas(VELOCITY),
             attitude_rad: self.covariance.sigmas(ATTITUDE).map(|sigma| libm::hypot(sigma, mounting_rad)),
             gyro_bias_rad_s: self.covariance.sigmas(GYRO_BIAS),

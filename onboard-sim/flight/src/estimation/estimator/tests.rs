@@ -64,7 +64,7 @@ fn a_turn_on_gyro_bias_found_on_the_pad_does_not_turn_the_attitude() {
         measurements
     };
     let mut alignment = alignment::PadAlignment::default();
-    for frame in 1..=400 {
+    for frame in 1..=400_u64 {
         alignment.take(&on_pad(frame).imu);
     }
     let pad = alignment.finish(0.0).unwrap();
@@ -100,7 +100,7 @@ fn a_silent_inertial_unit_is_bridged_and_then_makes_the_estimate_unhealthy() {
 #[test]
 fn an_outlier_is_rejected_and_counted() {
     let mut estimator = at(5.0);
-    for frame in 1..=400 {
+    for frame in 1..=400_u64 {
         estimator.step(&hovering(frame), &VEHICLE);
     }
     let before = estimator.estimate().state.position_m.z;
@@ -164,7 +164,7 @@ fn height_error_over_a_slope(ground_slope_deg: f64) -> (f64, f64) {
     let start = RigidState { velocity_m_s: Vector3::x() * SPEED_M_S, ..RigidState::upright(8.0) };
     let mut estimator = Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &start);
     let mut over_ground_m = 8.0;
-    for frame in 1..=400 {
+    for frame in 1..=400_u64 {
         let time_s = frame as f64 * 0.005;
         over_ground_m = 8.0 - RISE * SPEED_M_S * time_s;
         let fix = |valid_at_s: f64| GnssFix {
@@ -193,34 +193,36 @@ fn a_filter_that_expects_a_slope_is_not_deceived_by_it() {
     assert!(level_m.abs() > 2.0 * level_sigma_m, "the slope must matter: {level_m} m with {level_sigma_m} m");
 }
 
-#[test]
-fn a_filter_that_expects_a_late_lidar_finds_its_age() {
-    // Falling at 10 m/s with a lidar that is 10 ms late, the ranges are 0.1 m too long.
-    let config = EstimatorConfig { lidar_late_s: 0.005, ..EstimatorConfig::default() };
+/// Brakes from 20 m/s to 8 m/s with a lidar that is 10 ms late, and otherwise only an exact inertial unit. Returns the
+/// error of the estimated height and the standard deviation that the filter has for it.
+fn height_error_with_a_late_lidar(lidar_late_s: f64) -> (f64, f64) {
+    const LATE_S: f64 = 0.01;
+    const BRAKING_M_S2: f64 = 10.0;
+    let config = EstimatorConfig { lidar_late_s, ..EstimatorConfig::default() };
     let start = RigidState { velocity_m_s: Vector3::z() * -20.0, ..RigidState::upright(20.0) };
     let mut estimator = Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &start);
-    let late_s = 0.01;
-    // From 20 m/s to 8 m/s in 1.2 s: the changing speed tells the age from the height.
-    let braking_m_s2 = 10.0;
-    let at = |time_s: f64| {
-        (20.0 - 20.0 * time_s + 0.5 * braking_m_s2 * time_s * time_s, -20.0 + braking_m_s2 * time_s)
-    };
-    for frame in 1..=240 {
+    let height_m = |time_s: f64| 20.0 - 20.0 * time_s + 0.5 * BRAKING_M_S2 * time_s * time_s;
+    for frame in 1..=240_u64 {
         let time_s = frame as f64 * 0.005;
-        let (height_m, climb_m_s) = at(time_s);
-        let past_m = height_m - climb_m_s * late_s;
+        let late_m = height_m(time_s - LATE_S);
         let mut measurements = hovering(frame);
-        measurements.imu.specific_force_m_s2.x += braking_m_s2;
+        measurements.imu.specific_force_m_s2.x += BRAKING_M_S2;
         measurements.pressure_altitude_m = None;
         measurements.gnss = None;
-        measurements.lidar_range_m =
-            frame.is_multiple_of(2).then_some(past_m - VEHICLE.lidar_behind_cg_m);
+        measurements.lidar_range_m = frame.is_multiple_of(2).then_some(late_m - VEHICLE.lidar_behind_cg_m);
         estimator.step(&measurements, &VEHICLE);
     }
-    let (height_m, _) = at(1.2);
-    let error_m = estimator.estimate().state.position_m.z - height_m;
-    assert!((estimator.nominal.lidar_late_s - late_s).abs() < 0.004, "{} s", estimator.nominal.lidar_late_s);
-    assert!(error_m.abs() < 0.05, "{error_m} m");
+    let estimate = estimator.estimate();
+    (estimate.state.position_m.z - height_m(1.2), estimate.sigmas.position_m.z)
+}
+
+#[test]
+fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
+    let (expecting_m, expecting_sigma_m) = height_error_with_a_late_lidar(0.01);
+    assert!(expecting_m.abs() < 2.0 * expecting_sigma_m, "{expecting_m} m with {expecting_sigma_m} m");
+    let (trusting_m, trusting_sigma_m) = height_error_with_a_late_lidar(0.0);
+    assert!(trusting_m.abs() > 3.0 * trusting_sigma_m, "{trusting_m} m with {trusting_sigma_m} m");
+    assert!(expecting_m.abs() < trusting_m.abs(), "{expecting_m} m, trusting {trusting_m} m");
 }
 
 fn any_number() -> impl Strategy<Value = f64> {
