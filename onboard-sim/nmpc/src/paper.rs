@@ -47,7 +47,6 @@ pub(crate) fn problem(initial: PlanarState, intervals: usize) -> Problem {
             u_max_m_s: -0.05,
             w_m_s: 0.03,
             pitch_rate_deg_s: 0.5,
-            w_opening_m_s2: 0.0,
         }),
         altitude_min_m: None,
         floor_rise_m_s: 0.0,

@@ -23,10 +23,6 @@ pub struct FinalBox {
     pub w_m_s: f64,
     /// Largest pitch rate, degrees per second.
     pub pitch_rate_deg_s: f64,
-    /// By how much the limit of the lateral speed is larger for each second before the end, m/s^2: what leans within the
-    /// limit of the pitch error still take away.
-    #[serde(default)]
-    pub w_opening_m_s2: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -207,10 +203,8 @@ impl Problem {
             conditions.extend(between(end, U, limits.u_min_m_s, limits.u_max_m_s));
             // From the end backwards, so that a horizon that is too short for all nodes keeps the order of the others.
             for node in (1..=end).rev().take(limits.settled_nodes) {
-                let before_s = (end - node) as f64 * self.step_s;
-                let speed_m_s = limits.w_m_s + limits.w_opening_m_s2 * before_s;
                 conditions.extend(about(node, THETA, target.theta_rad, tilt));
-                conditions.extend(about(node, W, target.w_m_s, speed_m_s));
+                conditions.extend(about(node, W, target.w_m_s, limits.w_m_s));
                 conditions.extend(about(node, Q, target.q_rad_s, rate));
             }
         }
@@ -242,32 +236,5 @@ impl Problem {
             && self.mass_kg.iter().all(|mass| mass.is_finite() && *mass > 0.0)
             && self.floor_rise_m_s.is_finite()
             && self.gimbal_limit_rad.is_finite()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::dynamics::PlanarState;
-
-    #[test]
-    fn val_hand_the_limit_of_the_lateral_speed_opens_before_the_end() {
-        let mut problem = crate::paper::problem(PlanarState::default(), 10);
-        if let Some(limits) = &mut problem.final_box {
-            limits.w_opening_m_s2 = 2.0;
-        }
-        let limits_of = |component: usize| -> Vec<f64> {
-            let conditions = problem.conditions();
-            let highest = conditions.iter().filter(|row| row.component == component && row.sign < 0.0);
-            highest.map(|row| -row.offset).collect()
-        };
-        // 0.03 m/s at the end, and 0.1 m/s more for each sample of 0.05 s before.
-        let step_m_s = 2.0 * problem.step_s;
-        for (found, expected) in limits_of(W).iter().zip([0.03, 0.03 + step_m_s, 0.03 + 2.0 * step_m_s]) {
-            assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
-        }
-        assert_eq!(limits_of(W).len(), 3);
-        let rates = limits_of(Q);
-        assert!(rates.iter().all(|rate| *rate == rates[0]), "{rates:?}");
     }
 }

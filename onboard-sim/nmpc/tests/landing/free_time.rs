@@ -77,7 +77,6 @@ fn study(gimbal_deg: f64) -> FreeTimeProblem {
         u_max_m_s: -0.1,
         w_m_s: 0.03,
         pitch_rate_deg_s: 1.0,
-        w_opening_m_s2: 0.0,
     });
     FreeTimeProblem {
         landing,

@@ -158,12 +158,6 @@ fn nmpc(profile: &Profile) -> Check {
         )?;
         positive("nmpc.limits.final.w_m_s", end.w_m_s)?;
         positive("nmpc.limits.final.pitch_rate_deg_s", end.pitch_rate_deg_s)?;
-        require(
-            end.w_opening_m_s2.is_finite() && end.w_opening_m_s2 >= 0.0,
-            "nmpc.limits.final.w_opening_m_s2",
-            end.w_opening_m_s2,
-            "finite and not below 0",
-        )?;
     }
     let solver = &nmpc.solver;
     require(
