@@ -284,9 +284,9 @@ impl Estimator {
     /// Covariance of two errors of the motion, the height's over the ground below.
     fn over_ground_covariance(&self, row: usize, column: usize) -> f64 {
         let at_m = self.nominal.position_m;
-        let made_of = |index| match index == POSITION + 2 {
-            true => [(index, 1.0), (SLOPE, -at_m.x), (SLOPE + 1, -at_m.y)],
-            false => [(index, 1.0), (SLOPE, 0.0), (SLOPE + 1, 0.0)],
+        let made_of = |index| {
+            let slope = if index == POSITION + 2 { -at_m.xy() } else { Vector2::zeros() };
+            [(index, 1.0), (SLOPE, slope.x), (SLOPE + 1, slope.y)]
         };
         self.covariance.between(&made_of(row), &made_of(column))
     }
