@@ -5,6 +5,7 @@ use alloc::boxed::Box;
 
 use super::motor_watch::MotorWatch;
 use super::news::Readiness;
+use super::pilot::BoosterCommands;
 use super::plane::{Moment, PlanarLaw, Plane, PlaneError};
 use super::self_test::SelfTest;
 use super::space::Space;
@@ -79,6 +80,7 @@ impl Computer {
                 fins_rad: [closed_rad; 4],
                 ignite: false,
                 parachute: false,
+                booster: BoosterCommands::default(),
             },
             self_test: SelfTest::NotBegun,
             readiness: Readiness::default(),

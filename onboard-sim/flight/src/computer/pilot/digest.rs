@@ -10,6 +10,8 @@ remembers!(Pilot {
     known,
     estimator,
     estimate,
+    ascent,
+    apogee_m,
     ignited_at_s,
     outlook,
     powered,
