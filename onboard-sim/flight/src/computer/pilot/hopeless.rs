@@ -79,7 +79,7 @@ impl Pilot {
             || found.predicted_touchdown_x_m > limits.fence_radius_m
             || found.height_disagreement_m > FAR_BEYOND * limits.height_disagreement_max_m
             || speed_error_m_s > FAR_BEYOND * limits.speed_error_max_fraction * found.predicted_speed_m_s
-            || self.outlook.ignition.band.is_none()
+            || !self.outlook.lands_ahead
     }
 }
 

@@ -20,7 +20,7 @@ mod step;
 pub(super) use ascent::{AscentWatch, axial_m_s2};
 use fin_watch::FinWatch;
 use known::Known;
-pub use outlook::{Outlook, touchdown_m};
+pub use outlook::{ApogeeAhead, Outlook, apogee_ahead, touchdown_from_below_m, touchdown_m};
 
 use nalgebra::Vector3;
 
@@ -33,6 +33,7 @@ use crate::guidance::powered::{PoweredGuidance, PoweredReport};
 use crate::rules::phase::Phase;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::mission::Mission;
+use crate::vehicle::profile::StartPoint;
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
@@ -135,7 +136,10 @@ impl Pilot {
             estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
             estimate: None,
             ascent: AscentWatch::default(),
-            apogee_m: mission.start.height_m,
+            apogee_m: match mission.start.at {
+                StartPoint::Drone => believed.position_m.z,
+                _ => mission.start.height_m,
+            },
             ignited_at_s: None,
             outlook: Outlook::default(),
             powered: PoweredGuidance::new(mission.powered),

@@ -191,6 +191,14 @@ impl Pilot {
             vertical_m_s,
             fins_m2,
         );
+        let lands_ahead = ignition.band.is_some()
+            || self.known.mission.ignition.lands_ahead(
+                &column,
+                &self.known.mission.motor_curve,
+                height_m,
+                vertical_m_s,
+                fins_m2,
+            );
         let parachute = &self.known.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
         // The speed after the fall from apogee so far, with drag as certified.
@@ -206,6 +214,7 @@ impl Pilot {
                 parachute.inflation_distance_m,
             ),
             height_m,
+            lands_ahead,
             predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
             touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
         };
