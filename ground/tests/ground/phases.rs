@@ -28,8 +28,8 @@ fn regress_countdown() {
 }
 
 #[test]
-fn regress_coast() {
-    snapshot("coast", &coasting());
+fn regress_ascent() {
+    snapshot("ascent", &coasting());
 }
 
 /// The ascent shares the key of the descent, and gives way to it at apogee.
