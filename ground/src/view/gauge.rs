@@ -27,8 +27,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
     let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
     let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
-    let apogee = descent.and_then(|d| finite(f64::from(d.value.apogee_m)).filter(|apogee_m| *apogee_m > 0.0));
-    let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
+    // On the way up there is no commit height yet, and on the way down no apogee any more.
+    let above_ground = |height: f32| finite(f64::from(height)).filter(|height_m| *height_m > 0.0);
+    let apogee = descent.and_then(|d| above_ground(d.value.apogee_m));
+    let commit = descent.and_then(|d| above_ground(d.value.commit_height_m));
     let lost = predict_position(&model.vehicle, now);
     let (height, mark, role) = match (lost, model.vehicle.height_m()) {
         (Some(at), _) => (finite(at.altitude_m), "pred ", TextRole::Stale),

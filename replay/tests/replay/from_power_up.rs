@@ -8,6 +8,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
+use flight::vehicle::profile::StartPoint;
 use onboard_sim::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use proptest::prelude::*;
 use protocol::log::record::Record;
@@ -58,8 +59,13 @@ impl Flown {
     }
 
     fn in_space(crew: &[Reached], faults: &[&str]) -> Self {
+        Self::from(StartPoint::Apogee, crew, faults)
+    }
+
+    fn from(start: StartPoint, crew: &[Reached], faults: &[&str]) -> Self {
         let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-        let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap() };
+        let recipe =
+            Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
         let toml = recipe.mission_toml.clone();
         Self::fly(Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), &toml, crew)
     }
@@ -172,6 +178,27 @@ fn both_vehicles_verify_from_power_up_to_safed() {
         assert_eq!(report.outcome, Verification::Identical, "{report:?}");
         assert_eq!(all_frames_identical(&report), flown.frames());
         assert!(report.ticks_compared > 60);
+    }
+}
+
+/// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and with a booster that
+/// stays; and from below a drone.
+#[test]
+fn flights_from_the_pad_and_from_a_drone_verify() {
+    let started = armed_and_started(2_600);
+    let mut aborted = started.clone();
+    aborted.push(asked(4_000, Asked::Abort));
+    for (start, crew, faults, passed) in [
+        (StartPoint::Pad, &started, &[][..], Phase::Powered),
+        (StartPoint::Pad, &aborted, &[], Phase::Chute),
+        (StartPoint::Pad, &started, &["reboot:0.4@boost+0.5"], Phase::AeroDescent),
+        (StartPoint::Pad, &started, &["separation-fails@0"], Phase::Chute),
+        (StartPoint::Drone, &started, &[], Phase::AeroDescent),
+    ] {
+        let flown = Flown::from(start, crew, faults);
+        assert!(flown.phases.contains(&passed), "{start:?} {faults:?}: {:?}", flown.phases);
+        assert_eq!(flown.phases.contains(&Phase::Boost), start == StartPoint::Pad);
+        all_frames_identical(&flown.verified());
     }
 }
 

@@ -137,7 +137,11 @@ impl Pilot {
             estimate: None,
             ascent: AscentWatch::default(),
             apogee_m: match mission.start.at {
-                StartPoint::Drone => believed.position_m.z,
+                // The fall is felt a moment after it began.
+                StartPoint::Drone => {
+                    let falls_m_s = believed.velocity_m_s.z;
+                    believed.position_m.z + 0.5 * falls_m_s * falls_m_s / mission.gravity_m_s2
+                }
                 _ => mission.start.height_m,
             },
             ignited_at_s: None,

@@ -18,6 +18,7 @@ use crate::rules::phase::{Effect, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::fins::Moments;
+use crate::vehicle::profile::StartPoint;
 
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
@@ -63,7 +64,9 @@ impl Pilot {
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         self.feel(table.mode().phase, input, &estimate, density_kg_m3);
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
-        let far = table.mode().phase == Phase::AeroDescent;
+        // A drop lasts for two seconds or three, and its speed changes all the time.
+        let dropped = self.known.mission.start.at == StartPoint::Drone;
+        let far = table.mode().phase == Phase::AeroDescent && !dropped;
         let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
         // Without an outlook, right after apogee and after a restart, an abort would not know whether the parachute has
         // room.
