@@ -74,3 +74,21 @@ impl<const N: usize> Curvature<N> for [[f64; N]; N] {
         from_fn(|i| self[i].iter().zip(vector).map(|(entry, value)| entry * value).sum())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_diagonal_acts_like_the_whole_matrix_with_it() {
+        let (mut diagonal, mut whole) = ([2.0, -3.0], [[2.0, 0.0], [0.0, -3.0]]);
+        diagonal.add_to_diagonal(1, 0.5);
+        whole.add_to_diagonal(1, 0.5);
+        assert_eq!(diagonal.times(&[1.0, 4.0]), whole.times(&[1.0, 4.0]));
+        assert_eq!([0, 1].map(|i| diagonal.diagonal(i)), [0, 1].map(|i| whole.diagonal(i)));
+        let (mut one, mut other) = ([[1.0; 2]; 2], [[1.0; 2]; 2]);
+        diagonal.add_to(&mut one);
+        whole.add_to(&mut other);
+        assert_eq!(one, other);
+    }
+}

@@ -14,6 +14,9 @@
 //! problem always has a solution, and an unreachable condition is missed by as little as the price allows. A condition
 //! whose multiplier stays below the price holds exactly, so a high price makes it a hard one.
 //!
+//! [`Dense`] intervals are enough for a new model; the tests' `polynomial` is one. `nmpc` has one whose matrices have a
+//! structure.
+//!
 //! The tolerances inside suit states, and inputs in their own [`unit`](InputRange::unit), whose changes are of the order
 //! of one.
 //!
@@ -83,3 +86,6 @@ pub use model::{InputRange, Model, Settings};
 pub use outcome::{Outcome, Status};
 pub use solver::Workspace;
 pub use start::Start;
+
+#[cfg(test)]
+mod tests;

@@ -35,7 +35,7 @@ pub trait Model<const NX: usize, const NU: usize> {
 
     /// Writes the states and inputs from which the cold solve `index` starts, 0 to `guesses + spare_guesses - 1` of the
     /// settings. The first state is the initial one, the inputs are inside their limits, and the path may have defects.
-    /// A method of Newton keeps a symmetry, so a guess should not have one that the best path breaks.
+    /// Newton's method keeps a symmetry, so a guess should not have one that the best path breaks.
     fn guess(&self, index: usize, states: &mut [[f64; NX]], inputs: &mut [[f64; NU]]);
 
     /// Evaluates every interval `k` from node `k`, with the costate of node `k + 1`. Without `derivatives` those of the
@@ -80,7 +80,7 @@ pub trait Model<const NX: usize, const NU: usize> {
     }
 }
 
-/// The limits of an input.
+/// The limits of an input, finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputRange {
     pub lower: f64,
