@@ -171,8 +171,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
             }
         }
         for (k, step) in self.sweep.inputs.iter().enumerate() {
-            for i in 0..NU {
-                trial.inputs[k][i] = iterate.inputs[k][i] + primal * step[i];
+            for (i, step) in step.iter().enumerate() {
+                trial.inputs[k][i] = iterate.inputs[k][i] + primal * step;
                 trial.limits[k][i] = Limits {
                     lower: iterate.limits[k][i].lower + dual * self.limits[k][i].lower,
                     upper: iterate.limits[k][i].upper + dual * self.limits[k][i].upper,

@@ -26,10 +26,12 @@ impl<const N: usize> Factor<N> {
                 return None;
             }
             factor.inverse[j] = 1.0 / pivot;
+            let column = matrix.map(|row| row[j]);
             for i in j + 1..N {
-                factor.lower[i][j] = matrix[i][j] * factor.inverse[j];
-                for k in j + 1..=i {
-                    matrix[i][k] -= factor.lower[i][j] * matrix[k][j];
+                let share = column[i] * factor.inverse[j];
+                factor.lower[i][j] = share;
+                for (entry, value) in matrix[i].iter_mut().zip(&column).skip(j + 1) {
+                    *entry -= share * value;
                 }
             }
         }

@@ -80,21 +80,21 @@ fn dense<const NX: usize, const NU: usize>(model: &Polynomial<NX, NU>) -> Vec<[f
         let weights = model.weights(node);
         let push = model.state_slope(node, &[0.0; NX]);
         for i in 0..NX {
-            for j in 0..=i {
-                equation(state_at(node) + i, state_at(node) + j, weights[i][j]);
+            for (j, weight) in weights[i].iter().enumerate().take(i + 1) {
+                equation(state_at(node) + i, state_at(node) + j, *weight);
             }
             right[state_at(node) + i] = -push[i];
             right[row + i] = -zero[i];
             equation(row + i, state_at(node) + i, -1.0);
-            for j in 0..NX {
+            for (j, entry) in a[i].iter().enumerate() {
                 if k == 0 {
-                    right[row + i] -= a[i][j] * model.initial[j];
+                    right[row + i] -= entry * model.initial[j];
                 } else {
-                    equation(row + i, state_at(k) + j, a[i][j]);
+                    equation(row + i, state_at(k) + j, *entry);
                 }
             }
-            for j in 0..NU {
-                equation(row + i, input_at(k) + j, b[i][j]);
+            for (j, entry) in b[i].iter().enumerate() {
+                equation(row + i, input_at(k) + j, *entry);
             }
         }
     }

@@ -37,7 +37,6 @@ impl<const NX: usize, const NU: usize> Polynomial<NX, NU> {
     }
 
     /// `F` and its derivatives by the state and by the input.
-    #[expect(clippy::type_complexity, reason = "three results of one shape each")]
     pub(super) fn step(
         &self,
         state: &[f64; NX],

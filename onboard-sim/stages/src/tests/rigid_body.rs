@@ -22,7 +22,7 @@ const INERTIA_KG_M2: [f64; 3] = [0.12, 0.15, 0.03];
 pub(super) fn problem(limit_n_m: f64) -> Polynomial<13, 3> {
     let mut rates = Vec::new();
     let mut add = |row, factor, of| rates.push(Term { row, factor, of });
-    for i in 0..3 {
+    for (i, inertia) in INERTIA_KG_M2.into_iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         add(R + i, 1.0, [V + i, ONE]);
         // q' = q (0, w) / 2.
@@ -31,8 +31,8 @@ pub(super) fn problem(limit_n_m: f64) -> Polynomial<13, 3> {
         add(Q + 1 + i, 0.5, [Q + 1 + j, W + k]);
         add(Q + 1 + i, -0.5, [Q + 1 + k, W + j]);
         // Euler's equations.
-        add(W + i, (INERTIA_KG_M2[j] - INERTIA_KG_M2[k]) / INERTIA_KG_M2[i], [W + j, W + k]);
-        add(W + i, 1.0 / INERTIA_KG_M2[i], [T + i, ONE]);
+        add(W + i, (INERTIA_KG_M2[j] - INERTIA_KG_M2[k]) / inertia, [W + j, W + k]);
+        add(W + i, 1.0 / inertia, [T + i, ONE]);
     }
     // The thrust acts along the body's third axis.
     let thrust_m_s2 = 1.02 * GRAVITY_M_S2;
