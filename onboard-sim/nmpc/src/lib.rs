@@ -7,8 +7,8 @@
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`rollout`]: states and cost of given inputs.
 //! * `bound`: a lower bound of the touchdown speed, which shows starts that cannot be landed.
-//! * `model`: the problem as the solver reads it. The solver is the crate [`stages`], whose page has the formulation, the
-//!   steps and the references.
+//! * `model`: the problem as the solver reads it. The solver is the crate [`stages`], whose page has the formulation,
+//!   the steps and the references.
 //! * `intervals`: the dynamics of all intervals with exact first and second derivatives, in vector registers.
 //! * `workspace`: the solver's buffers, between a problem and its solution.
 //! * `resample`: converts a solution into a start for a problem with other nodes.

@@ -27,8 +27,8 @@ fn first_root(c: f64, b: f64, a: f64) -> Option<f64> {
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Takes the fraction of a long step at which the one held condition, an equality, is met. Returns false if there is
-    /// none, or if another condition is held, too.
+    /// Takes the fraction of a long step at which the one held condition, an equality, is met. Returns false if there
+    /// is none, or if another condition is held, too.
     pub(crate) fn bend(&mut self, model: &M, stiffness: f64) -> bool {
         let Self { conditions, current, trial, newton, sides, scratch, .. } = self;
         let mut held =

@@ -15,9 +15,9 @@
 //! search.
 //!
 //! Where inputs change a held condition only to second order, its equation gives a step that is far too long. Therefore
-//! `bend` shortens a long first step with its second-order terms. If that is not possible, held conditions are springs at
-//! first (the method of multipliers: Bertsekas, *Constrained Optimization and Lagrange Multiplier Methods*, 1982), which
-//! get stiffer with every step.
+//! `bend` shortens a long first step with its second-order terms. If that is not possible, held conditions are springs
+//! at first (the method of multipliers: Bertsekas, *Constrained Optimization and Lagrange Multiplier Methods*, 1982),
+//! which get stiffer with every step.
 //!
 //! The last one or two steps are so short that the second derivatives of the previous step are good enough (a chord
 //! instead of a tangent, Ortega and Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables*, 1970,
@@ -52,7 +52,8 @@ const HARDENING: f64 = 30.0;
 /// A first step of the inputs this long, in their units, counts as long.
 const CAREFUL_STEP: f64 = 0.03;
 
-/// A step of the inputs this small, in their units, is probably the last one, so derivatives are only evaluated if it is not.
+/// A step of the inputs this small, in their units, is probably the last one, so derivatives are only evaluated if it
+/// is not.
 const LAST_STEP: f64 = 1e-3;
 
 /// How much more than the ratio of the step lengths a step with old second derivatives reduces the residual.

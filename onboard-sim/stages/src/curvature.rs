@@ -4,7 +4,8 @@
 use core::array::from_fn;
 use core::fmt::Debug;
 
-/// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a whole symmetric matrix.
+/// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a whole symmetric
+/// matrix.
 pub trait Curvature<const N: usize>: Copy + Debug {
     const ZERO: Self;
 

@@ -6,7 +6,7 @@
 //! Over the nodes `k = 0..N` of the horizon, states `x_k` and inputs `u_k` are variables alike (multiple shooting):
 //!
 //! ```text
-//! minimise    sum over the nodes of L_k(x_k)  +  sum over the intervals of R_k(u_k)  +  M (violations of the conditions)
+//! minimise    sum over nodes of L_k(x_k)  +  sum over intervals of R_k(u_k)  +  M (violations of the conditions)
 //! subject to  x_{k+1} = F_k(x_k, u_k),   x_0 given,   lower <= u_k <= upper
 //! ```
 //!
@@ -14,11 +14,14 @@
 //! problem always has a solution, and an unreachable condition is missed by as little as the price allows. A condition
 //! whose multiplier stays below the price holds exactly, so a high price makes it a hard one.
 //!
+//! There is no cost of products of states and inputs, no condition on several components at once, and input limits are
+//! the same in all intervals. A further state can stand for what is missing.
+//!
 //! [`Dense`] intervals are enough for a new model; the tests' `polynomial` is one. `nmpc` has one whose matrices have a
 //! structure.
 //!
-//! The tolerances inside suit states, and inputs in their own [`unit`](InputRange::unit), whose changes are of the order
-//! of one.
+//! The tolerances inside suit states, and inputs in their own [`unit`](InputRange::unit), whose changes are of the
+//! order of one.
 //!
 //! # Steps of an iteration
 //!
@@ -26,8 +29,8 @@
 //!    in all intervals.
 //! 2. `residual`: stops if the optimality conditions hold; lowers the barrier `mu` if its problem is solved.
 //! 3. `newton`: eliminates slacks and limit multipliers, which leaves diagonal terms at the nodes.
-//! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. The inertia is right
-//!    exactly if one matrix per stage, as large as the inputs are many, is positive definite. If it is not, the sweep
+//! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. The inertia is
+//!    right exactly if one matrix per stage, with a row for each input, is positive definite. If it is not, the sweep
 //!    runs again with half the dynamics' curvature, and then without it.
 //! 5. `newton`: finds the longest fractions of the step that keep slacks and multipliers positive, primal and dual
 //!    separately.
@@ -35,9 +38,9 @@
 //!
 //! `solver` is the loop. A cold solve runs it from the model's guesses (`start`). A warm solve (`warm`) takes over
 //! states, inputs and all multipliers, and first checks whether they are still optimal. If not, it treats the active
-//! limits and conditions as equations (`clamped`), which needs no barrier and no line search. If that does not converge,
-//! the loop starts at the last barrier, and raises it once if the first step shows that many limits and conditions must
-//! change sides. Iterations are capped; there is no clock.
+//! limits and conditions as equations (`clamped`), which needs no barrier and no line search. If that does not
+//! converge, the loop starts at the last barrier, and raises it once if the first step shows that many limits and
+//! conditions must change sides. Iterations are capped; there is no clock.
 //!
 //! The sweeps are compiled twice, for plain and for wider vectors, and the program uses the widest that the machine has
 //! (`pulp`). Both execute the same operations in the same order and fuse none, so the bits are the same.

@@ -27,8 +27,8 @@ pub trait Model<const NX: usize, const NU: usize> {
     /// The limits of each input, the same in every interval.
     fn input_ranges(&self) -> [InputRange; NU];
 
-    /// Appends the conditions, the same number for the same number of intervals; allocates only if the vector never held
-    /// as many.
+    /// Appends the conditions, the same number for the same number of intervals; allocates only if the vector never
+    /// held as many.
     fn append_conditions(&self, conditions: &mut Vec<Condition>);
 
     fn settings(&self) -> Settings;
@@ -58,17 +58,19 @@ pub trait Model<const NX: usize, const NU: usize> {
     /// First derivative of the cost by the state of a node.
     fn state_slope(&self, node: usize, state: &[f64; NX]) -> [f64; NX];
 
-    /// Second derivative of the cost by the state of a node. Where it is not positive semidefinite, the solver may fail.
+    /// Second derivative of the cost by the state of a node. Where it is not positive semidefinite, the solver may
+    /// fail.
     fn state_curvature(&self, node: usize, state: &[f64; NX]) -> Self::StateCurvature;
 
     /// First derivative of the cost by the input of interval `k`.
     fn input_slope(&self, k: usize, input: &[f64; NU]) -> [f64; NU];
 
-    /// Second derivative of the cost by the input of interval `k`. Where it is not positive semidefinite, the solver may
-    /// fail.
+    /// Second derivative of the cost by the input of interval `k`. Where it is not positive semidefinite, the solver
+    /// may fail.
     fn input_curvature(&self, k: usize, input: &[f64; NU]) -> Self::InputCurvature;
 
-    /// Slope of the cost along a change of all states. A model whose weights are the same at all nodes can add up faster.
+    /// Slope of the cost along a change of all states. A model whose weights are the same at all nodes can add up
+    /// faster.
     fn slope_along(&self, states: &[[f64; NX]], changes: &[[f64; NX]]) -> f64 {
         let mut sum = 0.0;
         for (node, (state, change)) in states.iter().zip(changes).enumerate() {

@@ -1,4 +1,4 @@
-//! The triangular factors `L D L'` of a symmetric matrix as large as the inputs are many.
+//! The triangular factors `L D L'` of a symmetric matrix with a row for each input.
 #![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
 use core::array::from_fn;

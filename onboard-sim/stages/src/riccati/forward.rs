@@ -57,7 +57,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
         }
     }
 
-    /// The optimality residuals of the inputs of interval `k` after the step: only rounding, unless the sweeps are wrong.
+    /// The optimality residuals of the inputs of interval `k` after the step: only rounding, unless the sweeps are
+    /// wrong.
     #[cfg(test)]
     pub(crate) fn input_residual(&self, iterate: &Iterate<M, NX, NU>, k: usize) -> [f64; NU] {
         let interval = iterate.intervals.interval(k);
