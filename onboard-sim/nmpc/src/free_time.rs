@@ -7,9 +7,9 @@
 //!
 //! Each final time is a landing problem of its own, solved by [`solve_into`](super::solve_into). By the envelope
 //! theorem the derivative of the optimal price by the final time is that of the Lagrangian at the solution
-//! (`interior::lagrangian`; Bryson and Ho, *Applied Optimal Control*, 1975, section 2.7, have it as the Hamiltonian at
-//! the end). The search is a secant on that derivative, kept between the ends and between points already known to be
-//! worse:
+//! ([`stages::Workspace::lagrangian`]; Bryson and Ho, *Applied Optimal Control*, 1975, section 2.7, have it as the
+//! Hamiltonian at the end). The search is a secant on that derivative, kept between the ends and between points already
+//! known to be worse:
 //!
 //! * a warm search starts at the end of the earlier solution;
 //! * a cold search starts at the best point of a coarse grid. If the earliest end lands and later ends cost more, the

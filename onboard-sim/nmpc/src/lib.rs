@@ -7,8 +7,10 @@
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`rollout`]: states and cost of given inputs.
 //! * `bound`: a lower bound of the touchdown speed, which shows starts that cannot be landed.
-//! * `interior`: the solver, a stage-structured interior-point method with exact Hessians. Its page has the
-//!   formulation, the steps and the references.
+//! * `model`: the problem as the solver reads it. The solver is the crate [`stages`], whose page has the formulation,
+//!   the steps and the references.
+//! * `intervals`: the dynamics of all intervals with exact first and second derivatives, in vector registers.
+//! * `workspace`: the solver's buffers, between a problem and its solution.
 //! * `resample`: converts a solution into a start for a problem with other nodes.
 //! * [`free_time`]: a search for the best final time, around the solver.
 //!
@@ -26,16 +28,18 @@ extern crate std;
 mod bound;
 pub mod dynamics;
 pub mod free_time;
-mod interior;
+mod intervals;
+mod model;
 #[cfg(test)]
 mod paper;
 pub mod problem;
 mod resample;
 pub mod rollout;
+mod workspace;
 
 pub use bound::best_touchdown_speed_m_s;
-pub use interior::Workspace;
 pub use problem::{FinalBox, Problem, SolverLimits};
+pub use workspace::Workspace;
 
 use alloc::vec::Vec;
 
@@ -229,8 +233,7 @@ pub fn solve_into(
         solution.status = SolveStatus::Converged;
         solution.states.push(problem.initial);
     } else {
-        let fitting = warm.filter(|start| start.inputs_rad.len() == problem.intervals());
-        workspace.solve(problem, fitting, solution);
+        workspace.solve(problem, warm, solution);
     }
     solution.step_s = problem.step_s;
     solution.best_touchdown_speed_m_s = best_touchdown_speed_m_s;

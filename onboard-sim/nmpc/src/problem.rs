@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use serde::Deserialize;
+pub use stages::Condition;
 
 use crate::dynamics::{PlanarModel, PlanarState};
 
@@ -90,35 +91,6 @@ pub struct Problem {
     pub solver: SolverLimits,
 }
 
-/// A scalar condition on one state component of one node: `sign * component - offset` must be zero (an equality) or not
-/// negative. SI and radians.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Condition {
-    /// The node, 1 to the number of intervals.
-    pub node: usize,
-    /// The component in state order.
-    pub component: usize,
-    /// Sign of the component.
-    pub sign: f64,
-    /// The value that the signed component is compared with.
-    pub offset: f64,
-    /// Whether the condition is an equality.
-    pub equality: bool,
-}
-
-impl Condition {
-    /// The condition's value on a path.
-    pub fn value(&self, states: &[[f64; 6]]) -> f64 {
-        let component = states.get(self.node).and_then(|state| state.get(self.component));
-        component.map_or(f64::NAN, |value| self.sign * value - self.offset)
-    }
-
-    /// By how much a value breaks the condition.
-    pub fn violation(&self, value: f64) -> f64 {
-        if self.equality { value.abs() } else { (-value).max(0.0) }
-    }
-}
-
 const X: usize = 0;
 const Z: usize = 1;
 const THETA: usize = 2;
@@ -141,12 +113,12 @@ impl Problem {
     /// node before it.
     pub fn conditions(&self) -> Vec<Condition> {
         let mut conditions = Vec::new();
-        self.append_conditions(&mut conditions);
+        self.append_all_conditions(&mut conditions);
         conditions
     }
 
     /// Appends the conditions; allocates only if the vector never held as many.
-    pub(super) fn append_conditions(&self, conditions: &mut Vec<Condition>) {
+    pub(super) fn append_all_conditions(&self, conditions: &mut Vec<Condition>) {
         self.append_end_conditions(conditions);
         if let Some(altitude_min_m) = self.altitude_min_m {
             let end = self.intervals();

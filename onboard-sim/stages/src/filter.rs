@@ -22,20 +22,20 @@ const CAPACITY: usize = 32;
 
 /// Defects and objective of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Measures {
-    pub(super) infeasibility: f64,
-    pub(super) objective: f64,
+pub(crate) struct Measures {
+    pub(crate) infeasibility: f64,
+    pub(crate) objective: f64,
 }
 
 impl Measures {
-    pub(super) fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         self.infeasibility.is_finite() && self.objective.is_finite()
     }
 }
 
 /// A trial point must not be worse in both measures than any of these points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Filter {
+pub(crate) struct Filter {
     entries: [Measures; CAPACITY],
     used: usize,
     oldest: usize,
@@ -59,20 +59,20 @@ impl Default for Filter {
 
 impl Filter {
     /// A filter for a solve that starts with these defects.
-    pub(super) fn starting_at(infeasibility: f64) -> Self {
+    pub(crate) fn starting_at(infeasibility: f64) -> Self {
         let size = infeasibility.max(1.0);
         Self { ceiling: 1e4 * size, small: 1e-4 * size, ..Self::default() }
     }
 
     /// Drops every point, because the objective has changed.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.used = 0;
         self.oldest = 0;
     }
 
     /// Whether a trial point at `fraction` of a step is progress over `now`. If the point is accepted but the step was
     /// not a descent of the objective, `now` enters the filter. `slope` is the objective's slope along the whole step.
-    pub(super) fn accepts(&mut self, now: Measures, trial: Measures, slope: f64, fraction: f64) -> bool {
+    pub(crate) fn accepts(&mut self, now: Measures, trial: Measures, slope: f64, fraction: f64) -> bool {
         if !trial.is_finite() {
             return false;
         }

@@ -13,10 +13,12 @@
 //! from the Newton system leaves a diagonal term `1 / D`, `D = s / (y + l) + e / (M - y)`, on the condition's
 //! component.
 
-/// Barrier of a warm solve, and the last of every solve.
-pub(super) const LAST_BARRIER: f64 = 1e-8;
+use crate::model::InputRange;
 
-/// Slacks up to this do not change a multiplier, m, rad, m/s or rad/s.
+/// Barrier of a warm solve, and the last of every solve.
+pub(crate) const LAST_BARRIER: f64 = 1e-8;
+
+/// Slacks up to this do not change a multiplier.
 const SLACK: f64 = 1e-3;
 
 /// A multiplier this close to its price, relative to it, counts as at its price.
@@ -24,38 +26,38 @@ const AT_PRICE: f64 = 1e-9;
 
 /// Multipliers of an input's lower and upper limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Limits {
-    pub(super) lower: f64,
-    pub(super) upper: f64,
+pub(crate) struct Limits {
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
 }
 
 impl Limits {
     /// The multipliers on the central path.
-    pub(super) fn central(input_rad: f64, limit_rad: f64, barrier: f64) -> Self {
-        Self { lower: barrier / (limit_rad + input_rad), upper: barrier / (limit_rad - input_rad) }
+    pub(crate) fn central(input: f64, range: &InputRange, barrier: f64) -> Self {
+        Self { lower: barrier / range.below(input), upper: barrier / range.above(input) }
     }
 
     /// Raises multipliers to the barrier, and returns the input moved away from the limits with a multiplier.
-    pub(super) fn raise(&mut self, input_rad: f64, limit_rad: f64, barrier: f64) -> f64 {
-        let room = 0.5 * limit_rad;
-        let below = (limit_rad + input_rad).max((barrier / self.lower).min(room));
-        let above = (limit_rad - input_rad).max((barrier / self.upper).min(room));
+    pub(crate) fn raise(&mut self, input: f64, range: &InputRange, barrier: f64) -> f64 {
+        let room = 0.5 * range.reach();
+        let below = range.below(input).max((barrier / self.lower).min(room));
+        let above = range.above(input).max((barrier / self.upper).min(room));
         self.lower = self.lower.max(barrier / below);
         self.upper = self.upper.max(barrier / above);
-        if above > limit_rad - input_rad { limit_rad - above } else { below - limit_rad }
+        if above > range.above(input) { range.upper - above } else { range.lower + below }
     }
 
     /// Second and first derivative that the limits add to the input's part of the Newton system.
     #[inline]
-    pub(super) fn terms(&self, input_rad: f64, limit_rad: f64, barrier: f64) -> (f64, f64) {
-        let (below, above) = (1.0 / (limit_rad + input_rad), 1.0 / (limit_rad - input_rad));
+    pub(crate) fn terms(&self, input: f64, range: &InputRange, barrier: f64) -> (f64, f64) {
+        let (below, above) = (1.0 / range.below(input), 1.0 / range.above(input));
         (self.lower * below + self.upper * above, barrier * (above - below))
     }
 
     /// The multipliers' Newton step when the input moves by `step`.
     #[inline]
-    pub(super) fn step(&self, input_rad: f64, limit_rad: f64, barrier: f64, step: f64) -> Self {
-        let (below, above) = (1.0 / (limit_rad + input_rad), 1.0 / (limit_rad - input_rad));
+    pub(crate) fn step(&self, input: f64, range: &InputRange, barrier: f64, step: f64) -> Self {
+        let (below, above) = (1.0 / range.below(input), 1.0 / range.above(input));
         Self {
             lower: (barrier - self.lower * step) * below - self.lower,
             upper: (barrier + self.upper * step) * above - self.upper,
@@ -68,13 +70,13 @@ impl Limits {
 /// The multiplier is kept as its distances `a = y + l` and `b = M - y`, so that it stays exact when it is next to an
 /// end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Elastic {
+pub(crate) struct Elastic {
     a: f64,
     b: f64,
     /// `s`.
-    pub(super) above: f64,
+    pub(crate) above: f64,
     /// `e`.
-    pub(super) below: f64,
+    pub(crate) below: f64,
     /// `l`, the negative of the multiplier's smallest value: 0, or the price for an equality.
     least: f64,
     /// `M`, the multiplier's largest value.
@@ -83,15 +85,15 @@ pub(super) struct Elastic {
 
 /// Change of an [`Elastic`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct ElasticStep {
-    pub(super) multiplier: f64,
-    pub(super) above: f64,
-    pub(super) below: f64,
+pub(crate) struct ElasticStep {
+    pub(crate) multiplier: f64,
+    pub(crate) above: f64,
+    pub(crate) below: f64,
 }
 
 impl Elastic {
     /// The elastic of a condition at value `c` on the central path.
-    pub(super) fn central(c: f64, equality: bool, price: f64, barrier: f64) -> Self {
+    pub(crate) fn central(c: f64, equality: bool, price: f64, barrier: f64) -> Self {
         let least = if equality { price } else { 0.0 };
         let width = price + least;
         // c = mu / a - mu / (width - a); the smaller root of a quadratic, for the side c is on.
@@ -103,7 +105,7 @@ impl Elastic {
     }
 
     /// The elastic of a condition at value `c` with a multiplier from an earlier solution.
-    pub(super) fn warm(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+    pub(crate) fn warm(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
         /// Smallest distance of a multiplier from the ends of its range, as a fraction of its value on the central
         /// path.
         const KEPT: f64 = 0.1;
@@ -115,7 +117,7 @@ impl Elastic {
     }
 
     /// The elastic of a condition at value `c` with the multiplier of an optimum, which may be at an end of its range.
-    pub(super) fn settled(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+    pub(crate) fn settled(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
         /// Smallest distance from the ends: negligible, but above zero.
         const NOTHING: f64 = 1e-9;
         let least = if equality { price } else { 0.0 };
@@ -132,7 +134,7 @@ impl Elastic {
 
     /// With `s - e` equal to the condition's value `c`: the smaller of the two is kept.
     #[inline]
-    pub(super) fn fitted(mut self, c: f64) -> Self {
+    pub(crate) fn fitted(mut self, c: f64) -> Self {
         if c >= 0.0 {
             self.above = c + self.below;
         } else {
@@ -142,7 +144,7 @@ impl Elastic {
     }
 
     /// With slacks and multiplier raised to the barrier, for a condition at value `c`.
-    pub(super) fn raised(&self, c: f64, barrier: f64) -> Self {
+    pub(crate) fn raised(&self, c: f64, barrier: f64) -> Self {
         let width = self.price + self.least;
         let least = (barrier / c.abs().max(SLACK)).min(0.5 * width);
         let mut raised = *self;
@@ -163,12 +165,12 @@ impl Elastic {
 
     /// `y`.
     #[inline]
-    pub(super) fn multiplier(&self) -> f64 {
+    pub(crate) fn multiplier(&self) -> f64 {
         if self.a < self.b { self.a - self.least } else { self.price - self.b }
     }
 
     /// `y`, set exactly to its price if a broken condition has brought it close.
-    pub(super) fn settled_multiplier(&self) -> f64 {
+    pub(crate) fn settled_multiplier(&self) -> f64 {
         if self.b <= AT_PRICE * self.price {
             self.price
         } else if self.least > 0.0 && self.a <= AT_PRICE * self.price {
@@ -180,25 +182,25 @@ impl Elastic {
 
     /// Distances of the multiplier from its least and its largest value.
     #[inline]
-    pub(super) fn room(&self) -> (f64, f64) {
+    pub(crate) fn room(&self) -> (f64, f64) {
         (self.a, self.b)
     }
 
     /// The violation that the price is paid for.
     #[inline]
-    pub(super) fn broken(&self) -> f64 {
+    pub(crate) fn broken(&self) -> f64 {
         if self.least > 0.0 { self.above + self.below } else { self.below }
     }
 
     /// The change of the violation that the price is paid for.
     #[inline]
-    pub(super) fn broken_by(&self, step: &ElasticStep) -> f64 {
+    pub(crate) fn broken_by(&self, step: &ElasticStep) -> f64 {
         if self.least > 0.0 { step.above + step.below } else { step.below }
     }
 
     /// `D`, and the multiplier's change by a step that leaves the condition's value as it is.
     #[inline]
-    pub(super) fn terms(&self, barrier: f64) -> (f64, f64) {
+    pub(crate) fn terms(&self, barrier: f64) -> (f64, f64) {
         let softness = self.above / self.a + self.below / self.b;
         let target = barrier / self.a - barrier / self.b;
         (softness, -(self.above - self.below - target) / softness)
@@ -206,7 +208,7 @@ impl Elastic {
 
     /// The slacks' Newton step when the multiplier changes by `change`.
     #[inline]
-    pub(super) fn step(&self, barrier: f64, change: f64) -> ElasticStep {
+    pub(crate) fn step(&self, barrier: f64, change: f64) -> ElasticStep {
         ElasticStep {
             multiplier: change,
             above: (barrier - self.above * change) / self.a - self.above,
@@ -216,7 +218,7 @@ impl Elastic {
 
     /// The elastic after fractions of a step that changes the condition's value to `c`.
     #[inline]
-    pub(super) fn moved(&self, step: &ElasticStep, primal: f64, dual: f64, c: f64) -> Self {
+    pub(crate) fn moved(&self, step: &ElasticStep, primal: f64, dual: f64, c: f64) -> Self {
         Self {
             a: self.a + dual * step.multiplier,
             b: self.b - dual * step.multiplier,
@@ -229,7 +231,7 @@ impl Elastic {
 
     /// Products of the slacks and their multipliers.
     #[inline]
-    pub(super) fn products(&self) -> [f64; 2] {
+    pub(crate) fn products(&self) -> [f64; 2] {
         [self.above * self.a, self.below * self.b]
     }
 }

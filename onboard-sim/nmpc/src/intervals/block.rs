@@ -1,7 +1,7 @@
 //! The inputs and results of the evaluation of intervals, for several nodes at once.
 #![expect(clippy::inline_always, reason = "inlined into one loop body over vector registers")]
 
-use super::lanes::{LANES, Lanes};
+use super::lanes::Lanes;
 use crate::dynamics::{ModelKind, PlanarModel};
 
 /// Directions of differentiation: theta, u, w, q, delta.
@@ -175,8 +175,3 @@ pub(super) const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0
 pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
 /// Fraction of half a squared step by which the pitch acceleration moves a stage's pitch.
 pub(super) const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];
-
-/// Number of blocks that hold `intervals`.
-pub(super) fn blocks_for(intervals: usize) -> usize {
-    intervals.div_ceil(LANES)
-}

@@ -1,11 +1,12 @@
 use proptest::prelude::*;
 
-use super::block::{Block, Constants, DIRECTIONS, Points, pair};
-use super::interval::evaluate;
-use super::lanes::{LANES, Lanes};
+use stages::{Interval, Intervals};
+
+use super::block::{DIRECTIONS, pair};
+use super::lanes::Lanes;
 use super::*;
 use crate::dynamics::{ModelKind, PlanarModel, PlanarState};
-use crate::{paper, solve};
+use crate::paper;
 
 const STEP_S: f64 = 0.1;
 const THRUST_N: f64 = 33.3;
@@ -131,53 +132,85 @@ proptest! {
     }
 }
 
-/// States and costates satisfy their equations by construction of the sweeps. If the inputs satisfy theirs, too, the
-/// step solves the whole Newton system.
-#[test]
-fn the_sweeps_solve_the_newton_system() {
-    for (theta_deg, w_m_s) in [(90.0_f64, 0.0), (60.0, 1.0), (115.0, -2.0)] {
-        let nominal = paper::start();
-        let start = PlanarState { theta_rad: theta_deg.to_radians(), w_m_s, ..nominal };
-        let problem = paper::problem(start, 50);
-        let warm = solve(&paper::problem(nominal, 50), None).shifted(0);
-        let mut workspace = Workspace::default();
-        workspace.load(&problem, &warm);
-        workspace.evaluate_intervals(&problem);
-        assert!(workspace.sweep(&problem));
-        for k in 0..50 {
-            let left = workspace.newton.sweep.input_residual(&workspace.current, problem.step_s, k);
-            assert!(left.abs() < 1e-6, "{k}: {left}");
+/// A matrix of numbers from -1 to 1.
+fn symmetric() -> impl Strategy<Value = [[f64; 6]; 6]> {
+    prop::array::uniform6(prop::array::uniform6(-1.0..1.0_f64))
+        .prop_map(|half| from_fn(|i| from_fn(|j| half[i][j] + half[j][i])))
+}
+
+proptest! {
+    /// The columns of `A` and `b` are the pushed unit vectors, those of the curvature the curved ones.
+    #[test]
+    fn the_rows_pull_and_square_as_the_matrices_that_they_stand_for(point in point(), p in symmetric()) {
+        let unit = |i: usize| from_fn(|j| f64::from(u8::from(i == j)));
+        for vehicle in &vehicles() {
+            let block = block(vehicle, &point);
+            let rows = Rows::of(&block, 1, STEP_S);
+            let columns: [[f64; 6]; 7] = from_fn(|j| match j {
+                6 => rows.push(&[0.0; 6], &[1.0]),
+                _ => rows.push(&unit(j), &[0.0]),
+            });
+            let curved: [[f64; 7]; 7] = from_fn(|j| {
+                let (by_state, [by_input]) = match j {
+                    6 => rows.curve(0.5, &[0.0; 6], &[1.0]),
+                    _ => rows.curve(0.5, &unit(j), &[0.0]),
+                };
+                from_fn(|i| *by_state.get(i).unwrap_or(&by_input))
+            });
+            let dot = |one: &[f64; 6], other: &[f64; 6]| one.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
+            let close = |one: f64, other: f64| (one - other).abs() < 1e-10 * (1.0 + other.abs());
+            let (pulled, [pulled_input]) = rows.pull(&point.2);
+            let square = rows.square(&p, 0.5);
+            for (i, column) in columns.iter().enumerate() {
+                let expected = dot(column, &point.2);
+                let actual = *pulled.get(i).unwrap_or(&pulled_input);
+                prop_assert!(close(actual, expected), "[{i}] {actual} {expected}");
+                for (j, other) in columns.iter().enumerate() {
+                    let product: [f64; 6] = p.map(|row| dot(&row, other));
+                    let expected = dot(column, &product) + curved[j][i];
+                    let actual = match (i, j) {
+                        (6, 6) => square.uu[0][0],
+                        (6, j) => square.ux[0][j],
+                        (i, 6) => square.ux[0][i],
+                        _ => square.xx[i][j],
+                    };
+                    prop_assert!(close(actual, expected), "[{i}][{j}] {actual} {expected}");
+                }
+            }
         }
     }
 }
 
-/// Compares derivatives and sweeps in this machine's widest vectors with those in plain vectors.
+/// Compares the intervals in this machine's widest vectors with those in plain vectors. The sweeps are compared in
+/// `stages`.
 #[test]
 fn the_width_of_the_vectors_does_not_change_any_bit() {
-    let mut problem = paper::problem(paper::start(), 50);
-    let warm = solve(&problem, None).shifted(0);
+    const COUNT: usize = 50;
+    let states: Vec<[f64; 6]> = (0..=COUNT)
+        .map(|k| {
+            let share = k as f64 / COUNT as f64;
+            [share, 15.0 * (1.0 - share), 1.2 + 0.7 * share, -5.0 + 4.9 * share, 0.3 - share, 0.2 * share]
+        })
+        .collect();
+    let costates: Vec<[f64; 6]> = states.iter().map(|state| state.map(|value| 30.0 - 7.0 * value)).collect();
+    let inputs_rad: Vec<[f64; 1]> = (0..COUNT).map(|k| [0.3 - 0.012 * k as f64]).collect();
     for vehicle in vehicles() {
+        let mut problem = paper::problem(paper::start(), COUNT);
         problem.model = vehicle.0;
-        let mut workspace = Workspace::default();
-        workspace.load(&problem, &warm);
-        workspace.evaluate_intervals(&problem);
-        for k in 0..50 {
-            let (wide, lane) = (&workspace.current.blocks[k / LANES], k % LANES);
-            let current = &workspace.current;
-            let point = (current.states[k], current.inputs_rad[k], current.costates[k + 1]);
-            let plain = block(&(vehicle.0, vehicle.0.params.mass_kg), &point);
-            for (wide, plain) in wide.curvature.iter().zip(&plain.curvature) {
-                assert_eq!(wide.0[lane].to_bits(), plain.0[0].to_bits(), "{k}");
-            }
-            for (wide, plain) in wide.after.iter().zip(&plain.after) {
+        problem.mass_kg = vec![vehicle.1; COUNT];
+        problem.thrust_n = vec![THRUST_N; COUNT];
+        let mut wide = Blocks::default();
+        wide.resize(COUNT);
+        wide.evaluate::<true>(&problem, &states, &inputs_rad, &costates);
+        for k in 0..COUNT {
+            let plain = block(&vehicle, &(states[k], inputs_rad[k][0], costates[k + 1]));
+            let (wide, lane) = (&wide.blocks[k / LANES], k % LANES);
+            let rows = wide.tangent.as_flattened().iter().zip(plain.tangent.as_flattened());
+            let others =
+                wide.curvature.iter().zip(&plain.curvature).chain(wide.pulled.iter().zip(&plain.pulled));
+            for (wide, plain) in rows.chain(others).chain(wide.after.iter().zip(&plain.after)) {
                 assert_eq!(wide.0[lane].to_bits(), plain.0[0].to_bits(), "{k}");
             }
         }
-        workspace.sweep(&problem);
-        let sweep = &mut workspace.newton.sweep;
-        let wide = (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone());
-        sweep.eliminate(&workspace.current, problem.step_s);
-        sweep.substitute(&workspace.current, problem.step_s);
-        assert_eq!(wide, (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone()));
     }
 }

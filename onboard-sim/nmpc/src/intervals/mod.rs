@@ -1,0 +1,130 @@
+//! The planar dynamics in every interval, with exact first and second derivatives: several intervals at once in vector
+//! registers (`lanes`).
+//!
+//! * `block`: inputs and results of an evaluation.
+//! * `step`: the RK4 step and its adjoint; `tangent`: its tangent and curvature.
+//! * `rows`: one interval's derivatives as the sweeps of the solver need them.
+#![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
+
+mod block;
+mod lanes;
+mod rows;
+mod step;
+mod tangent;
+
+use alloc::vec::Vec;
+use core::array::from_fn;
+
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::Problem;
+use block::{Block, Constants, D, Points};
+use lanes::LANES;
+use rows::Rows;
+use step::evaluate;
+
+/// The intervals of a horizon, several to a block.
+#[derive(Debug, Clone, Default)]
+pub struct Blocks {
+    blocks: Vec<Block>,
+    step_s: f64,
+}
+
+impl Blocks {
+    /// Evaluates every interval, with tangents and curvature if asked for.
+    pub(crate) fn evaluate<const DERIVATIVES: bool>(
+        &mut self,
+        problem: &Problem,
+        states: &[[f64; 6]],
+        inputs_rad: &[[f64; 1]],
+        costates: &[[f64; 6]],
+    ) {
+        let constants = &Constants::of(&problem.model, problem.step_s);
+        let count = inputs_rad.len();
+        let (thrust_n, mass_kg) = (&problem.thrust_n, &problem.mass_kg);
+        let across = constants.pushed_across();
+        let mut points = Points::rest(constants);
+        let arch = Arch::new();
+        self.step_s = problem.step_s;
+        for (index, block) in self.blocks.iter_mut().enumerate() {
+            for lane in 0..LANES {
+                // Lanes beyond the end repeat the last interval.
+                let k = (index * LANES + lane).min(count - 1);
+                for i in 0..6 {
+                    points.state[i].0[lane] = states[k][i];
+                    points.costate[i].0[lane] = costates[k + 1][i];
+                }
+                points.gimbal.0[lane] = inputs_rad[k][0];
+                points.thrust.0[lane] = thrust_n[k];
+                if let Some(mass_kg) = mass_kg.get(k) {
+                    points.inverse_mass.0[lane] = 1.0 / mass_kg;
+                    points.lightness.0[lane] = constants.mass_kg / mass_kg;
+                }
+            }
+            let points = &points;
+            match (constants.printed, across) {
+                (true, _) => Kernel::<DERIVATIVES, true, false> { constants, points, block }.run(arch),
+                (false, true) => Kernel::<DERIVATIVES, false, true> { constants, points, block }.run(arch),
+                (false, false) => Kernel::<DERIVATIVES, false, false> { constants, points, block }.run(arch),
+            }
+        }
+    }
+}
+
+impl stages::Intervals<6, 1> for Blocks {
+    /// Nothing depends on x and z.
+    const INTEGRALS: usize = 2;
+
+    type Interval<'a> = Rows<'a>;
+
+    fn resize(&mut self, intervals: usize) {
+        self.blocks.resize(intervals.div_ceil(LANES), Block::EMPTY);
+    }
+
+    #[inline(always)]
+    fn end(&self, k: usize) -> [f64; 6] {
+        let after = &self.blocks[k / LANES].after;
+        from_fn(|i| after[i].0[k % LANES])
+    }
+
+    #[inline(always)]
+    fn pulled(&self, k: usize, lambda: &[f64; 6]) -> ([f64; 6], [f64; 1]) {
+        let block = &self.blocks[k / LANES];
+        let pulled = |direction: usize| block.pulled[direction].0[k % LANES];
+        ([lambda[0], lambda[1], pulled(0), pulled(1), pulled(2), pulled(3)], [pulled(D)])
+    }
+
+    #[inline(always)]
+    fn interval(&self, k: usize) -> Rows<'_> {
+        Rows::of(&self.blocks[k / LANES], k % LANES, self.step_s)
+    }
+}
+
+/// One block, evaluated in the widest vectors that the machine has.
+struct Kernel<'a, const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> {
+    constants: &'a Constants,
+    points: &'a Points,
+    block: &'a mut Block,
+}
+
+impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> NullaryFnOnce
+    for Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        evaluate::<DERIVATIVES, PRINTED, ACROSS>(self.constants, self.points, self.block);
+    }
+}
+
+impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>
+    Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
+{
+    fn run(self, arch: Arch) {
+        arch.dispatch(self);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,187 @@
+//! The Newton system of the barrier problem at an iterate: its assembly, its solution, and the step to a trial point.
+
+use alloc::vec::Vec;
+
+use crate::barrier::{ElasticStep, Limits};
+use crate::condition::Condition;
+use crate::curvature::Curvature;
+use crate::iterate::Iterate;
+use crate::model::Model;
+use crate::riccati::Sweep;
+
+/// A Newton step.
+#[derive(Debug, Clone)]
+pub(crate) struct Newton<M: Model<NX, NU>, const NX: usize, const NU: usize> {
+    pub(crate) sweep: Sweep<M, NX, NU>,
+    limits: Vec<[Limits; NU]>,
+    elastics: Vec<ElasticStep>,
+}
+
+/// The longest fractions of a step that keep slacks and multipliers positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Fractions {
+    pub(crate) primal: f64,
+    pub(crate) dual: f64,
+}
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Newton<M, NX, NU> {
+    fn default() -> Self {
+        Self { sweep: Sweep::default(), limits: Vec::new(), elastics: Vec::new() }
+    }
+}
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
+    /// Makes room for a problem; allocates only if no earlier problem was this long.
+    pub(crate) fn resize(&mut self, intervals: usize, conditions: usize) {
+        self.sweep.resize(intervals);
+        self.limits.resize(intervals, [Limits::default(); NU]);
+        self.elastics.resize(conditions, ElasticStep::default());
+    }
+
+    /// Sets the system up at an iterate.
+    pub(crate) fn assemble(
+        &mut self,
+        model: &M,
+        conditions: &[Condition],
+        iterate: &Iterate<M, NX, NU>,
+        barrier: f64,
+    ) {
+        let ranges = model.input_ranges();
+        let sweep = &mut self.sweep;
+        sweep.set_cost(model, iterate);
+        for (k, input) in iterate.inputs.iter().enumerate() {
+            let (curvature, slope) = &mut sweep.input_terms[k];
+            for i in 0..NU {
+                let (own_curvature, own_slope) = iterate.limits[k][i].terms(input[i], &ranges[i], barrier);
+                curvature.add_to_diagonal(i, own_curvature);
+                slope[i] += own_slope;
+            }
+        }
+        for (condition, elastic) in conditions.iter().zip(&iterate.elastics) {
+            let (softness, change) = elastic.terms(barrier);
+            let multiplier = elastic.multiplier() + change;
+            sweep.curvatures[condition.node].add_to_diagonal(condition.component, 1.0 / softness);
+            sweep.slopes[condition.node][condition.component] -= condition.sign * multiplier;
+        }
+    }
+
+    /// Solves for the step of every variable, after a backward sweep.
+    pub(crate) fn solve(
+        &mut self,
+        model: &M,
+        conditions: &[Condition],
+        iterate: &Iterate<M, NX, NU>,
+        barrier: f64,
+    ) {
+        let ranges = model.input_ranges();
+        self.sweep.forward(iterate);
+        for (k, steps) in self.limits.iter_mut().enumerate() {
+            let (limits, input, change) = (&iterate.limits[k], &iterate.inputs[k], &self.sweep.inputs[k]);
+            for i in 0..NU {
+                steps[i] = limits[i].step(input[i], &ranges[i], barrier, change[i]);
+            }
+        }
+        for (index, condition) in conditions.iter().enumerate() {
+            let elastic = &iterate.elastics[index];
+            let (softness, unmoved) = elastic.terms(barrier);
+            let moved = condition.sign * self.sweep.states[condition.node][condition.component];
+            let change = unmoved - moved / softness;
+            self.elastics[index] = elastic.step(barrier, change);
+        }
+    }
+
+    /// The longest fractions of the step that leave `keep` of every slack and multiplier.
+    pub(crate) fn fractions(&self, model: &M, iterate: &Iterate<M, NX, NU>, keep: f64) -> Fractions {
+        let ranges = model.input_ranges();
+        let reach = 1.0 - keep;
+        let shorten = |fraction: &mut f64, value: f64, step: f64| {
+            if -step * *fraction > reach * value {
+                *fraction = reach * value / -step;
+            }
+        };
+        let (mut primal, mut dual) = (1.0, 1.0);
+        for (k, input) in iterate.inputs.iter().enumerate() {
+            for i in 0..NU {
+                let step = self.sweep.inputs[k][i];
+                shorten(&mut primal, ranges[i].below(input[i]), step);
+                shorten(&mut primal, ranges[i].above(input[i]), -step);
+                shorten(&mut dual, iterate.limits[k][i].lower, self.limits[k][i].lower);
+                shorten(&mut dual, iterate.limits[k][i].upper, self.limits[k][i].upper);
+            }
+        }
+        for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
+            shorten(&mut primal, elastic.above, step.above);
+            shorten(&mut primal, elastic.below, step.below);
+            let (a, b) = elastic.room();
+            shorten(&mut dual, a, step.multiplier);
+            shorten(&mut dual, b, -step.multiplier);
+        }
+        Fractions { primal, dual }
+    }
+
+    /// Slope of the barrier objective along the step.
+    pub(crate) fn slope(&self, model: &M, iterate: &Iterate<M, NX, NU>, barrier: f64) -> f64 {
+        let ranges = model.input_ranges();
+        let price = model.settings().price;
+        let mut slope = model.slope_along(&iterate.states, &self.sweep.states);
+        for (k, (input, step)) in iterate.inputs.iter().zip(&self.sweep.inputs).enumerate() {
+            let own = model.input_slope(k, input);
+            for i in 0..NU {
+                let (below, above) = (ranges[i].below(input[i]), ranges[i].above(input[i]));
+                slope += (own[i] + barrier * (1.0 / above - 1.0 / below)) * step[i];
+            }
+        }
+        for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
+            slope += price * elastic.broken_by(step)
+                - barrier * (step.above / elastic.above + step.below / elastic.below);
+        }
+        slope
+    }
+
+    /// The largest change of an input, in its unit.
+    pub(crate) fn largest_input_step(&self, model: &M) -> f64 {
+        let ranges = model.input_ranges();
+        self.sweep.inputs.iter().fold(0.0, |largest, steps| {
+            steps
+                .iter()
+                .zip(&ranges)
+                .fold(largest, |most: f64, (step, range)| most.max(step.abs() / range.unit))
+        })
+    }
+
+    /// Writes the point at the fractions of the step into `trial`; its intervals are not evaluated.
+    pub(crate) fn take(
+        &self,
+        conditions: &[Condition],
+        iterate: &Iterate<M, NX, NU>,
+        fractions: Fractions,
+        trial: &mut Iterate<M, NX, NU>,
+    ) {
+        let Fractions { primal, dual } = fractions;
+        for (k, step) in self.sweep.states.iter().enumerate() {
+            let (from, to) = (&iterate.states[k], &mut trial.states[k]);
+            for i in 0..NX {
+                to[i] = from[i] + primal * step[i];
+            }
+        }
+        for (k, target) in self.sweep.costates.iter().enumerate() {
+            let (from, to) = (&iterate.costates[k], &mut trial.costates[k]);
+            for i in 0..NX {
+                to[i] = from[i] + primal * (target[i] - from[i]);
+            }
+        }
+        for (k, step) in self.sweep.inputs.iter().enumerate() {
+            for (i, step) in step.iter().enumerate() {
+                trial.inputs[k][i] = iterate.inputs[k][i] + primal * step;
+                trial.limits[k][i] = Limits {
+                    lower: iterate.limits[k][i].lower + dual * self.limits[k][i].lower,
+                    upper: iterate.limits[k][i].upper + dual * self.limits[k][i].upper,
+                };
+            }
+        }
+        for (index, step) in self.elastics.iter().enumerate() {
+            let value = conditions[index].value(&trial.states);
+            trial.elastics[index] = iterate.elastics[index].moved(step, primal, dual, value);
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The main loop of the solver.
+
+use alloc::vec::Vec;
+
+use crate::barrier::LAST_BARRIER;
+use crate::condition::Condition;
+use crate::filter::{Filter, Measures};
+use crate::iterate::Iterate;
+use crate::model::Model;
+use crate::newton::{Fractions, Newton};
+use crate::outcome::{Outcome, SolveEnd, Status};
+use crate::residual::Residual;
+use crate::sides::Sides;
+use crate::start::{self, Start};
+
+/// When limits and conditions change sides, the barrier is raised at least to this value and by this factor.
+pub(crate) const RAISED_BARRIER: f64 = 1e-2;
+const RAISING_FACTOR: f64 = 100.0;
+
+/// Largest number of times that the barrier is raised.
+const RAISES: u32 = 4;
+
+/// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between limits.
+const JAMMED: f64 = 0.1;
+
+/// A barrier problem is solved when its residual is at most this multiple of the barrier.
+const BARRIER_TOLERANCE: f64 = 30.0;
+
+/// Factor and exponent of the barrier's decrease; the faster one applies.
+const BARRIER_FACTOR: f64 = 0.2;
+const BARRIER_EXPONENT: f64 = 1.8;
+
+/// Bounds of the fraction of a slack or multiplier that a step must leave; between them it equals the barrier.
+const KEPT_LEAST: f64 = 1e-3;
+const KEPT_MOST: f64 = 1e-2;
+
+/// Fractions of the dynamics' curvature that are tried until the inertia is right, beginning with the one before the
+/// last that was right. Without the curvature the Hessian is that of Gauss and Newton, whose inertia is always right.
+pub(crate) const CURVATURE_SHARES: [f64; 3] = [1.0, 0.5, 0.0];
+
+/// Shortest fraction that is tried of the step that the slacks allow.
+const SHORTEST_STEP: f64 = 1.0 / 1024.0;
+
+/// A step of the inputs this small, in their units, is taken without a test: the objective's rounding error is larger
+/// than its possible decrease.
+const TINY_STEP: f64 = 1e-7;
+
+/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on them.
+#[derive(Debug, Clone)]
+pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
+    pub(crate) conditions: Vec<Condition>,
+    pub(crate) current: Iterate<M, NX, NU>,
+    pub(crate) trial: Iterate<M, NX, NU>,
+    other: Iterate<M, NX, NU>,
+    pub(crate) newton: Newton<M, NX, NU>,
+    pub(crate) sides: Sides<NU>,
+    filter: Filter,
+    pub(crate) scratch: Vec<[f64; NX]>,
+}
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Workspace<M, NX, NU> {
+    fn default() -> Self {
+        Self {
+            conditions: Vec::new(),
+            current: Iterate::default(),
+            trial: Iterate::default(),
+            other: Iterate::default(),
+            newton: Newton::default(),
+            sides: Sides::default(),
+            filter: Filter::default(),
+            scratch: Vec::new(),
+        }
+    }
+}
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
+    /// Solves a problem, warm if there is a start with as many inputs as the problem has intervals, otherwise cold. It
+    /// does not allocate if a problem of this length was solved before.
+    pub fn solve(&mut self, model: &M, start: Option<&Start<NX, NU>>) -> Outcome {
+        self.resize(model);
+        let cap = model.settings().max_iterations;
+        let end = match start.filter(|start| start.inputs.len() == model.intervals()) {
+            Some(start) => self.warm(model, start, cap),
+            None => self.cold(model, cap),
+        };
+        self.report(model, end)
+    }
+
+    pub(crate) fn resize(&mut self, model: &M) {
+        self.conditions.clear();
+        model.append_conditions(&mut self.conditions);
+        let (intervals, conditions) = (model.intervals(), self.conditions.len());
+        for iterate in [&mut self.current, &mut self.trial, &mut self.other] {
+            iterate.resize(intervals, conditions);
+        }
+        self.newton.resize(intervals, conditions);
+        self.sides.resize(intervals, conditions);
+        self.scratch.resize(intervals + 1, [0.0; NX]);
+    }
+
+    /// Solves from the model's guesses with at most `cap` iterations each; `current` is then the best result.
+    pub(crate) fn cold(&mut self, model: &M, cap: usize) -> SolveEnd {
+        let mut best: Option<(SolveEnd, f64)> = None;
+        let (mut iterations, mut sweeps) = (0, 0);
+        let settings = model.settings();
+        let barrier = settings.first_barrier;
+        for index in 0..settings.guesses + settings.spare_guesses {
+            let met = best.is_some_and(|(outcome, _)| outcome.meets(settings.acceptable_miss));
+            if index == settings.guesses && met {
+                break;
+            }
+            start::cold(model, &self.conditions, index, barrier, &mut self.current);
+            let mut outcome = self.descend(model, barrier, cap);
+            iterations += outcome.iterations;
+            sweeps += outcome.sweeps;
+            if outcome.status != Status::Converged {
+                self.current.roll_out(model);
+            }
+            outcome.miss = self.current.worst_violation(&self.conditions);
+            let price = self.current.price(model, &self.conditions);
+            if best.is_none_or(|(_, least)| price < least) && price.is_finite() {
+                best = Some((outcome, price));
+                core::mem::swap(&mut self.current, &mut self.other);
+            }
+        }
+        core::mem::swap(&mut self.current, &mut self.other);
+        let best = best.map_or(SolveEnd::BAD, |(outcome, _)| outcome);
+        SolveEnd { iterations, sweeps, ..best }
+    }
+
+    /// Runs Newton iterations from `current`, which is then the last iterate.
+    pub(crate) fn descend(&mut self, model: &M, first_barrier: f64, cap: usize) -> SolveEnd {
+        let tolerance = model.settings().tolerance;
+        let mut barrier = first_barrier;
+        let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
+        self.current.evaluate(model, true);
+        let mut residual = self.residual(model);
+        self.filter = Filter::starting_at(residual.infeasibility);
+        let status = loop {
+            if !residual.largest(0.0).is_finite() {
+                break Status::NotFinite;
+            }
+            if residual.largest(0.0) <= tolerance {
+                break Status::Converged;
+            }
+            if iterations >= cap {
+                break Status::IterationLimit;
+            }
+            iterations += 1;
+
+            while barrier > LAST_BARRIER && residual.largest(barrier) <= BARRIER_TOLERANCE * barrier {
+                let faster = libm::pow(barrier, BARRIER_EXPONENT);
+                barrier = (BARRIER_FACTOR * barrier).min(faster).max(LAST_BARRIER);
+                self.filter.clear();
+            }
+            self.newton.assemble(model, &self.conditions, &self.current, barrier);
+            let first = share.saturating_sub(1);
+            let right = (first..CURVATURE_SHARES.len()).find(|tried| {
+                sweeps += 1;
+                self.newton.sweep.backward(&self.current, CURVATURE_SHARES[*tried])
+            });
+            let Some(right) = right else {
+                break Status::SubproblemFailed;
+            };
+            share = right;
+            self.newton.solve(model, &self.conditions, &self.current, barrier);
+
+            let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
+            let fractions = self.newton.fractions(model, &self.current, kept);
+            let jammed =
+                raises == 0 && barrier < RAISED_BARRIER && fractions.primal.min(fractions.dual) < JAMMED;
+            if jammed || !self.advance(model, barrier, fractions, residual.infeasibility) {
+                if raises >= RAISES {
+                    break Status::Stalled;
+                }
+                raises += 1;
+                barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
+                start::raise(model, &self.conditions, barrier, &mut self.current);
+                self.current.evaluate(model, true);
+                residual = self.residual(model);
+                self.filter = Filter::starting_at(residual.infeasibility);
+            } else {
+                residual = self.residual(model);
+            }
+        };
+        SolveEnd { status, iterations, sweeps, residual, ..SolveEnd::BAD }
+    }
+
+    /// Line search along the step from `current`. Returns whether a point was accepted; it is then `current`.
+    fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> bool {
+        let slope = self.newton.slope(model, &self.current, barrier);
+        let objective = self.current.barrier_objective(model, barrier);
+        let now = Measures { infeasibility, objective };
+        let tiny = self.newton.largest_input_step(model) <= TINY_STEP;
+        let mut share = 1.0;
+        while share >= SHORTEST_STEP {
+            let tried = Fractions { primal: share * fractions.primal, dual: fractions.dual };
+            self.newton.take(&self.conditions, &self.current, tried, &mut self.trial);
+            self.trial.evaluate(model, true);
+            let trial = Measures {
+                infeasibility: self.trial.infeasibility(),
+                objective: self.trial.barrier_objective(model, barrier),
+            };
+            if self.filter.accepts(now, trial, slope, tried.primal) || tiny && trial.is_finite() {
+                core::mem::swap(&mut self.current, &mut self.trial);
+                return true;
+            }
+            share *= 0.5;
+        }
+        false
+    }
+
+    pub(crate) fn residual(&mut self, model: &M) -> Residual {
+        Residual::of(model, &self.conditions, &self.current, &mut self.scratch)
+    }
+}

@@ -1,0 +1,156 @@
+//! A rigid body under a constant thrust along its own axis, turned by three torques: 13 states, 3 inputs.
+
+use super::optimality::Optimality;
+use super::polynomial::{Polynomial, Term, diagonal, equals, within};
+use super::{Kept, solved};
+use crate::{Status, Workspace};
+
+/// Positions, velocities, the quaternion (scalar first) from body to ground, and the rates of the body.
+const R: usize = 0;
+const V: usize = 3;
+const Q: usize = 6;
+const W: usize = 10;
+/// The torques, and the 1.
+const T: usize = 13;
+const ONE: usize = 16;
+
+const INTERVALS: usize = 40;
+const GRAVITY_M_S2: f64 = 9.81;
+const INERTIA_KG_M2: [f64; 3] = [0.12, 0.15, 0.03];
+
+/// Flies to a place in front and to the side in two seconds, and arrives upright and at rest there.
+pub(super) fn problem(limit_n_m: f64) -> Polynomial<13, 3> {
+    let mut rates = Vec::new();
+    let mut add = |row, factor, of| rates.push(Term { row, factor, of });
+    for (i, inertia) in INERTIA_KG_M2.into_iter().enumerate() {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        add(R + i, 1.0, [V + i, ONE]);
+        // q' = q (0, w) / 2.
+        add(Q, -0.5, [Q + 1 + i, W + i]);
+        add(Q + 1 + i, 0.5, [Q, W + i]);
+        add(Q + 1 + i, 0.5, [Q + 1 + j, W + k]);
+        add(Q + 1 + i, -0.5, [Q + 1 + k, W + j]);
+        // Euler's equations.
+        add(W + i, (INERTIA_KG_M2[j] - INERTIA_KG_M2[k]) / inertia, [W + j, W + k]);
+        add(W + i, 1.0 / inertia, [T + i, ONE]);
+    }
+    // The thrust acts along the body's third axis.
+    let thrust_m_s2 = 1.02 * GRAVITY_M_S2;
+    add(V, 2.0 * thrust_m_s2, [Q + 1, Q + 3]);
+    add(V, 2.0 * thrust_m_s2, [Q, Q + 2]);
+    add(V + 1, 2.0 * thrust_m_s2, [Q + 2, Q + 3]);
+    add(V + 1, -2.0 * thrust_m_s2, [Q, Q + 1]);
+    for (component, sign) in [(0, 1.0), (1, -1.0), (2, -1.0), (3, 1.0)] {
+        add(V + 2, sign * thrust_m_s2, [Q + component, Q + component]);
+    }
+    add(V + 2, -GRAVITY_M_S2, [ONE, ONE]);
+
+    let mut upright = [0.0; 13];
+    upright[Q] = 1.0;
+    let mut target = upright;
+    (target[R], target[R + 1]) = (0.6, -0.4);
+    let weights = [1.0, 1.0, 4.0, 0.5, 0.5, 2.0, 0.0, 1.0, 1.0, 2.0, 0.2, 0.2, 0.2];
+    let mut conditions: Vec<_> = [R, R + 1, V, V + 1].map(|i| equals(INTERVALS, i, target[i])).to_vec();
+    conditions.extend([Q + 1, Q + 2, W, W + 1].map(|i| equals(INTERVALS, i, 0.0)));
+    Polynomial {
+        intervals: INTERVALS,
+        initial: upright,
+        target,
+        step_s: 0.05,
+        rates,
+        path_weights: diagonal(&weights.map(|weight| 0.05 * weight)),
+        end_weights: diagonal(&weights),
+        input_weights: diagonal(&[0.5; 3]),
+        ranges: [within(limit_n_m); 3],
+        conditions,
+        price: 1e3,
+    }
+}
+
+#[test]
+fn a_turning_flight_meets_the_optimality_conditions() {
+    for (limit_n_m, limited) in [(5.0, false), (0.2, true)] {
+        let model = problem(limit_n_m);
+        let (workspace, outcome) = solved(&model);
+        let found = Optimality::of(&model, &workspace);
+        println!("{limit_n_m} N m: {outcome:?} {found:?}");
+        found.assert_within(1e-6);
+        assert!(outcome.miss < 1e-6, "{outcome:?}");
+        assert_eq!(found.at_limit > 5, limited, "{found:?}");
+    }
+}
+
+/// The rest of a flight, from its plan and from a little beside it.
+#[test]
+fn a_shifted_plan_is_optimal_and_a_disturbed_one_soon_is() {
+    const SHIFT: usize = 6;
+    let mut model = problem(0.2);
+    let (mut workspace, cold) = solved(&model);
+    let mut plan = Kept::of(&workspace);
+    model.intervals -= SHIFT;
+    for condition in &mut model.conditions {
+        condition.node -= SHIFT;
+    }
+    plan.states.drain(..SHIFT);
+    plan.inputs.drain(..SHIFT);
+    plan.costates.drain(..SHIFT);
+    plan.limit_multipliers.drain(..SHIFT);
+    model.initial = plan.states[0];
+    let outcome = workspace.solve(&model, Some(&plan.start()));
+    assert_eq!((outcome.status, outcome.iterations), (Status::Converged, 0));
+    for (component, kick) in [(V, 0.02), (V + 1, -0.03), (W + 1, 0.05), (Q + 3, 0.01)] {
+        model.initial = plan.states[0];
+        model.initial[component] += kick;
+        let outcome = workspace.solve(&model, Some(&plan.start()));
+        println!("{component}: {} iterations, cold {}", outcome.iterations, cold.iterations);
+        assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
+        assert!(2 * outcome.iterations < cold.iterations, "{outcome:?} {cold:?}");
+        Optimality::of(&model, &workspace).assert_within(1e-6);
+    }
+}
+
+#[test]
+fn inputs_alone_are_a_start() {
+    let model = problem(0.2);
+    let (mut workspace, _) = solved(&model);
+    let cold = Kept::of(&workspace);
+    let start = crate::Start {
+        states: &[],
+        costates: &[],
+        limit_multipliers: &[],
+        condition_multipliers: &[],
+        ..cold.start()
+    };
+    let outcome = workspace.solve(&model, Some(&start));
+    assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
+    assert!(Kept::of(&workspace).farthest_input(&cold) < 1e-4);
+}
+
+#[test]
+fn a_used_workspace_gives_the_same_bits_and_does_not_allocate() {
+    let model = problem(0.2);
+    let (fresh, _) = solved(&model);
+    let plan = Kept::of(&fresh);
+    let mut other = model.clone();
+    other.initial[V] = 0.3;
+    let mut used = Workspace::default();
+    used.solve(&other, None);
+    let allocated = allocation_counter::measure(|| {
+        used.solve(&other, Some(&plan.start()));
+        used.lagrangian(&other, &plan.start());
+        used.solve(&model, None);
+    });
+    assert_eq!(allocated.count_total, 0);
+    assert_eq!(format!("{:?}", used.states()), format!("{:?}", fresh.states()));
+    assert_eq!(used.inputs(), fresh.inputs());
+    assert_eq!(used.costates(), fresh.costates());
+}
+
+#[test]
+fn numbers_that_are_not_finite_give_a_status_and_not_a_panic() {
+    for bad in [f64::NAN, f64::INFINITY, 1e300] {
+        let mut model = problem(0.2);
+        model.initial[V] = bad;
+        assert_ne!(Workspace::default().solve(&model, None).status, Status::Converged);
+    }
+}
