@@ -5,11 +5,21 @@
 //! * [`height`]: the height at which a flight must begin.
 //! * [`window`]: what may differ from the data so that the vehicle still lands.
 //! * [`choice`]: the best mass and height for a motor, or why it does not land.
+//! * [`mission_text`]: the mission with another motor, mass and height, as a text.
+//! * [`flown`]: what quick flights of it come to.
+//! * [`ranking`]: many motors in order; [`table`] and [`picture`] show them.
 
 pub mod choice;
+pub mod flown;
 pub mod frame;
 pub mod height;
+pub mod mission_text;
+pub mod ranking;
+mod markup;
+pub mod picture;
 mod search;
 pub mod source;
+pub mod table;
 pub mod thrustcurve_db;
 pub mod window;
+mod work;

@@ -4,6 +4,8 @@
 //! up to one mass and falls beyond it, and a grid with a golden section around its best place finds that mass.
 
 use crate::choice::{Choice, Obstacle, Pairing, StartHeight, Weighed};
+use crate::height::Fall;
+use crate::window::Onset;
 
 /// Shares of the terminal speed at which the thrust may begin.
 const SPEED_SHARES: [f64; 5] = [0.75, 0.85, 0.92, 0.95, 0.97];
@@ -62,7 +64,7 @@ fn grid(least_kg: f64, most_kg: f64) -> Vec<f64> {
 }
 
 /// The speeds at which the thrust may begin, m/s.
-fn speeds_m_s(pairing: &Pairing<'_>, fall: &crate::height::Fall, onset: &crate::window::Onset<'_>) -> Vec<f64> {
+fn speeds_m_s(pairing: &Pairing<'_>, fall: &Fall, onset: &Onset<'_>) -> Vec<f64> {
     match pairing.limits.start {
         StartHeight::Exactly(start_m) => vec![agreed_m_s(fall, onset, start_m)],
         StartHeight::AtMost(_) => {
@@ -75,7 +77,7 @@ fn speeds_m_s(pairing: &Pairing<'_>, fall: &crate::height::Fall, onset: &crate::
 }
 
 /// The speed at the first thrust after a start at a height, m/s, where guidance lets the thrust begin at that speed.
-fn agreed_m_s(fall: &crate::height::Fall, onset: &crate::window::Onset<'_>, start_m: f64) -> f64 {
+fn agreed_m_s(fall: &Fall, onset: &Onset<'_>, start_m: f64) -> f64 {
     let mut speed_m_s = fall.speed_m_s(start_m, 0.2 * start_m);
     for _ in 0..ROUNDS {
         let Some(onset_m) = onset.chosen_m(speed_m_s) else { break };
@@ -109,7 +111,7 @@ pub(crate) fn best(pairing: &Pairing<'_>, landing_kg: [f64; 2]) -> Result<Choice
     };
     let around = |index: usize| masses_kg[index.min(masses_kg.len() - 1)];
     let place = golden(pairing, place, [around(index.saturating_sub(1)), around(index + 1)]);
-    finished(pairing, place, landing_kg).ok_or(Obstacle::Mass { possible_kg: pairing.limits.masses_kg })
+    finished(pairing, &place, landing_kg).ok_or(Obstacle::Mass { possible_kg: pairing.limits.masses_kg })
 }
 
 /// A mass, and the best speed for it.
@@ -189,12 +191,20 @@ fn golden(pairing: &Pairing<'_>, good: Place, [mut low_kg, mut high_kg]: [f64; 2
     best
 }
 
-fn finished(pairing: &Pairing<'_>, place: Place, landing_kg: [f64; 2]) -> Option<Choice> {
-    let Weighed { mass, ballast, onset, fall } = pairing.weighed(place.mass_kg).ok()?;
+fn finished(pairing: &Pairing<'_>, place: &Place, landing_kg: [f64; 2]) -> Option<Choice> {
+    let [least_kg, most_kg] = pairing.limits.masses_kg;
+    // A team weighs to a gram.
+    let rounded_kg = libm::round(place.mass_kg * 1e3) / 1e3;
+    let is_end = place.mass_kg <= least_kg || place.mass_kg >= most_kg;
+    let mass_kg = if is_end { place.mass_kg } else { rounded_kg.clamp(least_kg, most_kg) };
+    let Weighed { mass, ballast, onset, fall } = pairing.weighed(mass_kg).ok()?;
     let window = onset.window(place.speed_m_s)?;
     let start_height_m = match pairing.limits.start {
         StartHeight::Exactly(start_m) => start_m,
-        StartHeight::AtMost(_) => fall.start_height_m(window.onset_m, place.speed_m_s)?,
+        // To a metre, upwards: from higher it is hardly faster.
+        StartHeight::AtMost(most_m) => {
+            libm::ceil(fall.start_height_m(window.onset_m, place.speed_m_s)?).min(most_m)
+        }
     };
     Some(Choice { mass, ballast, start_height_m, window, landing_kg })
 }
