@@ -57,9 +57,13 @@ pub struct Refusal {
 pub enum Obstacle {
     #[error("does not fit: its diameter is {motor_mm:.0} mm; up to {tube_mm:.0} mm is accepted")]
     Diameter { motor_mm: f64, tube_mm: f64 },
-    #[error("does not fit: its length is {motor_mm:.0} mm; up to {body_mm:.0} mm, the body's length, is accepted")]
+    #[error(
+        "does not fit: its length is {motor_mm:.0} mm; up to {body_mm:.0} mm, the body's length, is accepted"
+    )]
     Length { motor_mm: f64, body_mm: f64 },
-    #[error("its thrust of at most {peak_n:.1} N is never above the weight of {weight_n:.1} N at {mass_kg:.3} kg")]
+    #[error(
+        "its thrust of at most {peak_n:.1} N is never above the weight of {weight_n:.1} N at {mass_kg:.3} kg"
+    )]
     Thrust { peak_n: f64, weight_n: f64, mass_kg: f64 },
     #[error("no landing exists {}", at_masses(*.possible_kg))]
     Mass { possible_kg: [f64; 2] },

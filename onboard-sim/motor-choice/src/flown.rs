@@ -93,9 +93,8 @@ pub(crate) fn fly_rows(
     jobs: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Vec<Row>>, FlyError> {
-    let tasks: Vec<(usize, u64)> = (0..recipes.len())
-        .flat_map(|recipe| numbers.clone().map(move |number| (recipe, number)))
-        .collect();
+    let tasks: Vec<(usize, u64)> =
+        (0..recipes.len()).flat_map(|recipe| numbers.clone().map(move |number| (recipe, number))).collect();
     let flown = in_parallel(&tasks, jobs, |(recipe, number)| tally::fly(recipes[*recipe], *number), done)?;
     let mut rows: Vec<Vec<Row>> = vec![Vec::new(); recipes.len()];
     for ((recipe, number), row) in tasks.into_iter().zip(flown) {

@@ -8,15 +8,17 @@
 //! * [`mission_text`]: the mission with another motor, mass and height, as a text.
 //! * [`flown`]: what quick flights of it come to.
 //! * [`ranking`]: many motors in order; [`table`] and [`picture`] show them.
+//! * [`card`]: the page for the field.
 
+pub mod card;
 pub mod choice;
 pub mod flown;
 pub mod frame;
 pub mod height;
-pub mod mission_text;
-pub mod ranking;
 mod markup;
+pub mod mission_text;
 pub mod picture;
+pub mod ranking;
 mod search;
 pub mod source;
 pub mod table;

@@ -76,11 +76,7 @@ fn bar(rank: usize, landing: &Landing, [x, y]: [Scale; 2], out: &mut String) -> 
         .as_ref()
         .map_or_else(String::new, |flown| format!(", {:.0} % land", 100.0 * flown.legs.share));
     let base_px = middle_px + 4.0;
-    writeln!(
-        out,
-        r#"<text x="{:.1}" y="{base_px:.1}" text-anchor="end">{rank}</text>"#,
-        x.from_px - 6.0
-    )?;
+    writeln!(out, r#"<text x="{:.1}" y="{base_px:.1}" text-anchor="end">{rank}</text>"#, x.from_px - 6.0)?;
     writeln!(
         out,
         r#"<text x="{:.1}" y="{base_px:.1}" font-size="11">{name}, {:.2} kg from {:.0} m{rate}</text>"#,

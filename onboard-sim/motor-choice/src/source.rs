@@ -76,11 +76,9 @@ pub fn built_in() -> Vec<Found> {
             curve,
             in_production: None,
         }),
-        Err(error) => Err(Unusable {
-            name: name.to_owned(),
-            origin: "built in".to_owned(),
-            reason: error.to_string(),
-        }),
+        Err(error) => {
+            Err(Unusable { name: name.to_owned(), origin: "built in".to_owned(), reason: error.to_string() })
+        }
     });
     found.collect()
 }
@@ -96,7 +94,9 @@ pub fn read(path: &Path) -> Result<Vec<Found>, SourceError> {
     }
     let unreadable = |source| SourceError::Read { path: path.to_owned(), source };
     let mut files = fs::read_dir(path)
-        .and_then(|entries| entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>())
+        .and_then(|entries| {
+            entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<Vec<_>, _>>()
+        })
         .map_err(unreadable)?;
     files.retain(|file| ENDINGS.iter().any(|ending| has_ending(file, ending)) && file.is_file());
     files.sort();

@@ -12,7 +12,9 @@ use crate::source::{Candidate, Found, Unusable};
 #[derive(Debug, thiserror::Error)]
 pub enum ListError {
     /// Not a JSON array.
-    #[error("not a list of motors: a JSON array of objects, as in the npm package thrustcurve-db, is accepted")]
+    #[error(
+        "not a list of motors: a JSON array of objects, as in the npm package thrustcurve-db, is accepted"
+    )]
     Json(#[from] serde_json::Error),
     /// The array is empty.
     #[error("the list holds no motor")]
@@ -80,7 +82,9 @@ fn motor(entry: &Entry) -> Result<ThrustCurve, String> {
     let propellant_mass_kg = kg("propWeightG", entry.prop_weight_g)?;
     let total_mass_kg = kg("totalWeightG", entry.total_weight_g)?;
     if entry.samples.is_empty() {
-        return Err("samples is missing or empty; points of time in s and thrust in N are accepted".to_owned());
+        return Err(
+            "samples is missing or empty; points of time in s and thrust in N are accepted".to_owned()
+        );
     }
     let mut points: Vec<ThrustPoint> = Vec::with_capacity(entry.samples.len() + 1);
     for (place, [time_s, thrust_n]) in entry.samples.iter().copied().enumerate() {

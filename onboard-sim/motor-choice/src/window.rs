@@ -78,7 +78,8 @@ impl<'a> Onset<'a> {
             burn_time_scales: scaled(self.settings.burn_time_scales),
             ..self.settings
         };
-        let sound = settings.impulse_scales.iter().chain(&settings.burn_time_scales).all(|scale| *scale > 0.05);
+        let sound =
+            settings.impulse_scales.iter().chain(&settings.burn_time_scales).all(|scale| *scale > 0.05);
         let room_m = 2.0 * scatter * self.igniter_s * speed_m_s;
         let outlook = || settings.outlook(&self.column, self.curve, 0.0, -speed_m_s, 0.0);
         sound && outlook().common.is_some_and(|common| common.high_m - common.low_m >= room_m)

@@ -148,11 +148,6 @@ impl Choices {
     pub(super) fn jobs(&self) -> usize {
         self.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
     }
-
-    /// The options that a campaign needs for the same flights.
-    pub(super) fn of_a_campaign(&self) -> (&str, u64) {
-        (&self.dispersion, self.seed)
-    }
 }
 
 /// Shows on standard error how much of something is done: every per cent on a terminal, every tenth in a file.

@@ -44,7 +44,8 @@ pub(crate) fn write_folder(folder: &Path, files: &[(&str, String)], force: bool)
     for (name, _) in files {
         refuse_loss(&folder.join(name), force)?;
     }
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut complete = Vec::with_capacity(files.len());
     for (name, text) in files {
         let path = folder.join(name);
