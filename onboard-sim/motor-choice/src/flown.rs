@@ -82,25 +82,24 @@ pub fn fly(
     jobs: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Flown>, FlyError> {
-    let rows = fly_rows(recipes, 0..flights, jobs, done)?;
-    Ok(rows.iter().map(|rows| Flown::of(rows)).collect())
+    let tasks: Vec<(&Recipe, u64)> =
+        recipes.iter().flat_map(|recipe| (0..flights).map(|number| (*recipe, number))).collect();
+    let rows = fly_rows(&tasks, jobs, done)?;
+    // Without flights there are no chunks.
+    let mut of_each = rows.chunks(flights.max(1) as usize);
+    Ok(recipes.iter().map(|_| Flown::of(of_each.next().unwrap_or_default())).collect())
 }
 
-/// The rows of some flights of each recipe.
+/// The rows of some flights, in their order.
 pub(crate) fn fly_rows(
-    recipes: &[&Recipe],
-    numbers: core::ops::Range<u64>,
+    tasks: &[(&Recipe, u64)],
     jobs: usize,
     done: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Vec<Row>>, FlyError> {
-    let tasks: Vec<(usize, u64)> =
-        (0..recipes.len()).flat_map(|recipe| numbers.clone().map(move |number| (recipe, number))).collect();
-    let flown = in_parallel(&tasks, jobs, |(recipe, number)| tally::fly(recipes[*recipe], *number), done)?;
-    let mut rows: Vec<Vec<Row>> = vec![Vec::new(); recipes.len()];
-    for ((recipe, number), row) in tasks.into_iter().zip(flown) {
-        rows[recipe].push(row.map_err(|source| FlyError::Flight { number, source })?);
-    }
-    Ok(rows)
+) -> Result<Vec<Row>, FlyError> {
+    let flown = in_parallel(tasks, jobs, |(recipe, number)| tally::fly(recipe, *number), done)?;
+    let rows = tasks.iter().zip(flown);
+    rows.map(|((_, number), row)| row.map_err(|source| FlyError::Flight { number: *number, source }))
+        .collect()
 }
 
 impl Flown {

@@ -146,3 +146,81 @@ fn rod_inertia_kg_m2(motor: &ThrustCurve) -> f64 {
 fn squared(value: f64) -> f64 {
     value * value
 }
+
+#[cfg(test)]
+mod tests {
+    use flight::vehicle::thrust_curve::{MotorData, ThrustPoint};
+
+    use super::*;
+
+    fn motor(total_mass_kg: f64, length_m: f64) -> ThrustCurve {
+        let points = [(0.0, 0.0), (1.0, 40.0), (2.0, 0.0)];
+        ThrustCurve::new(MotorData {
+            name: "T".to_owned(),
+            manufacturer: String::new(),
+            diameter_m: 0.04,
+            length_m,
+            propellant_mass_kg: 0.1,
+            total_mass_kg,
+            points: points.map(|(time_s, thrust_n)| ThrustPoint { time_s, thrust_n }).to_vec(),
+        })
+        .unwrap()
+    }
+
+    fn mission() -> Mission {
+        let mut mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+        mission.airframe.mass = Mass {
+            loaded_kg: 3.0,
+            loaded_cg_station_m: 0.5,
+            loaded_pitch_inertia_kg_m2: 0.2,
+            roll_inertia_kg_m2: 0.006,
+            propellant_station_m: 0.1,
+        };
+        mission.motor_curve = motor(0.5, 0.2);
+        mission
+    }
+
+    /// 0.5 kg of motor at 0.1 m leave 2.5 kg at (1.5 - 0.05) / 2.5 m with 0.2 - 0.5 (0.04 / 12 + 0.0016 / 16) - 0.5 * 0.16
+    /// - 2.5 * 0.0064 kg m2. A motor of 1 kg and 0.4 m and 0.5 kg at 0.7 m make 4 kg at (1.45 + 0.2 + 0.35) / 4 m.
+    #[test]
+    fn val_hand_another_motor_moves_mass_centre_of_gravity_and_inertia() {
+        let frame = Frame::of(&mission()).unwrap();
+        assert!((frame.mass_kg() - 2.5).abs() < 1e-12 && (frame.cg_station_m() - 0.58).abs() < 1e-12);
+        assert!((frame.pitch_inertia_kg_m2 - 0.102_283_333).abs() < 1e-8, "{frame:?}");
+        let mass = frame.with(&motor(1.0, 0.4), Ballast { mass_kg: 0.5, station_m: 0.7 }).unwrap();
+        assert!((mass.loaded_kg - 4.0).abs() < 1e-12 && (mass.loaded_cg_station_m - 0.5).abs() < 1e-12);
+        // 0.102283 + 2.5 * 0.0064 + (0.16 / 12 + 0.0001) + 0.09 + 0.5 * 0.04
+        assert!((mass.loaded_pitch_inertia_kg_m2 - 0.241_716_667).abs() < 1e-8, "{mass:?}");
+        assert!((mass.propellant_station_m - 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn its_own_motor_gives_the_airframe_back_to_the_bit() {
+        for (name, _) in vehicles::mission::BUILTIN {
+            let mission = vehicles::mission::builtin(name).unwrap().unwrap();
+            let frame = Frame::of(&mission).unwrap();
+            let none = Ballast { mass_kg: 0.0, station_m: 0.4 };
+            assert_eq!(frame.with(&mission.motor_curve, none).unwrap(), mission.airframe.mass, "{name}");
+            let some = Ballast { mass_kg: 1e-9, station_m: frame.cg_station_m() };
+            let nearly = frame.with(&mission.motor_curve, some).unwrap();
+            let apart = nearly.loaded_pitch_inertia_kg_m2 - mission.airframe.mass.loaded_pitch_inertia_kg_m2;
+            assert!(apart.abs() < 1e-8, "{name}: {apart}");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_cannot_be_is_refused_with_its_value() {
+        let mut light = mission();
+        light.airframe.mass.loaded_kg = 0.4;
+        let error = Frame::of(&light).unwrap_err().to_string();
+        assert_eq!(error, "airframe.mass.loaded_kg is 0.4; more than the 0.5 kg of its motor T is accepted");
+        let mut thin = mission();
+        thin.airframe.mass.loaded_pitch_inertia_kg_m2 = 0.01;
+        assert!(Frame::of(&thin).unwrap_err().to_string().contains("kg_m2 is 0.01; more than 0.0817"));
+        let frame = Frame::of(&mission()).unwrap();
+        let heavy = frame.with(&motor(30.0, 0.6), Ballast { mass_kg: 0.0, station_m: 0.4 });
+        assert!(heavy.is_ok_and(|mass| mass.loaded_cg_station_m < 0.33), "nearly all of it is motor");
+        let tail = frame.with(&motor(0.5, 0.2), Ballast { mass_kg: 40.0, station_m: 0.0 });
+        assert_eq!(tail.unwrap_err().key, "mass.propellant_station_m");
+    }
+}

@@ -73,3 +73,41 @@ pub fn name_of(mission: &str, motor: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
     format!("{mission} {motor}").chars().map(plain).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_with_the_same_values_is_the_same_mission() {
+        for (name, text) in vehicles::mission::BUILTIN {
+            let mission = vehicles::mission::from_toml(text, name).unwrap();
+            let changes = Changes {
+                name: &mission.name,
+                summary: &mission.summary,
+                motor: &mission.airframe.motor,
+                mass: mission.airframe.mass,
+                start_height_m: mission.start.height_m,
+            };
+            let again = changed(text, &changes).unwrap();
+            assert_eq!(vehicles::mission::from_toml(&again, name).unwrap(), mission);
+            let moved = changed(&again, &Changes { start_height_m: 77.5, ..changes }).unwrap();
+            let moved = vehicles::mission::from_toml(&moved, name).unwrap();
+            assert!((moved.start.height_m - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
+        }
+    }
+
+    #[test]
+    fn the_text_of_a_motor_file_stays_in_the_mission() {
+        let (name, text) = vehicles::mission::BUILTIN[0];
+        let mission = vehicles::mission::from_toml(text, name).unwrap();
+        let motor = "; it's \"quoted\" \\ and 'so'\nX1 29 93 4-6-8 0.04 0.08 A B\n0.5 30\n2 0\n";
+        let changes =
+            Changes { name: "x", summary: "y", motor, mass: mission.airframe.mass, start_height_m: 100.0 };
+        let again = vehicles::mission::from_toml(&changed(text, &changes).unwrap(), "x").unwrap();
+        assert_eq!(again.airframe.motor, motor);
+        assert_eq!(again.motor_curve, vehicles::motors::named(motor).unwrap());
+        assert_eq!(name_of("mk2", "A B/3.5"), "mk2-a-b-3.5");
+        assert!(changed("name = 3", &changes).unwrap_err().to_string().contains("no airframe"));
+    }
+}

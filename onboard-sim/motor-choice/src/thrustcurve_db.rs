@@ -164,7 +164,7 @@ mod tests {
     fn an_entry_that_is_not_whole_is_named_with_line_key_and_value() {
         let found = parse(EXCERPT, "db.json").unwrap();
         let [twice, no_mass] = [&found[1], &found[2]].map(|found| found.as_ref().unwrap_err());
-        assert_eq!((twice.name.as_str(), twice.origin.as_str()), ("Cesaroni 129G79-13A", "db.json:34"));
+        assert_eq!((twice.name.as_str(), twice.origin.as_str()), ("Cesaroni 129G79-13A", "db.json:32"));
         assert_eq!(twice.reason, "samples[24]: time is 1.631; times must increase from point to point");
         assert_eq!(no_mass.name, "Ellis H50");
         assert_eq!(no_mass.reason, "totalWeightG is missing; a mass in g is accepted");

@@ -18,7 +18,7 @@ use super::output::{refuse_loss, write_folder};
 /// More wind than that of the day, m/s.
 const WINDIER_M_S: f64 = 3.0;
 /// Steady winds in which the certified vehicle is flown, m/s.
-const STEADY_M_S: [f64; 8] = [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0];
+const STEADY_M_S: [f64; 6] = [0.0, 3.0, 6.0, 9.0, 12.0, 15.0];
 /// The files of a card.
 const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "day.toml"];
 /// Most flights of a card.

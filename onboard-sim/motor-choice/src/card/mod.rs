@@ -63,7 +63,6 @@ pub struct Card {
     /// Command heights of the feet from which a controller that knows everything would land.
     clairvoyant: Option<Clairvoyant>,
     seed: u64,
-    dispersion_name: String,
 }
 
 /// Why there is no card.
@@ -111,7 +110,7 @@ impl Card {
         };
         let landing = Landing { candidate: order.motor.clone(), choice, flown: None };
         let mission_toml = landing.mission_toml(&order.mission.name, order.mission_toml)?;
-        let mut recipe = order.today.weather.recipe(&mission_toml, "the mission of the card")?;
+        let recipe = order.today.weather.recipe(&mission_toml, "the mission of the card")?;
         let winds = flights::fly_in_winds(order, &recipe, progress)?;
         if winds.today.legs.count == 0 {
             let reason = winds.today.failure.as_ref().map_or("unknown", |(reason, _)| reason);
@@ -122,7 +121,6 @@ impl Card {
                 reason: reason.to_owned(),
             });
         }
-        recipe.dispersion = Dispersion::default();
         let clairvoyant = certified_window(&recipe.mission);
         Ok(Self {
             mission: recipe.mission,
@@ -132,7 +130,6 @@ impl Card {
             winds,
             clairvoyant,
             seed: order.today.weather.seed,
-            dispersion_name: order.today.weather.dispersion_name.clone(),
         })
     }
 

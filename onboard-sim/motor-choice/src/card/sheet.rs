@@ -29,7 +29,7 @@ fn row(what: &str, value: String, remark: impl Into<String>) -> [String; 3] {
 fn rate(flown: &Flown) -> String {
     let legs = flown.legs;
     format!(
-        "{} of {}: {:.0} % ({:.0} to {:.0} %)",
+        "{} of {}: {:.0} % ({:.0} to {:.0})",
         legs.count,
         legs.of,
         100.0 * legs.share,
@@ -61,7 +61,7 @@ impl Card {
             checks: self.checks(),
             notes: vec![
                 format!(
-                    "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; from {}.",
+                    "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; data: {}.",
                     self.landing.candidate.name(),
                     curve.total_impulse_n_s(),
                     curve.burn_time_s(),
@@ -91,7 +91,11 @@ impl Card {
         let empty_kg = mass.loaded_kg - motor_kg;
         let empty_cg_m =
             (mass.loaded_kg * mass.loaded_cg_station_m - motor_kg * mass.propellant_station_m) / empty_kg;
-        let ballast_words = if ballast.mass_kg < 0.0 { "take out" } else { "add" };
+        let ballast_words = match ballast.mass_kg {
+            0.0 => "none".to_owned(),
+            mass_kg if mass_kg < 0.0 => format!("take out {:.3} kg", -mass_kg),
+            mass_kg => format!("add {mass_kg:.3} kg"),
+        };
         Section {
             title: "Set before the flight",
             rows: vec![
@@ -101,13 +105,13 @@ impl Card {
                     format!("{empty_kg:.3} kg without the motor"),
                 ),
                 row(
-                    "Centre of gravity, motor in",
+                    "Balance, motor in",
                     format!("{:.0} mm above the nozzle", 1e3 * mass.loaded_cg_station_m),
-                    format!("{:.0} mm without the motor", 1e3 * empty_cg_m),
+                    format!("centre of gravity; {:.0} mm without the motor", 1e3 * empty_cg_m),
                 ),
                 row(
                     "Ballast",
-                    format!("{ballast_words} {:.3} kg", ballast.mass_kg.abs()),
+                    ballast_words,
                     format!(
                         "at {:.0} mm; the airframe without motor and ballast is {:.3} kg",
                         1e3 * ballast.station_m,
@@ -182,8 +186,8 @@ impl Card {
                 ),
                 row(
                     "Do not fly above",
-                    format!("{} m/s", winds.windier_m_s.min(winds.steady_m_s.unwrap_or(0.0))),
-                    "mean wind 10 m above the ground; with more wind than this nothing was flown",
+                    format!("{} m/s", winds.limit_m_s()),
+                    "mean wind 10 m above the ground; above it fewer flights land, or none was flown",
                 ),
             ],
         }
@@ -243,7 +247,7 @@ impl Card {
             "Load mission.toml; the ground station shows its name and no failed self-test.".to_owned(),
             format!(
                 "Measure the wind for ten minutes: mean below {} m/s.",
-                self.winds.windier_m_s.min(self.winds.steady_m_s.unwrap_or(0.0))
+                self.winds.limit_m_s()
             ),
             format!("Nobody within {:.0} m of the pad, the fence of the mission.", mission.gate.fence_radius_m),
             format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
