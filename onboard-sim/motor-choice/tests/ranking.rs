@@ -48,7 +48,7 @@ fn regress_mini_f10_on_its_own_motor() {
         window.impulse_scales[0],
         window.impulse_scales[1],
     ];
-    for (found, expected) in found.into_iter().zip([0.853, 100.0, 0.883, 24.7, 0.930, 1.069]) {
+    for (found, expected) in found.into_iter().zip([0.855, 99.0, 0.883, 24.3, 0.930, 1.069]) {
         assert!((found / expected - 1.0).abs() < 0.005, "{found} {expected}");
     }
 }
@@ -139,7 +139,7 @@ fn every_broken_file_of_a_folder_is_named_with_line_and_value() {
             .unwrap()
     };
     let grams = reason("grams.eng");
-    assert!(grams.starts_with("line 1: propellant mass is '40.7 kg for 8"), "{grams}");
+    assert!(grams.starts_with("line 1: propellant mass is '40.7 kg for 91.1 N s'"), "{grams}");
     assert!(grams.ends_with("a .eng file has kilograms, a .rse file grams"), "{grams}");
     assert!(reason("kilograms.rse").starts_with("line 1: propellant mass is '0.0000407 kg for 50.0 N s'"));
     assert_eq!(reason("overlap.eng"), "line 4: time is '0.4'; times must increase from point to point");
