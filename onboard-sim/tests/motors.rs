@@ -161,7 +161,7 @@ fn what_cannot_land_gets_no_card_but_the_bound_and_the_nearest() {
     assert_eq!(refused.status.code(), Some(1));
     let words = stderr(&refused);
     for expected in [
-        "error: Cesaroni H42: no landing exists at 3.100 kg; it would land at 2.",
+        "error: Cesaroni H42 (built in): no landing exists at 3.100 kg; it would land at 2.",
         "  bound: ",
         "  nearest mass on this motor: 2.",
         "kg more than that",

@@ -128,12 +128,13 @@ fn read_file(path: &Path) -> Result<Vec<Found>, SourceError> {
 /// The motor of a motor file's text.
 fn one(path: &Path, text: &str) -> Found {
     let origin = path.display().to_string();
+    let text = text.trim_start_matches('\u{feff}');
     let curve = vehicles::thrust_curve::from_file_text(&origin, text).map_err(|error| Unusable {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         origin: origin.clone(),
         reason: error.to_string(),
     })?;
     // A mission takes a text without a line break for a name.
-    let motor = format!("{}\n", text.trim_start_matches('\u{feff}').trim_end());
+    let motor = format!("{}\n", text.trim_end());
     Ok(Candidate { origin, motor, curve, in_production: None })
 }

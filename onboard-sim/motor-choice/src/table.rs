@@ -184,8 +184,8 @@ fn record(rank: usize, ranked: &Ranked) -> [String; 25] {
     let mut cells: [String; 25] = Default::default();
     if let Some(candidate) = candidate {
         let curve = &candidate.curve;
-        cells[1] = curve.manufacturer().to_owned();
-        cells[2] = curve.name().to_owned();
+        curve.manufacturer().clone_into(&mut cells[1]);
+        curve.name().clone_into(&mut cells[2]);
         cells[3].clone_from(&candidate.origin);
         cells[4] = candidate.in_production.map_or_else(String::new, |made| made.to_string());
         cells[5] = format!("{:.1}", 1e3 * curve.diameter_m());

@@ -67,7 +67,8 @@ pub(super) fn no_landing(
     });
     let bound = bound(order, frame, limits);
     let other_motors = other_motors(order, frame, limits)?;
-    Ok(NoLanding { motor: order.motor.name(), refusal, bound, other_mass, other_motors })
+    let motor = format!("{} ({})", order.motor.name(), order.motor.origin);
+    Ok(NoLanding { motor, refusal, bound, other_mass, other_motors })
 }
 
 /// What a controller that knows everything could do.
