@@ -184,7 +184,9 @@ fn ranking(jobs: usize) -> Vec<Ranked> {
 fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
     let ranked = ranking(1);
     assert_eq!(ranked, ranking(3));
-    assert_eq!(ranked.len(), 12);
+    // Five broken files.
+    let of = vehicles::motors::names().count() + 5;
+    assert_eq!(ranked.len(), of);
     let names: Vec<String> = ranked
         .iter()
         .filter_map(|ranked| match ranked {
@@ -194,13 +196,13 @@ fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
         .collect();
     assert!(names.len() == 2 && names.iter().all(|name| name == "G12" || name == "F10"), "{names:?}");
     let text = table::text(&ranked, false);
-    assert!(text.contains("10 of 12 motors cannot be landed on:"), "{text}");
+    assert!(text.contains(&format!("{} of {of} motors cannot be landed on:", of - 2)), "{text}");
     assert!(text.contains("AT H45W") && text.contains("does not fit: its diameter is 38 mm"), "{text}");
     assert!(text.contains("line 4: time is '0.4'; times must increase"), "{text}");
     let mut csv = Vec::new();
     table::write_csv(&ranked, &mut csv).unwrap();
     let csv = String::from_utf8(csv).unwrap();
-    assert_eq!(csv.lines().count(), 13);
+    assert_eq!(csv.lines().count(), of + 1);
     assert!(csv.lines().nth(1).unwrap().starts_with("1,"), "{csv}");
     let svg = picture::svg(&ranked, "mini <f10>");
     let document = roxmltree::Document::parse(&svg).unwrap();

@@ -79,13 +79,12 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let loaded = choices.load()?;
     let mission = &loaded.mission;
     let found = choices.motors()?;
-    let motor = match &arguments.motor {
-        Some(name) => named(name, &found)?,
-        None => {
-            let motor = mission.airframe.motor.clone();
-            let curve = mission.motor_curve.clone();
-            Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
-        }
+    let motor = if let Some(name) = &arguments.motor {
+        named(name, &found)?
+    } else {
+        let motor = mission.airframe.motor.clone();
+        let curve = mission.motor_curve.clone();
+        Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
     };
     let set = choices.weather()?;
     let (today, windier) = (day(&set, wind_m_s)?, day(&set, wind_m_s + WINDIER_M_S)?);
