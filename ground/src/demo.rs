@@ -15,6 +15,8 @@ use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
 use tokio::sync::{oneshot, watch};
 
+use crate::cli::Demonstration;
+
 pub use onboard_sim::fly::{LogClock, Speed};
 
 /// How long to wait for the end of the simulator.
@@ -31,12 +33,13 @@ pub struct DemoOptions {
 }
 
 impl DemoOptions {
-    /// Reads the profile or mission.
+    /// Reads the profile or mission. A mission that has a launch begins on its pad, unless a start is given.
     ///
     /// # Errors
     /// There is no profile of that name, or it is invalid.
-    pub fn load(name_or_path: &str, seed: u64, speed: Speed, system_id: u8) -> anyhow::Result<Self> {
-        Ok(Self { profile: fly::load_flight(name_or_path)?, seed, speed, system_id })
+    pub fn load(demonstration: &Demonstration<'_>, system_id: u8) -> anyhow::Result<Self> {
+        let Demonstration { profile, start, seed, speed } = *demonstration;
+        Ok(Self { profile: fly::load_flight(profile)?.starting_at(start)?, seed, speed, system_id })
     }
 
     /// The header of the log that contains both sides.

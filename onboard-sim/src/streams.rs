@@ -104,7 +104,8 @@ pub const FROM_APOGEE: [Standard; 25] = [
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
-    standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0),
+    // Without its extensions, which are zero from apogee on. On the way up there is no plan to be sent.
+    standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(57),
     standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 4.0),
     standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
     standard::<TD_FINS_DATA>("RATE_FINS", 2.0),

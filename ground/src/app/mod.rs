@@ -83,10 +83,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
 async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &cli.connect[..] {
-        [] => {
-            let (profile, seed, speed) = cli.demonstration();
-            Some(DemoOptions::load(profile, seed, speed, cli.vehicle().system_id)?)
-        }
+        [] => Some(DemoOptions::load(&cli.demonstration(), cli.vehicle().system_id)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -158,7 +155,7 @@ async fn start(
             .next()
             .filter(|_| links.len() == 1)
             .and_then(LinkAddress::capacity_bytes_s),
-        vehicle_name: demo.as_ref().map(|_| cli.demonstration().0.to_owned()),
+        vehicle_name: demo.as_ref().map(|_| cli.demonstration().profile.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: cli.us(),

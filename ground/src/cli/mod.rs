@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Parser, Subcommand};
+use onboard_sim::fly::StartPoint;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 
@@ -57,6 +58,10 @@ pub struct Cli {
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
     pub profile: Option<String>,
 
+    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one.
+    #[arg(long, value_name = "START", conflicts_with = "connect", global = true)]
+    pub start: Option<StartPoint>,
+
     /// Demonstration: seed of its dispersions. Default: 1.
     #[arg(long, value_name = "NUMBER", conflicts_with = "connect", global = true)]
     pub seed: Option<u64>,
@@ -82,7 +87,7 @@ pub struct Cli {
     pub demo: bool,
 
     /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "seed", "speed"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
     pub replay: Option<PathBuf>,
 
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
@@ -173,11 +178,26 @@ pub enum ConfigCommand {
     Example,
 }
 
+/// What the demonstration flies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demonstration<'a> {
+    /// A built-in name or a file.
+    pub profile: &'a str,
+    /// Where it begins; `None` leaves it to the profile.
+    pub start: Option<StartPoint>,
+    pub seed: u64,
+    pub speed: Speed,
+}
+
 impl Cli {
-    /// Profile, seed and speed of the demonstration.
-    pub fn demonstration(&self) -> (&str, u64, Speed) {
-        let profile = self.profile.as_deref().unwrap_or(DEMO_PROFILE);
-        (profile, self.seed.unwrap_or(DEMO_SEED), self.speed.unwrap_or(Speed::Factor(1.0)))
+    /// What the demonstration flies.
+    pub fn demonstration(&self) -> Demonstration<'_> {
+        Demonstration {
+            profile: self.profile.as_deref().unwrap_or(DEMO_PROFILE),
+            start: self.start,
+            seed: self.seed.unwrap_or(DEMO_SEED),
+            speed: self.speed.unwrap_or(Speed::Factor(1.0)),
+        }
     }
 
     /// Our own MAVLink address.
@@ -192,7 +212,11 @@ impl Cli {
 
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
     pub fn describes_demonstration(&self) -> bool {
-        self.demo || self.profile.is_some() || self.seed.is_some() || self.speed.is_some()
+        self.demo
+            || self.profile.is_some()
+            || self.start.is_some()
+            || self.seed.is_some()
+            || self.speed.is_some()
     }
 
     /// A given flag that the command would ignore.
@@ -205,6 +229,7 @@ impl Cli {
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
+            ("--start", self.start.is_some()),
             ("--seed", self.seed.is_some()),
             ("--speed", self.speed.is_some()),
             ("--demo", self.demo),
@@ -242,6 +267,7 @@ mod tests {
             "--vehicle-sysid",
             "--log",
             "--profile",
+            "--start",
             "--seed",
             "--speed",
             "--auto",
@@ -268,7 +294,8 @@ mod tests {
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap();
-        assert_eq!(demo.demonstration(), ("mk2", 1, Speed::Factor(1.0)), "the mission itself");
+        let expected = Demonstration { profile: "mk2", start: None, seed: 1, speed: Speed::Factor(1.0) };
+        assert_eq!(demo.demonstration(), expected, "the mission itself");
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
         let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
         assert!(!live.starts_by_itself(false));
@@ -283,6 +310,7 @@ mod tests {
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),
+            ("--start", " apogee"),
             ("--seed", " 1"),
             ("--speed", " 1"),
             ("--demo", ""),

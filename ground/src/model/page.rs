@@ -8,6 +8,8 @@ use super::alarm::AlarmKind;
 pub enum Page {
     /// Arming checks and the arming ladder.
     Pad,
+    /// Height, speed, apogee and booster on the way up; it shares the key of the descent.
+    Ascent,
     /// Height and speed against the ignition band.
     Descent,
     /// The burn: side view, controller, actuators.
@@ -42,7 +44,8 @@ impl Page {
 
     /// The key that shows the page.
     pub fn key(self) -> char {
-        let digit = Self::ALL.iter().position(|page| *page == self).map(|place| place as u32 + 1);
+        let of = if self == Self::Ascent { Self::Descent } else { self };
+        let digit = Self::ALL.iter().position(|page| *page == of).map(|place| place as u32 + 1);
         digit.and_then(|digit| char::from_digit(digit, 10)).unwrap_or('?')
     }
 
@@ -56,6 +59,7 @@ impl Page {
     pub fn name(self) -> &'static str {
         match self {
             Self::Pad => "Pad",
+            Self::Ascent => "Ascent",
             Self::Descent => "Descent",
             Self::Landing => "Landing",
             Self::Review => "Review",
@@ -72,9 +76,8 @@ impl Page {
     pub fn of_phase(phase: TdPhase) -> Self {
         match phase {
             TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => Self::Pad,
-            TdPhase::TD_PHASE_BOOST
-            | TdPhase::TD_PHASE_COAST
-            | TdPhase::TD_PHASE_DEPLOY
+            TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST => Self::Ascent,
+            TdPhase::TD_PHASE_DEPLOY
             | TdPhase::TD_PHASE_AERO_DESCENT
             | TdPhase::TD_PHASE_LAND_ARMED
             | TdPhase::TD_PHASE_CHUTE => Self::Descent,
@@ -98,7 +101,12 @@ pub struct Pages {
 impl Pages {
     /// The page to show in this phase.
     pub fn shown(self, phase: Option<TdPhase>) -> Page {
-        self.held.unwrap_or_else(|| phase.map_or(Page::Pad, Page::of_phase))
+        let of_phase = phase.map_or(Page::Pad, Page::of_phase);
+        match self.held {
+            // The same key, on the way up.
+            Some(Page::Descent) if of_phase == Page::Ascent => Page::Ascent,
+            held => held.unwrap_or(of_phase),
+        }
     }
 
     /// Holds a page; `None` follows the flight again.
@@ -116,7 +124,7 @@ mod tests {
         for page in Page::ALL {
             assert_eq!(Page::from_digit(page.key()), Some(page));
         }
-        assert_eq!(Page::Help.key(), '?');
+        assert_eq!((Page::Help.key(), Page::Ascent.key()), ('?', Page::Descent.key()));
         for other in ['0', 'x', '\u{0661}'] {
             assert_eq!(Page::from_digit(other), None);
         }
@@ -126,6 +134,7 @@ mod tests {
     fn the_phase_chooses_the_page_unless_one_is_held() {
         let mut pages = Pages::default();
         assert_eq!(pages.shown(None), Page::Pad);
+        assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_COAST)), Page::Ascent);
         assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_AERO_DESCENT)), Page::Descent);
         assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_POWERED)), Page::Landing);
         assert_eq!(pages.shown(Some(TdPhase::TD_PHASE_TOUCHDOWN)), Page::Review);

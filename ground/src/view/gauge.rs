@@ -27,6 +27,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
     let band = to_light
         .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
     let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
+    let apogee = descent.and_then(|d| finite(f64::from(d.value.apogee_m)).filter(|apogee_m| *apogee_m > 0.0));
     let commit = descent.and_then(|d| finite(f64::from(d.value.commit_height_m)));
     let lost = predict_position(&model.vehicle, now);
     let (height, mark, role) = match (lost, model.vehicle.height_m()) {
@@ -38,7 +39,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         // The position is unknown.
         (None, _) => (None, " ", TextRole::Label),
     };
-    let marks = [height, band.map(|band| band.1), chosen, commit];
+    let marks = [height, band.map(|band| band.1), chosen, commit, apogee];
     let top = top_m(marks.into_iter().flatten().fold(0.0, f64::max));
     let per_row = top / (rows - 1) as f64;
     (0..rows)
@@ -56,7 +57,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
                 let role = if role == TextRole::Stale { role } else { TextRole::Title };
                 spans.push(Span::styled(format!("<{mark}{text} "), theme.style(role)));
             }
-            for (at, name) in [(chosen, "IGNITE"), (commit, "commit")] {
+            for (at, name) in [(chosen, "IGNITE"), (commit, "commit"), (apogee, "apogee")] {
                 if here(at) {
                     let text = at.map_or_else(String::new, |height| fixed(height, 0));
                     spans.push(Span::styled(format!("-{name} {text} "), theme.style(TextRole::Caution)));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdChute, TdPhase};
+use protocol::dialect::{TdBooster, TdChute, TdPhase};
 use ratatui::text::{Line, Span};
 
 use super::number::{STALE_MARK, fixed};
@@ -36,7 +36,10 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
         TdPhase::TD_PHASE_COAST => {
             let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
             let left_s = climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64());
-            Some((format!("apogee{}", within(left_s)), ", then the fins open".to_owned()))
+            let attached =
+                vehicle.descent.as_ref().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
+            let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
+            Some((format!("{before}apogee{}", within(left_s)), after.to_owned()))
         }
         TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),

@@ -52,8 +52,10 @@ fn names_line(model: &Model, theme: Theme) -> Line<'static> {
     let mut spans = Vec::new();
     for page in Page::ALL.into_iter().chain([Page::Help]) {
         let (left, right, role) =
-            if page == shown { ("[", "]", TextRole::Key) } else { (" ", "", TextRole::Label) };
-        spans.push(Span::styled(format!("{left}{}{}{right}", page.key(), page.name()), theme.style(role)));
+            if page.key() == shown.key() { ("[", "]", TextRole::Key) } else { (" ", "", TextRole::Label) };
+        // Ascent and descent share a key.
+        let name = if page.key() == shown.key() { shown.name() } else { page.name() };
+        spans.push(Span::styled(format!("{left}{}{name}{right}", page.key()), theme.style(role)));
     }
     let (word, role) =
         if model.pages.held.is_some() { (" HELD 0", TextRole::Caution) } else { (" auto", TextRole::Good) };

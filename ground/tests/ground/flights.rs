@@ -25,7 +25,7 @@ fn frames_of(number: u64) -> Vec<(Duration, Frame)> {
 
 /// The same, with the simulator's own judgement by Table 2.
 fn mk2(number: u64) -> (Vec<(Duration, Frame)>, bool) {
-    let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").expect("a profile of its own") else {
+    let LoadedFlight::InSpace(mut flight) = load_flight("mk2").expect("a profile of its own") else {
         panic!("from apogee")
     };
     flight.number = number;

@@ -1,11 +1,11 @@
 //! Snapshots of the screen in each phase of a flight.
 
 use ground::key::Key;
-use protocol::dialect::{TdAbortEffect, TdChute, TdInterlock, TdLimit, TdPhase};
+use protocol::dialect::{TdAbortEffect, TdBooster, TdChute, TdInterlock, TdLimit, TdPhase};
 
 use crate::in_space::burning_in_space;
 use crate::rig::{Rig, settings, typed};
-use crate::screens::{armed, counting, descending, on_the_pad, powered, snapshot};
+use crate::screens::{armed, coasting, counting, descending, on_the_pad, powered, snapshot};
 
 #[test]
 fn regress_pad() {
@@ -25,6 +25,37 @@ fn regress_pad_no_go() {
 #[test]
 fn regress_countdown() {
     snapshot("countdown", &counting());
+}
+
+#[test]
+fn regress_coast() {
+    snapshot("coast", &coasting());
+}
+
+/// The ascent shares the key of the descent, and gives way to it at apogee.
+#[test]
+fn the_ascent_page_shows_apogee_and_booster_until_it_is_over() {
+    let mut rig = coasting();
+    for words in [
+        "Ascent",
+        "apogee at        301 m",
+        "apogee in        4.9 s",
+        "booster     attached",
+        "T+3.5",
+        "[2Ascent]",
+    ] {
+        assert!(rig.screen(80, 24).contains(words), "{words}: {}", rig.screen(80, 24));
+    }
+    rig.ascent(TdBooster::TD_BOOSTER_SEPARATING, 301.0, 2.5);
+    assert!(rig.screen(80, 24).contains("separating"));
+    // Under the ascent motor no apogee is known.
+    rig.ascent(TdBooster::TD_BOOSTER_ATTACHED, f32::NAN, f32::NAN);
+    assert!(rig.screen(80, 24).contains("apogee at         -- m"), "{}", rig.screen(80, 24));
+    rig.key(Key::Char('2'));
+    assert!(rig.screen(80, 24).contains("[2Ascent]"));
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.run(1.0);
+    assert!(rig.screen(80, 24).contains("[2Descent]"), "{}", rig.screen(80, 24));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::rig::{MONO, Rig, is_abort, settings, typed};
 use ground::key::Key;
 use ground::update::Msg;
 use ground::view::theme::Theme;
-use protocol::dialect::{MavCmd, TdAbortEffect, TdInterlock, TdLimit, TdPhase};
+use protocol::dialect::{MavCmd, TdAbortEffect, TdBooster, TdInterlock, TdLimit, TdPhase};
 use protocol::frame::FramerCounters;
 use ratatui::style::Color;
 
@@ -107,6 +107,17 @@ fn regress_abort_chord_and_abort() {
     rig.run(1.0);
     assert!(rig.take_commands().iter().any(is_abort));
     snapshot("abort_sent", &rig);
+}
+
+pub(crate) fn coasting() -> Rig {
+    let mut rig = armed();
+    rig.phase = TdPhase::TD_PHASE_COAST;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE;
+    rig.countdown_ms = -3_500;
+    rig.run(1.0);
+    rig.state(8.5, 184.8, 2.9, 49.4, 86.0);
+    rig.ascent(TdBooster::TD_BOOSTER_ATTACHED, 301.0, 4.9);
+    rig
 }
 
 pub(crate) fn descending() -> Rig {

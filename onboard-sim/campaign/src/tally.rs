@@ -128,11 +128,11 @@ impl Tally {
         let world = self.flight.world();
         let errors = self.flight.largest_errors();
         let drawn = self.flight.drawn();
-        let (truth, apogee) = (&drawn.truth, &drawn.apogee);
+        let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
         let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
-        let attainable = attainable::window(self.flight.mission(), drawn);
+        let attainable = attainable::window(self.flight.mission(), drawn, apogee);
         Row {
             number: self.number,
             impulse_scale: truth.impulse_scale,

@@ -193,7 +193,7 @@ fn compared(mission: &str, dispersion: &str, seed: u64, numbers: impl Iterator<I
     let mut all = Compared::default();
     for number in numbers {
         let drawn = draw(&recipe.mission, &recipe.dispersion, seed, number);
-        let found = window(&recipe.mission, &drawn);
+        let found = window(&recipe.mission, &drawn, &drawn.apogee);
         let searcher = Searcher::new(&recipe.mission, &drawn);
         let heights_m = found.map_or_else(
             || (0..10).map(|i| 30.0 + 8.0 * f64::from(i)).collect(),

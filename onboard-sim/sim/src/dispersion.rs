@@ -42,6 +42,12 @@ pub struct Dispersion {
     pub apogee_tilt_deg: f64,
     /// Rotation rate at apogee, degrees per second, in each axis.
     pub apogee_rate_deg_s: f64,
+    /// Lean of the launch rail, degrees, about each axis of the world.
+    pub rail_lean_deg: f64,
+    /// Cant of the booster's fins, degrees.
+    pub fin_cant_deg: f64,
+    /// Height of a drop, m.
+    pub drop_height_m: f64,
     /// Differences between the vehicle and its data that the flight computer's own models do not have.
     pub mismatch: Mismatch,
 }

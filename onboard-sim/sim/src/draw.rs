@@ -9,6 +9,7 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 use world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use world::wind::Wind;
+use world::{AscentTruth, Hanging};
 
 use crate::dispersion::{Dispersion, Mismatch};
 
@@ -17,8 +18,13 @@ use crate::dispersion::{Dispersion, Mismatch};
 pub struct Draw {
     /// The vehicle and the day.
     pub truth: Truth,
-    /// The state at apogee.
+    /// The state in which the fall begins: at apogee, or when it is felt after a drone let go. A flight from the pad rises
+    /// to an apogee of its own.
     pub apogee: RigidState,
+    /// The ascent of a flight from the pad.
+    pub ascent: AscentTruth,
+    /// How a vehicle hangs that starts below a drone.
+    pub hanging: Option<Hanging>,
     /// Seed of everything random during the flight: gusts and sensors.
     pub flight_seed: u64,
 }
@@ -28,9 +34,7 @@ pub struct Draw {
 /// Every value is drawn in a fixed order, even if its deviation is zero. So a changed deviation does not change the
 /// other draws, and two sets of dispersions can be compared flight by flight.
 pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
-    let mut random = ChaCha12Rng::seed_from_u64(seed);
-    random.set_stream(number);
-    let mut chance = Chance { random };
+    let mut chance = Chance::of(seed, number);
     let sigma = dispersion;
     let nominal = Truth::default();
     let impulse_scale =
@@ -87,7 +91,53 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         ..nominal
     };
     let truth = mismatched(&truth, &sigma.mismatch, seed, number);
-    Draw { truth, apogee, flight_seed }
+    let ascent = ascended(mission, dispersion, seed, number);
+    let hanging = hung(mission, dispersion, seed, number);
+    Draw { truth, apogee, ascent, hanging, flight_seed }
+}
+
+/// The ascent of flight `number`, from a generator of its own.
+fn ascended(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> AscentTruth {
+    /// Any number that no other draw uses.
+    const OF_ASCENT: u64 = 0x5ce7_0000_0000_0003;
+    let nominal = AscentTruth::default();
+    if mission.launch.is_none() {
+        return nominal;
+    }
+    let mut chance = Chance::of(seed ^ OF_ASCENT, number);
+    let rate_rad_s = sigma.apogee_rate_deg_s.to_radians();
+    let lean_rad = sigma.rail_lean_deg.to_radians();
+    AscentTruth {
+        impulse_scale: (1.0
+            + sigma.impulse_share * chance.normal()
+            + sigma.impulse_even_share * chance.even())
+        .max(0.1),
+        burn_time_scale: (1.0 + sigma.burn_time_share * chance.normal()).max(0.3),
+        ignition_delay_s: (nominal.ignition_delay_s + sigma.ignition_delay_s * chance.normal()).max(0.02),
+        drag_scale: (1.0 + sigma.drag_share * chance.normal()).max(0.2),
+        rail_lean_rad: [lean_rad * chance.normal(), lean_rad * chance.normal()],
+        fin_cant_rad: sigma.fin_cant_deg.to_radians() * chance.normal(),
+        tip_off_rad_s: [rate_rad_s * chance.normal(), rate_rad_s * chance.normal()],
+    }
+}
+
+/// How the vehicle of flight `number` hangs, from a generator of its own; `None` without a drone.
+fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option<Hanging> {
+    /// Any number that no other draw uses.
+    const OF_HANGING: u64 = 0xd120_0000_0000_0004;
+    let drop = mission.drop.as_ref()?;
+    let airframe = &mission.airframe;
+    let mut chance = Chance::of(seed ^ OF_HANGING, number);
+    let (drift_sin, drift_cos) = libm::sincos(TAU * chance.unit());
+    let drift_m_s = drop.drift_m_s * chance.unit();
+    Some(Hanging {
+        height_m: drop.height_m + sigma.drop_height_m * chance.normal(),
+        drift_m_s: [drift_m_s * drift_cos, drift_m_s * drift_sin],
+        length_m: drop.rope_m + airframe.body.length_m - airframe.mass.loaded_cg_station_m,
+        swing_rad: drop.swing_deg.to_radians() * chance.unit(),
+        towards_rad: TAU * chance.unit(),
+        phase_rad: TAU * chance.unit(),
+    })
 }
 
 /// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
@@ -95,9 +145,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
 fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
-    let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_MISMATCH);
-    random.set_stream(number);
-    let mut chance = Chance { random };
+    let mut chance = Chance::of(seed ^ OF_MISMATCH, number);
     // Amplitudes that fall as 1 / k; a cosine's rms is its amplitude over the root of 2.
     let terms: [f64; SHAPE_TERMS] = core::array::from_fn(|k| 1.0 / (k + 1) as f64);
     let whole = libm::sqrt(0.5 * terms.iter().map(|term| term * term).sum::<f64>());
@@ -149,9 +197,7 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
 pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
     /// Any number that no other draw uses.
     const OF_FAULTS: u64 = 0xfa17_0000_0000_0001;
-    let mut random = ChaCha12Rng::seed_from_u64(seed ^ OF_FAULTS);
-    random.set_stream(number);
-    let mut chance = Chance { random };
+    let mut chance = Chance::of(seed ^ OF_FAULTS, number);
     (0..faults).map(|_| chance.unit()).collect()
 }
 
@@ -161,6 +207,13 @@ struct Chance {
 }
 
 impl Chance {
+    /// The numbers of flight `number` from a generator of this seed.
+    fn of(seed: u64, number: u64) -> Self {
+        let mut random = ChaCha12Rng::seed_from_u64(seed);
+        random.set_stream(number);
+        Self { random }
+    }
+
     /// Uniform in [0, 1).
     fn unit(&mut self) -> f64 {
         (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64

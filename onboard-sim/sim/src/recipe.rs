@@ -1,6 +1,7 @@
 //! Everything that a flight is made from. The same recipe and flight number give the same flight, bit for bit.
 
 use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
 use vehicles::mission::MissionError;
 
 use crate::dispersion::{Dispersion, DispersionError};
@@ -56,6 +57,16 @@ impl Recipe {
         })
     }
 
+    /// This recipe with another start of its flights.
+    ///
+    /// # Errors
+    /// The mission has not what that start needs.
+    pub fn starting_at(self, start: StartPoint) -> Result<Self, RecipeError> {
+        let mission_toml = toml_starting_at(&self.mission_toml, &self.mission.name, start)?;
+        let mission = vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
+        Ok(Self { mission, mission_toml, ..self })
+    }
+
     /// A recipe from a built-in mission and a built-in set of dispersions.
     ///
     /// # Errors
@@ -65,4 +76,22 @@ impl Recipe {
         let mission = known.ok_or_else(|| RecipeError::UnknownMission(mission.to_owned()))?;
         Self::from_texts(*mission, (dispersion, Dispersion::builtin_toml(dispersion)?))
     }
+}
+
+/// The text of a mission with another start; comments and order stay. `origin` names it in messages.
+///
+/// # Errors
+/// The text is not TOML.
+pub fn toml_starting_at(mission_toml: &str, origin: &str, start: StartPoint) -> Result<String, MissionError> {
+    let mut document: toml_edit::DocumentMut =
+        mission_toml.parse().map_err(|error: toml_edit::TomlError| MissionError::Parse {
+            origin: origin.to_owned(),
+            message: error.to_string(),
+        })?;
+    let before = document.get("start").and_then(|section| section.get("at")).and_then(|at| at.as_str());
+    if before.unwrap_or(StartPoint::Apogee.name()) == start.name() {
+        return Ok(mission_toml.to_owned());
+    }
+    document["start"]["at"] = toml_edit::value(start.name());
+    Ok(document.to_string())
 }

@@ -13,11 +13,12 @@ use campaign::summary::to_text;
 use campaign::{results, run, timing};
 use clap::{Args, Subcommand};
 use flight::guidance::baseline::Controller;
+use flight::vehicle::profile::StartPoint;
 use protocol::log::build::build_info;
 use sha2::Digest as _;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
-use sim::recipe::Recipe;
+use sim::recipe::{self, Recipe};
 
 use super::cost::Stopwatch;
 use super::single;
@@ -30,6 +31,9 @@ pub(crate) struct CampaignArguments {
     /// Built-in mission or TOML file.
     #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
     profile: String,
+    /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
+    #[arg(long, value_name = "START")]
+    start: Option<StartPoint>,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
@@ -137,6 +141,10 @@ fn order_of(manifest: &Manifest, mission_toml: &str, dispersion_toml: &str) -> a
 
 fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
     let mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
+    let mission_toml = match arguments.start {
+        Some(start) => recipe::toml_starting_at(&mission_toml, &arguments.profile, start)?,
+        None => mission_toml,
+    };
     let mut mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {

@@ -7,11 +7,12 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Args;
+use flight::vehicle::profile::StartPoint;
 use onboard_sim::fly::{
     FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
     log_header,
 };
-use onboard_sim::vehicle::{Judged, VehicleEvent};
+use onboard_sim::vehicle::{Judged, RocketFlight, VehicleEvent};
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
@@ -27,7 +28,7 @@ pub(super) const WIND_MAX_M_S: f64 = 30.0;
 
 #[derive(Args)]
 pub(crate) struct FlyArguments {
-    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2, mk3) at apogee.
+    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2, mk3) where they say, or as --start says.
     #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
     profile: String,
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
@@ -54,16 +55,19 @@ pub(crate) struct FlyArguments {
     /// Seed of the dispersions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// From apogee: which flight of the seed, as in campaign --only.
+    /// Missions: which flight of the seed, as in campaign --only.
     #[arg(long, value_name = "NUMBER")]
     flight: Option<u64>,
-    /// From apogee: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
+    /// Missions: where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
+    #[arg(long, value_name = "START")]
+    start: Option<StartPoint>,
+    /// Missions: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
     #[arg(long, value_name = "NAME|FILE")]
     dispersion: Option<String>,
-    /// From apogee: mean wind 10 m above the ground, m/s, instead of the set's.
+    /// Missions: mean wind 10 m above the ground, m/s, instead of the set's.
     #[arg(long, value_name = "M_S")]
     wind: Option<f64>,
-    /// From apogee: break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
+    /// Missions: break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<TimedFault>,
     /// Speed of simulated time: a factor, or max.
@@ -86,10 +90,11 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 }
 
 impl FlyArguments {
-    /// Applies the options to a flight from apogee. A start at ignition has its dispersions in its profile.
+    /// Applies the options to a mission. A start at ignition has its dispersions in its profile.
     fn choose(&self, profile: &mut LoadedFlight) -> anyhow::Result<()> {
-        let LoadedFlight::FromApogee(flight) = profile else {
+        let LoadedFlight::InSpace(flight) = profile else {
             let given = [
+                (self.start.is_some(), "--start"),
                 (self.flight.is_some(), "--flight"),
                 (self.dispersion.is_some(), "--dispersion"),
                 (self.wind.is_some(), "--wind"),
@@ -97,12 +102,16 @@ impl FlyArguments {
             ];
             if let Some((_, option)) = given.iter().find(|(given, _)| *given) {
                 anyhow::bail!(
-                    "{option} is for missions from apogee; {} starts at ignition, and its dispersions are in its profile",
+                    "{option} is for missions; {} starts at ignition, and its dispersions are in its profile",
                     profile.name()
                 );
             }
             return Ok(());
         };
+        if let Some(start) = self.start {
+            **flight =
+                RocketFlight { recipe: flight.recipe.clone().starting_at(start)?, ..(**flight).clone() };
+        }
         let recipe = &mut flight.recipe;
         flight.number = self.flight.unwrap_or(0);
         if let Some(name) = &self.dispersion {

@@ -1,9 +1,9 @@
-//! Loads the profile (starts at ignition) or the mission (starts at apogee), by name or from a file.
+//! Loads the profile (starts at ignition) or the mission (starts where it says), by name or from a file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use flight::vehicle::profile::Profile;
+use flight::vehicle::profile::{Profile, StartPoint};
 use protocol::log::writer::LogHeader;
 use sim::dispersion::Dispersion;
 use sim::recipe::{Recipe, RecipeError};
@@ -29,15 +29,15 @@ pub struct LoadedProfile {
 pub enum LoadedFlight {
     /// In the plane, from ignition.
     AtIgnition(Box<LoadedProfile>),
-    /// In space, from apogee. The recipe's seed is the run's.
-    FromApogee(Box<RocketFlight>),
+    /// In space. The recipe's seed is the run's.
+    InSpace(Box<RocketFlight>),
 }
 
 impl LoadedFlight {
     pub fn name(&self) -> &str {
         match self {
             Self::AtIgnition(loaded) => &loaded.profile.name,
-            Self::FromApogee(flight) => &flight.recipe.mission.name,
+            Self::InSpace(flight) => &flight.recipe.mission.name,
         }
     }
 
@@ -45,7 +45,7 @@ impl LoadedFlight {
     pub fn summary(&self) -> &str {
         match self {
             Self::AtIgnition(loaded) => &loaded.profile.summary,
-            Self::FromApogee(flight) => &flight.recipe.mission.summary,
+            Self::InSpace(flight) => &flight.recipe.mission.summary,
         }
     }
 
@@ -53,7 +53,26 @@ impl LoadedFlight {
     pub fn toml(&self) -> &str {
         match self {
             Self::AtIgnition(loaded) => &loaded.toml,
-            Self::FromApogee(flight) => &flight.recipe.mission_toml,
+            Self::InSpace(flight) => &flight.recipe.mission_toml,
+        }
+    }
+
+    /// The same flight from another start; `None` leaves a mission with a launch on its pad, and anything else as it is.
+    ///
+    /// # Errors
+    /// It has no such start.
+    pub fn starting_at(self, start: Option<StartPoint>) -> Result<Self, FlyError> {
+        match self {
+            Self::InSpace(flight) => {
+                let RocketFlight { recipe, number } = *flight;
+                let launched = recipe.mission.launch.as_ref().map(|_| StartPoint::Pad);
+                let start = start.or(launched).unwrap_or(recipe.mission.start.at);
+                Ok(Self::InSpace(Box::new(RocketFlight { recipe: recipe.starting_at(start)?, number })))
+            }
+            Self::AtIgnition(_) if start.is_some_and(|start| start != StartPoint::Ignition) => {
+                Err(FlyError::NoSuchStart { name: self.name().to_owned() })
+            }
+            Self::AtIgnition(_) => Ok(self),
         }
     }
 
@@ -67,10 +86,10 @@ impl LoadedFlight {
                 let drawn = draw(&loaded.profile, seed);
                 Vehicle::in_plane(PlanarFlight::new(&loaded.profile, drawn, policy)?)
             }
-            Self::FromApogee(_) if policy == DeadlinePolicy::Enforce => {
+            Self::InSpace(_) if policy == DeadlinePolicy::Enforce => {
                 return Err(FlyError::DeadlinePolicy { name: self.name().to_owned() });
             }
-            Self::FromApogee(flight) => Vehicle::in_space(&seeded(flight, seed))?,
+            Self::InSpace(flight) => Vehicle::in_space(&seeded(flight, seed))?,
         })
     }
 }
@@ -111,7 +130,7 @@ pub fn load_flight(name_or_path: &str) -> Result<LoadedFlight, FlyError> {
             .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?,
     };
     if vehicles::mission::is_meant(&toml) {
-        return Ok(LoadedFlight::FromApogee(Box::new(mission_flight(&toml, name_or_path)?)));
+        return Ok(LoadedFlight::InSpace(Box::new(mission_flight(&toml, name_or_path)?)));
     }
     let profile = vehicles::profile::from_toml(&toml, name_or_path)?;
     Ok(LoadedFlight::AtIgnition(Box::new(LoadedProfile { profile, toml })))
@@ -120,11 +139,11 @@ pub fn load_flight(name_or_path: &str) -> Result<LoadedFlight, FlyError> {
 /// Reads a profile that starts at ignition.
 ///
 /// # Errors
-/// As [`load_flight`], and for a mission from apogee.
+/// As [`load_flight`], and for a mission.
 pub fn load_planar(name_or_path: &str) -> Result<LoadedProfile, FlyError> {
     match load_flight(name_or_path)? {
         LoadedFlight::AtIgnition(loaded) => Ok(*loaded),
-        flight @ LoadedFlight::FromApogee(_) => Err(FlyError::FromApogee { name: flight.name().to_owned() }),
+        flight @ LoadedFlight::InSpace(_) => Err(FlyError::InSpace { name: flight.name().to_owned() }),
     }
 }
 
@@ -154,7 +173,7 @@ pub fn log_header(writer: &str, loaded: &LoadedFlight, seed: u64, start_unix_ns:
                 scenario_toml: None,
             }
         }
-        LoadedFlight::FromApogee(flight) => {
+        LoadedFlight::InSpace(flight) => {
             tick_log::sortie::header(writer, &seeded(flight, seed).recipe, flight.number, start_unix_ns)
         }
     }
@@ -171,14 +190,14 @@ mod tests {
             assert_eq!((loaded.name(), loaded.toml()), (name, text));
             assert!(!loaded.summary().is_empty());
             let from_apogee = vehicles::mission::BUILTIN.iter().any(|(known, _)| *known == name);
-            assert_eq!(matches!(loaded, LoadedFlight::FromApogee(_)), from_apogee, "{name}");
+            assert_eq!(matches!(loaded, LoadedFlight::InSpace(_)), from_apogee, "{name}");
             assert_eq!(load_planar(name).is_err(), from_apogee, "{name}");
         }
     }
 
     #[test]
     fn a_mission_has_field_dispersions_by_default() {
-        let LoadedFlight::FromApogee(flight) = load_flight("mk2").unwrap() else { panic!("not from apogee") };
+        let LoadedFlight::InSpace(flight) = load_flight("mk2").unwrap() else { panic!("not from apogee") };
         assert_eq!(flight.recipe.dispersion, Dispersion::builtin(DISPERSION).unwrap());
         assert!(!flight.recipe.dispersion_toml.is_empty());
     }
@@ -191,7 +210,7 @@ mod tests {
             "{words}"
         );
         let words = load_planar("mk2").err().unwrap().to_string();
-        assert!(words.contains("mk2 flies from apogee"), "{words}");
+        assert!(words.contains("mk2 flies in space"), "{words}");
         let flight = load_flight("mk2").unwrap();
         let words = flight.vehicle(1, DeadlinePolicy::Enforce).err().unwrap().to_string();
         assert!(words.contains("mk2: deadlines"), "{words}");

@@ -33,6 +33,7 @@ use crate::solve_times::SolveTimes;
 use crate::streams::Standard;
 use crate::vehicle::{Judged, VehicleEvent};
 use flight::computer::plane::PlaneError;
+pub use flight::vehicle::profile::StartPoint;
 pub use sim::plane::DeadlinePolicy;
 
 /// How fast simulated time runs.
@@ -131,11 +132,8 @@ pub enum FlyError {
     #[error(transparent)]
     Recipe(#[from] RecipeError),
     /// The mission flies from apogee, but a start at ignition is needed.
-    #[error(
-        "{name} flies from apogee; this takes a profile that starts at ignition: {}",
-        load::planar_names()
-    )]
-    FromApogee {
+    #[error("{name} flies in space; this takes a profile that starts at ignition: {}", load::planar_names())]
+    InSpace {
         /// The mission.
         name: String,
     },
@@ -148,6 +146,14 @@ pub enum FlyError {
     /// The flight from apogee cannot be set up.
     #[error(transparent)]
     Rocket(#[from] sim::sortie::SetUpError),
+    /// A planar profile starts at ignition only.
+    #[error(
+        "{name} starts at ignition; a mission (mk2, mk3) may start on its pad, at apogee or below a drone"
+    )]
+    NoSuchStart {
+        /// The profile's name.
+        name: String,
+    },
     /// The profile cannot be simulated.
     #[error(transparent)]
     Plane(#[from] PlaneError),

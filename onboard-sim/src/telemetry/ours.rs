@@ -14,7 +14,7 @@ use flight::computer::AbortEffect;
 use crate::vehicle::{PATH_POINTS, Snapshot};
 
 pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
-    let seconds = snapshot.countdown_s.or(snapshot.since_ignition_s.map(|since_s| -since_s));
+    let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
     let locks = snapshot.interlocks;
     let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {

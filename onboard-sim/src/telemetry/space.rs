@@ -1,14 +1,16 @@
 //! Messages of the rocket in space only: descent, estimator, sensors; and the battery status, always unknown.
 
+use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
 use mavlink::MessageData as _;
 use protocol::dialect::{
     BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA,
-    HighresImuUpdatedFlags, MavBatteryFault, MavMessage, MavSysStatusSensor, TD_DESCENT_DATA, TdChute,
+    HighresImuUpdatedFlags, MavBatteryFault, MavMessage, MavSysStatusSensor, TD_DESCENT_DATA, TdBooster,
+    TdChute,
 };
 
 use super::boot_ms;
-use crate::vehicle::{Chute, Snapshot};
+use crate::vehicle::{Booster, Chute, DescentFacts, Snapshot};
 
 /// The message of this id, or `None` if the vehicle has no such message or no data for it.
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
@@ -62,7 +64,27 @@ fn descent(snapshot: &Snapshot) -> Option<MavMessage> {
             Chute::Fired => TdChute::TD_CHUTE_FIRED,
             Chute::Open => TdChute::TD_CHUTE_OPEN,
         },
+        booster: booster(descent.ascent.map(|ascent| ascent.booster)),
+        apogee_m: on_the_way_up(descent, |apogee| apogee.height_m),
+        time_to_apogee_s: on_the_way_up(descent, |apogee| apogee.in_s),
     }))
+}
+
+fn booster(booster: Option<Booster>) -> TdBooster {
+    match booster {
+        None => TdBooster::TD_BOOSTER_NONE,
+        Some(Booster::Attached) => TdBooster::TD_BOOSTER_ATTACHED,
+        Some(Booster::Separating) => TdBooster::TD_BOOSTER_SEPARATING,
+        Some(Booster::Separated) => TdBooster::TD_BOOSTER_SEPARATED,
+    }
+}
+
+/// A value of the apogee ahead. Zeros at the end of a message are not sent, so a descent costs nothing.
+fn on_the_way_up(descent: &DescentFacts, read: impl Fn(&ApogeeAhead) -> f64) -> f32 {
+    match descent.ascent.filter(|ascent| !ascent.over) {
+        None => 0.0,
+        Some(ascent) => ascent.apogee.as_ref().map_or(f32::NAN, |apogee| read(apogee) as f32),
+    }
 }
 
 /// The outputs that are valid, by the estimator's own doubts; its test ratios are not kept and are sent as unknown.

@@ -21,7 +21,7 @@ use flight::computer::news::Severity;
 use flight::computer::{Commander, Computer, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::phase::{Mode, Phase};
-use flight::vehicle::profile::StateWeights;
+use flight::vehicle::profile::{StartPoint, StateWeights};
 use protocol::log::computer_v1::ComputerFrame;
 use sim::outside::{Flown, Outside, Watch};
 use sim::plane::PlanarFlight;
@@ -32,8 +32,8 @@ pub use self::events::{Tick, VehicleEvent};
 use self::ground::Ground;
 use self::sensed::SensorWatch;
 pub use self::snapshot::{
-    Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS, Path, Prediction,
-    SensorFacts, Snapshot,
+    AscentFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS,
+    Path, Prediction, SensorFacts, Snapshot,
 };
 use crate::streams::{FROM_APOGEE, STANDARD, Standard};
 
@@ -212,7 +212,7 @@ impl Vehicle {
     fn events_of_the_simulation(&mut self, released: bool, took: Duration) -> Vec<VehicleEvent> {
         let mut said = Vec::new();
         match &self.flight {
-            Flight::Space(space) if released => {
+            Flight::Space(space) if released && space.sortie.mission().start.at == StartPoint::Apogee => {
                 let height_m = space.sortie.world().height_m();
                 let words =
                     format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");

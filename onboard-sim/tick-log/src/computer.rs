@@ -83,6 +83,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
             landing_found: rehearsed.landing.as_ref().map(|landing| landing.found.clone()),
         }),
         late: input.late,
+        booster_attached: input.booster_attached.then_some(true),
     }
 }
 
@@ -120,6 +121,7 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
         requests: &[],
         rehearsed: None,
         late: input.late,
+        booster_attached: input.booster_attached.unwrap_or(false),
     };
     let requests = input.requests.iter().map(|request| request_from_log(request, frame));
     let rehearsed = input.rehearsed.as_ref().map(|rehearsed| Rehearsed {
@@ -149,6 +151,8 @@ fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
         planned: output.planned,
         phase,
         answers: output.answers.iter().map(ended).collect(),
+        ignite_booster: output.commands.booster.ignite.then_some(true),
+        separate_booster: output.commands.booster.separate.then_some(true),
     }
 }
 
@@ -287,6 +291,7 @@ mod tests {
                 requests: &requests,
                 rehearsed: rehearsed.as_ref(),
                 late: flags[5],
+                booster_attached: flags[6],
             };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();

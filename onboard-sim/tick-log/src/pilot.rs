@@ -1,6 +1,6 @@
 //! Converts the pilot's frames between its own types and log records, bit for bit.
 
-use flight::computer::pilot::{PilotInput, PilotOutput, Sensed};
+use flight::computer::pilot::{BoosterCommands, PilotInput, PilotOutput, Sensed};
 use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
@@ -227,6 +227,7 @@ pub fn input_to_log(input: &PilotInput) -> v1::PilotInput {
         contact: input.contact,
         igniter_continuity: input.igniter_continuity,
         abort: input.abort,
+        booster_attached: input.booster_attached.then_some(true),
     }
 }
 
@@ -249,6 +250,7 @@ pub fn input_from_log(input: &v1::PilotInput) -> Result<PilotInput, PilotLogErro
         contact: input.contact,
         igniter_continuity: input.igniter_continuity,
         abort: input.abort,
+        booster_attached: input.booster_attached.unwrap_or(false),
     })
 }
 
@@ -261,6 +263,8 @@ pub fn output_to_log(output: &PilotOutput) -> v1::PilotOutput {
         parachute: output.parachute,
         phase: u32::from(output.phase.index()),
         level: u32::from(output.level.index()),
+        ignite_booster: output.booster.ignite.then_some(true),
+        separate_booster: output.booster.separate.then_some(true),
     }
 }
 
@@ -279,6 +283,10 @@ pub fn output_from_log(output: &v1::PilotOutput, frame: u64) -> Result<PilotOutp
         parachute: output.parachute,
         phase: phase.ok_or_else(|| unknown("phase", output.phase, Phase::ALL.len()))?,
         level: level.ok_or_else(|| unknown("control level", output.level, ControlLevel::ALL.len()))?,
+        booster: BoosterCommands {
+            ignite: output.ignite_booster.unwrap_or(false),
+            separate: output.separate_booster.unwrap_or(false),
+        },
     })
 }
 
@@ -367,7 +375,7 @@ mod tests {
             frame: u64,
             numbers in prop::collection::vec(any_bits(), 56),
             there: [bool; 3],
-            flags: [bool; 4],
+            flags: [bool; 7],
             health in 0..=DOUBTS.len(),
             phase in 0..Phase::ALL.len(),
             level in 0..ControlLevel::ALL.len(),
@@ -385,6 +393,7 @@ mod tests {
                 contact: flags[0],
                 igniter_continuity: flags[1],
                 abort: flags[2],
+                booster_attached: flags[4],
             };
             let output = PilotOutput {
                 gimbal_rad: [numbers[50], numbers[51]],
@@ -393,6 +402,7 @@ mod tests {
                 parachute: flags[2],
                 phase: Phase::ALL[phase],
                 level: ControlLevel::ALL[level],
+                booster: BoosterCommands { ignite: flags[5], separate: flags[6] },
             };
             let bytes = tick_to_log(&input, &output, frame).encode_to_vec();
             let read = v1::PilotTick::decode(bytes.as_slice()).unwrap();
@@ -401,7 +411,8 @@ mod tests {
             // Compared as bytes as well, because a NaN never equals itself.
             prop_assert_eq!(tick_to_log(&input_read, &output_read, frame).encode_to_vec(), bytes);
             prop_assert_eq!(input_read.time_s.to_bits(), input.time_s.to_bits());
-            prop_assert_eq!(input_read.frame, input.frame);
+            prop_assert_eq!((input_read.frame, input_read.booster_attached), (frame, flags[4]));
+            prop_assert_eq!(output_read.booster, output.booster);
             prop_assert_eq!((output_read.phase, output_read.level), (output.phase, output.level));
         }
     }

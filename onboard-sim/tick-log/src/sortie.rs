@@ -1,4 +1,4 @@
-//! A simulated flight from apogee as log records: the flight computer's input, estimate and output in every frame, and
+//! A simulated flight as log records: the flight computer's input, estimate and output in every frame, and
 //! the truth. A replay runs the flight computer again from these records.
 
 use std::collections::BTreeMap;
@@ -40,17 +40,17 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
     }
 }
 
-/// The record before the first frame. Times in the records count from apogee.
+/// The record before the first frame. Times in the records count from the start of the flight.
 pub fn start(flight: &Sortie) -> Record {
     Record::PilotStart(Box::new(pilot_start(flight)))
 }
 
-/// The flight computer's estimate at its release, and its settings that the text of its mission does not contain.
+/// The flight computer's estimate at its start, and its settings that the text of its mission does not contain.
 pub fn pilot_start(flight: &Sortie) -> PilotStart {
     let mission = flight.mission();
     PilotStart {
         time_s: 0.0,
-        believed: state_to_log(flight.believed_at_apogee()),
+        believed: state_to_log(flight.believed_at_start()),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
     }
@@ -88,6 +88,7 @@ fn truth(flight: &Sortie) -> TruthSample {
         parachute_open_share: world.parachute_open_share(),
         in_contact: world.touchdown().is_some(),
         nees_of_motion: flight.nees_of_motion(),
+        booster_thrust_n: world.booster_attached().then(|| world.booster_thrust_n()),
     }
 }
 
@@ -112,7 +113,7 @@ pub fn dispersion_of(
     }
 }
 
-/// Nanoseconds since apogee at the end of the last frame.
+/// Nanoseconds since the start at the end of the last frame.
 pub fn time_ns(flight: &Sortie) -> u64 {
     flight.frame() * u64::from(flight::computer::FRAME_MS) * 1_000_000
 }

@@ -4,7 +4,10 @@
 
 use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::airframe::BadValue;
+use flight::vehicle::drop::Drop;
+use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -78,6 +81,22 @@ pub enum MissionError {
         /// The accepted range, in words.
         required: &'static str,
     },
+    /// The launch or the drop is out of range.
+    #[error("{origin}")]
+    Start {
+        /// Where the text came from.
+        origin: String,
+        #[source]
+        source: BadValue,
+    },
+    /// The start needs a section that the mission does not have, or is not one of a mission.
+    #[error("{origin}: start.at = \"{at}\" {problem}")]
+    StartAt {
+        /// Where the text came from.
+        origin: String,
+        at: &'static str,
+        problem: &'static str,
+    },
     /// There is no motor of that name, or its file cannot be used.
     #[error(transparent)]
     Motor(#[from] MotorError),
@@ -114,6 +133,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
         return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });
     }
+    check_start(&mission, origin)?;
     let altitude_m = mission.pad_altitude_m;
     let nowhere =
         (!PAD_ALTITUDES_M.contains(&altitude_m)).then_some(("pad_altitude_m", altitude_m, "-450 to 6000"));
@@ -121,7 +141,31 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         return Err(MissionError::Site { origin: origin.to_owned(), key, found, required });
     }
     let motor = mission.airframe.motor.clone();
-    Ok(with_motor(mission, &motor)?)
+    let mut mission = with_motor(mission, &motor)?;
+    if let Some(launch) = &mut mission.launch {
+        launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
+    }
+    Ok(mission)
+}
+
+/// Checks that the mission has what its start needs.
+fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
+    let of_sections =
+        [mission.launch.as_ref().map(Launch::validate), mission.drop.as_ref().map(Drop::validate)];
+    for checked in of_sections.into_iter().flatten() {
+        checked.map_err(|source| MissionError::Start { origin: origin.to_owned(), source })?;
+    }
+    let refuse = |at, problem| Err(MissionError::StartAt { origin: origin.to_owned(), at, problem });
+    match mission.start.at {
+        StartPoint::Pad if mission.launch.is_none() => {
+            refuse("pad", "needs the section [launch] with its rail and booster")
+        }
+        StartPoint::Drone if mission.drop.is_none() => refuse("drone", "needs the section [drop]"),
+        StartPoint::Ignition => {
+            refuse("ignition", "is for planar profiles: apogee, pad or drone is accepted")
+        }
+        StartPoint::Pad | StartPoint::Apogee | StartPoint::Drone => Ok(()),
+    }
 }
 
 /// The built-in mission of that name.

@@ -13,6 +13,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("H42", include_str!("../motors/Cesaroni_186H42-10A.eng")),
     ("H45W", include_str!("../motors/AeroTech_H45.eng")),
     ("H53", include_str!("../motors/Cesaroni_234H53-12A.eng")),
+    ("I243", include_str!("../motors/Cesaroni_382I243-13A.eng")),
 ];
 
 /// Why a motor cannot be used.

@@ -22,8 +22,7 @@ fn windy(height_m: f64) -> World {
         .with_fins_at(FRAC_PI_2)
 }
 
-const OPEN: Actuators =
-    Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
+const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ..Actuators::NONE };
 
 /// A thousand steps of the fall, in wind and gusts: a microsecond in the table is a nanosecond per step.
 #[divan::bench]

@@ -23,6 +23,15 @@ pub enum Fault {
         /// Time since the first thrust, s.
         after_s: f64,
     },
+    /// The ascent motor never lights.
+    AscentNoLight,
+    /// The ascent motor has less impulse, in the same time.
+    AscentWeak {
+        /// Thrust, as a fraction of the thrust without the fault.
+        scale: f64,
+    },
+    /// The booster stays on the vehicle.
+    SeparationFails,
     /// Both gimbal axes are stuck.
     GimbalStuck,
     /// The gimbal servos turn slowly.

@@ -6,6 +6,7 @@
 //!
 //! * [`world`]: all parts together, one millisecond at a time.
 //! * `body`, `aero`, `motor`, `servo`, `linkage`, `parachute`, [`ground`]: the parts, one model each.
+//! * `stack`: the vehicle on its booster, on the way up; [`hanging`]: below a drone.
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`vertical`]: the true vehicle's forces in a vertical fall through still air, for bounds on what is possible.
@@ -16,11 +17,13 @@ mod aero;
 mod body;
 pub mod fault;
 pub mod ground;
+pub mod hanging;
 mod linkage;
 mod motor;
 mod parachute;
 pub mod sensors;
 mod servo;
+mod stack;
 pub mod truth;
 pub mod vertical;
 pub mod wind;
@@ -28,8 +31,9 @@ pub mod world;
 
 pub use fault::Fault;
 pub use ground::{Rest, RestOutcome, Touchdown};
+pub use hanging::Hanging;
 pub use motor::TrueBurn;
-pub use truth::Truth;
+pub use truth::{AscentTruth, Truth};
 pub use world::{Actuators, World};
 
 /// Length of one step, s.

@@ -150,7 +150,12 @@ impl Motor {
             Fault::LateLight { delay_s } => self.ignition_delay_s += delay_s.max(0.0),
             Fault::WeakMotor { scale } => self.burn.impulse_scale *= scale.clamp(0.01, 1.0),
             Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
-            Fault::GimbalStuck | Fault::GimbalSlow { .. } | Fault::FinStuck { .. } => {}
+            Fault::AscentNoLight
+            | Fault::AscentWeak { .. }
+            | Fault::SeparationFails
+            | Fault::GimbalStuck
+            | Fault::GimbalSlow { .. }
+            | Fault::FinStuck { .. } => {}
         }
     }
 }

@@ -57,6 +57,39 @@ pub struct Truth {
     pub ground_rise: [f64; 2],
 }
 
+/// How the true ascent of one flight differs from its nominal data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AscentTruth {
+    /// True impulse of the ascent motor over the motor file's.
+    pub impulse_scale: f64,
+    /// True burn time over the motor file's.
+    pub burn_time_scale: f64,
+    /// Time from the ignition command to the first thrust, s.
+    pub ignition_delay_s: f64,
+    /// Factor on the axial drag of the stack.
+    pub drag_scale: f64,
+    /// Lean of the rail beside its nominal one, about world x and y, rad.
+    pub rail_lean_rad: [f64; 2],
+    /// Cant of the booster's fins, rad.
+    pub fin_cant_rad: f64,
+    /// Rotation rates (pitch, yaw) that the separation gives the vehicle, rad/s.
+    pub tip_off_rad_s: [f64; 2],
+}
+
+impl Default for AscentTruth {
+    fn default() -> Self {
+        Self {
+            impulse_scale: 1.0,
+            burn_time_scale: 1.0,
+            ignition_delay_s: 0.15,
+            drag_scale: 1.0,
+            rail_lean_rad: [0.0; 2],
+            fin_cant_rad: 0.0,
+            tip_off_rad_s: [0.0; 2],
+        }
+    }
+}
+
 /// Terms in the shape of a thrust curve.
 pub const SHAPE_TERMS: usize = 5;
 

@@ -116,7 +116,7 @@ type Evaluated = (Vec<EvaluatedTick>, usize);
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
     let ticks = match recording.kind() {
-        FlightKind::FromApogee => frames(recording, settings),
+        FlightKind::InSpace => frames(recording, settings),
         FlightKind::Planar => ticks(recording, settings),
     };
     Ok(summarise(recording, settings, ticks?))

@@ -25,7 +25,7 @@ pub enum FlightKind {
     /// The controller of the planar landing.
     Planar,
     /// The flight computer of a flight from apogee.
-    FromApogee,
+    InSpace,
 }
 
 /// A flight of a log.
@@ -82,7 +82,7 @@ impl LoggedFlight {
         let (time_s, phase) = self.last.or(self.on_the_pad)?;
         let period_s = match self.kind {
             FlightKind::Planar => PLANAR_TICK_S,
-            FlightKind::FromApogee => FRAME_S,
+            FlightKind::InSpace => FRAME_S,
         };
         let reached = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= period_s + ROUNDING_S);
         let phase =
@@ -107,11 +107,7 @@ impl Flights {
         let before = self.found.len();
         match entry {
             Entry::ComputerStart(start) => {
-                self.begin(if start.in_space.is_some() {
-                    FlightKind::FromApogee
-                } else {
-                    FlightKind::Planar
-                });
+                self.begin(if start.in_space.is_some() { FlightKind::InSpace } else { FlightKind::Planar });
                 self.powered_up = true;
             }
             Entry::ComputerFrame(frame) => {
@@ -122,9 +118,9 @@ impl Flights {
             // If the log has the power-up of this flight computer, its release does not begin another flight.
             Entry::PilotStart(_)
                 if self.powered_up && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
-            Entry::PilotStart(_) => self.begin(FlightKind::FromApogee),
+            Entry::PilotStart(_) => self.begin(FlightKind::InSpace),
             Entry::PilotTick(tick) => {
-                self.present(FlightKind::FromApogee, false).note(tick.input.time_s, tick.output.phase);
+                self.present(FlightKind::InSpace, false).note(tick.input.time_s, tick.output.phase);
             }
             Entry::Tick(tick) => {
                 let again = tick.input.tick == 0 && self.tick_0_seen;

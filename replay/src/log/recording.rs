@@ -211,7 +211,7 @@ impl Recording {
     /// Which vehicle flew: its ticks are of this kind.
     pub fn kind(&self) -> FlightKind {
         let in_space = self.pilot_start.is_some() || !self.frames.is_empty();
-        if in_space { FlightKind::FromApogee } else { FlightKind::Planar }
+        if in_space { FlightKind::InSpace } else { FlightKind::Planar }
     }
 
     /// The start record of a flight from apogee and all its frames.

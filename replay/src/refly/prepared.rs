@@ -19,7 +19,7 @@ impl<'a> Prepared<'a> {
     /// See [`ReflyError`].
     pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let at_start = match recording.kind() {
-            FlightKind::FromApogee => Some(Box::new(apogee::AtStart::new(recording, options)?)),
+            FlightKind::InSpace => Some(Box::new(apogee::AtStart::new(recording, options)?)),
             FlightKind::Planar => {
                 recording.replayable_ticks()?;
                 None

@@ -81,7 +81,7 @@ fn header(
         options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
     let profile = recording.profile_toml().ok().and_then(|toml| match recording.kind() {
         // It keeps its mission from the start record; its settings change in flight.
-        FlightKind::FromApogee => Some(toml.to_owned()),
+        FlightKind::InSpace => Some(toml.to_owned()),
         FlightKind::Planar => profile_toml_with(toml, &lasting).ok(),
     });
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());

@@ -17,7 +17,7 @@ use protocol::log::{flight_v1, v1};
 use tick_log::pilot::state_from_log;
 use tick_log::state_to_log;
 
-use super::track::{AHEAD_S, Flight, FromApogee, GimbalAxis, PLANS_DRAWN, PlanSample, Vehicle, track_of};
+use super::track::{AHEAD_S, Flight, GimbalAxis, InSpace, PLANS_DRAWN, PlanSample, Vehicle, track_of};
 use crate::controller::{LoggedPilot, NewPlans, Replayed as _};
 use crate::log::Recording;
 
@@ -59,7 +59,7 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         .map(|pair| 0.5 * (pair[0].thrust_n + pair[1].thrust_n) * (pair[1].time_s - pair[0].time_s))
         .sum();
     let burnt_out = recording.world.last().is_some_and(|last| last.thrust_n <= 0.0);
-    let from_apogee = FromApogee {
+    let from_apogee = InSpace {
         inferred_scales: pilot
             .motor()
             .ignition_s()

@@ -37,7 +37,7 @@ pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
     let flight = match recording.kind() {
-        FlightKind::FromApogee => apogee::flight(recording),
+        FlightKind::InSpace => apogee::flight(recording),
         FlightKind::Planar => Flight::new(recording, plans_of(path)?),
     };
     let html = page::page(&flight, &info, &section::all(&flight, &info));

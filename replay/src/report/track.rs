@@ -83,7 +83,7 @@ pub(super) struct GimbalAxis {
 
 /// Data that only a flight from apogee has.
 #[derive(Debug, Clone, Default)]
-pub(super) struct FromApogee {
+pub(super) struct InSpace {
     /// Impulse and burn time divided by their certified values, as estimated at the end.
     pub(super) inferred_scales: Option<(f64, f64)>,
     /// True impulse divided by the certified impulse.
@@ -94,7 +94,7 @@ pub(super) struct FromApogee {
 pub(super) struct Flight {
     pub(super) recording: Recording,
     pub(super) vehicle: Option<Vehicle>,
-    pub(super) from_apogee: Option<FromApogee>,
+    pub(super) from_apogee: Option<InSpace>,
     pub(super) gimbal: Vec<GimbalAxis>,
     /// Vehicle time, s, and thrust as estimated in flight, N.
     pub(super) inferred_n: Vec<(f64, f64)>,

@@ -144,7 +144,7 @@ pub struct PathPoint {
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
     match recording.kind() {
-        FlightKind::FromApogee => pilot::frame(recording, number),
+        FlightKind::InSpace => pilot::frame(recording, number),
         FlightKind::Planar => planar::tick(recording, number),
     }
 }

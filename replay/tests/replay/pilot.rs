@@ -68,6 +68,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             fins_rad: [0.3; 4],
             contact: false,
             igniter_continuity: true,
+            booster_attached: false,
             abort: false,
         };
         computer.step(&Input::in_the_air(&input));

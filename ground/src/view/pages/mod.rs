@@ -1,6 +1,7 @@
 //! One module per page. Each gives its content as lines for small terminals; pages with panels also draw them.
 
 pub mod alarms;
+pub mod ascent;
 pub mod descent;
 pub mod help;
 pub mod landing;
@@ -27,6 +28,7 @@ use crate::model::page::Page;
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     match model.page() {
         Page::Pad => pad::draw(model, theme, now, frame, area),
+        Page::Ascent => ascent::draw(model, theme, now, frame, area),
         Page::Descent => descent::draw(model, theme, now, frame, area),
         Page::Landing => landing::draw(model, theme, now, frame, area),
         page => {
@@ -41,6 +43,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
         Page::Pad => pad::lines(model, theme, now),
+        Page::Ascent => ascent::lines(model, theme, now),
         Page::Descent => descent::lines(model, theme, now),
         Page::Landing => landing::lines(model, theme, now, columns, rows),
         Page::Review => review::lines(model, theme, now, columns),

@@ -3,7 +3,7 @@
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA, TD_DESCENT_DATA,
     TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdChute, TdControlLevel, TdLimit, TdMotor, TdSolverStatus,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdBooster, TdChute, TdControlLevel, TdLimit, TdMotor, TdSolverStatus,
 };
 
 use super::Rig;
@@ -171,6 +171,30 @@ impl Rig {
             touchdown_x_m: 0.8,
             touchdown_y_m: -1.1,
             chute,
+            ..TD_DESCENT_DATA::default()
+        }));
+    }
+
+    /// TD_DESCENT on the way up, with the apogee that is expected: its height, m, and the time until then, s.
+    pub(crate) fn ascent(&mut self, booster: TdBooster, apogee_m: f32, time_to_apogee_s: f32) {
+        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+            time_boot_ms: self.boot_ms(),
+            height_m: 184.8,
+            vertical_speed_m_s: 49.4,
+            band_low_m: f32::NAN,
+            band_high_m: f32::NAN,
+            chosen_height_m: f32::NAN,
+            commit_height_m: 0.0,
+            time_to_ignition_s: f32::NAN,
+            drag_scale: 1.0,
+            thrust_scale: 1.0,
+            touchdown_x_m: 41.0,
+            touchdown_y_m: -3.0,
+            chute: TdChute::TD_CHUTE_STOWED,
+            booster,
+            apogee_m,
+            time_to_apogee_s,
+            ..TD_DESCENT_DATA::default()
         }));
     }
 

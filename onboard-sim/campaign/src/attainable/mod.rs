@@ -18,6 +18,7 @@ mod fall;
 mod root;
 
 use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
 use sim::draw::Draw;
 use world::vertical::Vertical;
 
@@ -43,11 +44,11 @@ impl Window {
 /// gaining speed have such landings, and for them the window is metres wide.
 const TRIED: usize = 24;
 
-/// The window of a flight; `None` if it lands from no height.
-pub fn window(mission: &Mission, drawn: &Draw) -> Option<Window> {
+/// The window of a flight whose fall begins in this state; `None` if it lands from no height.
+pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
     let vertical = Vertical::new(&mission.airframe, &mission.motor_curve, &drawn.truth);
-    let apogee_m = drawn.apogee.position_m.z - vertical.cg_above_feet_m();
-    let vertical_m_s = drawn.apogee.velocity_m_s.z.min(0.0);
+    let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
+    let vertical_m_s = fall.velocity_m_s.z.min(0.0);
     let fall = Fall::new(&vertical, apogee_m, vertical_m_s, drawn.truth.ignition_delay_s)?;
     let limits = (mission.powered.tilt_max_deg.to_radians(), mission.leg_limits.vertical_m_s);
     let braking = Braking::new(vertical, limits)?;

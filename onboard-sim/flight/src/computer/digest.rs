@@ -3,6 +3,7 @@
 use super::self_test::SelfTest;
 use super::{Commands, Computer, LogState, Release, Vehicle};
 use crate::computer::memory::{Memory, Remembers, remembers};
+use crate::computer::pilot::BoosterCommands;
 use crate::guidance::controller::ControllerState;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
 
@@ -48,7 +49,8 @@ remembers!(Interlocks {
     lands_here
 });
 remembers!(Hold { cause, at_s });
-remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute });
+remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute, booster });
+remembers!(BoosterCommands { ignite, separate });
 remembers!(Release { frame, time_s });
 remembers!(LogState { running } but { space_bytes });
 

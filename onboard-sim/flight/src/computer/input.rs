@@ -64,6 +64,8 @@ pub struct Input<'a> {
     /// A foot touches the ground.
     pub contact: bool,
     pub igniter_continuity: bool,
+    /// The wire between booster and vehicle is whole.
+    pub booster_attached: bool,
     pub pin_out: bool,
     pub log: LogState,
     /// The uplink of the station that is heard best.
@@ -92,6 +94,7 @@ impl Input<'_> {
             fins_rad: input.fins_rad,
             contact: input.contact,
             igniter_continuity: input.igniter_continuity,
+            booster_attached: input.booster_attached,
             pin_out: true,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,

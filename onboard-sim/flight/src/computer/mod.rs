@@ -239,10 +239,11 @@ impl Computer {
             fins_rad: input.fins_rad,
             contact: input.contact,
             igniter_continuity: input.igniter_continuity,
+            booster_attached: input.booster_attached,
             abort,
         };
-        let PilotOutput { gimbal_rad, fins_rad, level, .. } = space.fly(&mut self.table, &input);
-        self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
+        let PilotOutput { gimbal_rad, fins_rad, level, booster, .. } = space.fly(&mut self.table, &input);
+        self.commands = Commands { gimbal_rad, fins_rad, booster, ..self.commands };
         let phase = self.table.mode().phase;
         if phase.in_landing_burn() && level != self.level {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));

@@ -54,8 +54,10 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
         Effect::ShowPadWait => (Severity::Critical, "ABORT on the pad: keep away for 60 s"),
         Effect::RecordLoss => (Severity::Critical, "vehicle will be lost: landing motor inhibited"),
         Effect::DeployChute => (Severity::Critical, "parachute deployed"),
-        // No ascent is flown here, and the crew can see the fins.
-        Effect::FinsOpen | Effect::IgniteAscentMotor => return None,
+        Effect::IgniteAscentMotor => (Severity::Notice, "ascent motor commanded to light"),
+        Effect::SeparateBooster => (Severity::Notice, "booster commanded to separate"),
+        // The crew can see the fins.
+        Effect::FinsOpen => return None,
     };
     Some((severity, words.to_owned()))
 }

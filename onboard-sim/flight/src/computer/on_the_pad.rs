@@ -4,7 +4,7 @@ use alloc::format;
 
 use super::news::Severity;
 use super::self_test::{ANSWERING_RAD, TestStep};
-use super::{Computer, Input, Release, Vehicle};
+use super::{Computer, Feeling, Input, Release, Vehicle};
 use crate::rules::phase::{Event, Phase, StartPoint};
 
 impl Computer {
@@ -17,8 +17,48 @@ impl Computer {
         if self.rehearsed.is_some() {
             self.complain_of_readiness();
         }
-        if self.countdown_is_over() {
-            self.let_go();
+        match self.start_point() {
+            // A drone's pilot lets go, and the fall is felt.
+            StartPoint::Drone => self.wait_below_the_drone(),
+            _ if self.countdown_is_over() => self.let_go(),
+            StartPoint::Pad => self.wait_on_the_rail(input),
+            StartPoint::Apogee | StartPoint::Ignition => {}
+        }
+    }
+
+    /// A motor may light that nobody lit.
+    fn wait_on_the_rail(&mut self, input: &Input<'_>) {
+        if let (Vehicle::Space(space), Feeling::InSpace(sensed)) = (&mut self.vehicle, &input.feeling)
+            && space.lifts_off(sensed, input.time_s)
+        {
+            self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
+            if self.happen(Event::LiftOff).is_ok() {
+                self.begin_flight();
+            }
+        }
+    }
+
+    fn wait_below_the_drone(&mut self) {
+        let Vehicle::Space(space) = &self.vehicle else { return };
+        if !space.pad.falls() {
+            return;
+        }
+        let released = if self.countdown_is_over() {
+            self.happen(Event::ReleasedAt(StartPoint::Drone))
+        } else {
+            self.table.say(Severity::Critical, "RELEASED before it was cleared".into());
+            let parachute_fills = space.parachute_fills_below_the_drone();
+            self.happen(Event::ReleasedEarly { parachute_fills })
+        };
+        if released.is_ok() {
+            self.begin_flight();
+        }
+    }
+
+    fn start_point(&self) -> StartPoint {
+        match &self.vehicle {
+            Vehicle::Space(space) => space.start_point(),
+            Vehicle::Plane(_) => StartPoint::Ignition,
         }
     }
 
@@ -59,15 +99,20 @@ impl Computer {
 
     /// The countdown has ended: the flight begins where the simulation releases the vehicle.
     pub(super) fn let_go(&mut self) {
-        let at = match self.vehicle {
-            Vehicle::Space(_) => StartPoint::Apogee,
-            Vehicle::Plane(_) => StartPoint::Ignition,
+        let event = match self.start_point() {
+            StartPoint::Pad => Event::CountdownElapsed,
+            at => Event::ReleasedAt(at),
         };
-        if self.happen(Event::ReleasedAt(at)).is_ok() {
-            self.release = Some(Release { frame: self.frame, time_s: self.table.time_s() });
-            if let Vehicle::Plane(plane) = &mut self.vehicle {
-                plane.release();
-            }
+        if self.happen(event).is_ok() {
+            self.begin_flight();
+        }
+    }
+
+    fn begin_flight(&mut self) {
+        self.release = Some(Release { frame: self.frame, time_s: self.table.time_s() });
+        match &mut self.vehicle {
+            Vehicle::Space(space) => space.leave_the_pad(),
+            Vehicle::Plane(plane) => plane.release(),
         }
     }
 }

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::crew::Answer;
 use super::news::News;
+use super::pilot::BoosterCommands;
 use super::plane::PlanarTick;
 
 /// Commands to the actuators.
@@ -18,6 +19,7 @@ pub struct Commands {
     pub ignite: bool,
     /// The parachute is ejected.
     pub parachute: bool,
+    pub booster: BoosterCommands,
 }
 
 /// The output of one frame.

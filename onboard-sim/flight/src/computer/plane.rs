@@ -255,6 +255,7 @@ impl Plane {
             rotation_rad_s: state.q_rad_s,
             speed_m_s: state.speed_m_s(),
             settled: true,
+            hanging_m: None,
         }
     }
 

@@ -7,13 +7,14 @@ use super::pad::Stance;
 use super::{Computer, Vehicle};
 use crate::rules::arming::{ArmingInput, Check, PredictedLanding, Uplink, arming_checks};
 use crate::rules::phase::Phase;
+use crate::vehicle::profile::StartPoint;
 use crate::vehicle::rigid::RigidState;
 
 impl Computer {
     /// Attitude and motion on the pad.
     pub fn stance(&self) -> Stance {
         match &self.vehicle {
-            Vehicle::Space(space) => space.pad.stance(),
+            Vehicle::Space(space) => space.pad.stance(space.start_point() == StartPoint::Drone),
             Vehicle::Plane(plane) => plane.stance(),
         }
     }
@@ -52,6 +53,7 @@ impl Computer {
             speed_m_s: stance.speed_m_s,
             self_test_passed: self.table.mode().phase != Phase::Safe,
             estimator_converged: stance.settled,
+            hanging_m: stance.hanging_m,
             fins_answering: self.fins_answering,
             igniter_continuity: self.igniter_continuity,
             log_running: self.log.running,

@@ -3,17 +3,21 @@
 use super::pad::PadWatch;
 use super::table::PhaseTable;
 use crate::computer::memory::remembers;
-use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
+use crate::computer::pilot::{AscentWatch, Pilot, PilotInput, PilotOutput, Sensed, axial_m_s2};
 use crate::estimation::estimator::StartUncertainty;
 use crate::guidance::baseline::Law;
 use crate::rules::phase::Phase;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::Mission;
+use crate::vehicle::profile::StartPoint;
 use crate::vehicle::rigid::RigidState;
 
 /// The rocket's part of the flight computer.
 #[derive(Debug, Clone)]
 pub(super) struct Space {
     pub(super) pad: PadWatch,
+    /// Watches for a lift-off that nobody asked for.
+    rail: AscentWatch,
     pub(super) pilot: Pilot,
     /// The last frame in the air.
     pub(super) last: Option<(PilotInput, PilotOutput)>,
@@ -22,13 +26,47 @@ pub(super) struct Space {
 }
 
 // The last frame in the air came with its input, and its decisions are compared as output.
-remembers!(Space { pad, pilot, gate_refusal } but { last });
+remembers!(Space { pad, rail, pilot, gate_refusal } but { last });
 
 impl Space {
     pub(super) fn new(mission: &Mission, law: Law, believed: &RigidState) -> Self {
-        let mut pilot = Pilot::at_apogee(mission, 0.0, believed, &StartUncertainty::at_apogee());
+        let uncertainty = StartUncertainty::at_start(mission.start.at);
+        let mut pilot = Pilot::starting(mission, 0.0, believed, &uncertainty);
         pilot.set_law(law);
-        Self { pad: PadWatch::default(), pilot, last: None, gate_refusal: None }
+        Self { pad: PadWatch::default(), rail: AscentWatch::default(), pilot, last: None, gate_refusal: None }
+    }
+
+    pub(super) fn start_point(&self) -> StartPoint {
+        self.pilot.mission().start.at
+    }
+
+    /// Whether a vehicle on its rail lifts off in this frame, without having been started.
+    pub(super) fn lifts_off(&mut self, sensed: &Sensed, time_s: f64) -> bool {
+        let frame_s = self.pilot.mission().estimator.frame_s;
+        self.rail.feels_lift_off(axial_m_s2(sensed), frame_s, time_s)
+    }
+
+    /// Whether the parachute fills before a vehicle that falls from its drone meets the ground.
+    pub(super) fn parachute_fills_below_the_drone(&self) -> bool {
+        let parachute = &self.pilot.mission().airframe.parachute;
+        // From rest it falls faster and faster: the speed when the lines are taut.
+        let delay_s = parachute.ejection_delay_s;
+        let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
+        self.pad.stance(true).hanging_m.is_some_and(|height_m| height_m > fall_m)
+    }
+
+    /// The flight begins. A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
+    pub(super) fn leave_the_pad(&mut self) {
+        let mission = self.pilot.mission();
+        if let (Some(launch), Some(start)) = (&mission.launch, self.pad.at_rest())
+            && mission.start.at == StartPoint::Pad
+        {
+            let believed = RigidState {
+                world_from_body: start.world_from_body,
+                ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
+            };
+            self.pilot = self.pilot.standing(&believed, start.gyro_bias_rad_s);
+        }
     }
 
     pub(super) fn fly(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {

@@ -5,6 +5,7 @@ use alloc::boxed::Box;
 
 use super::motor_watch::MotorWatch;
 use super::news::Readiness;
+use super::pilot::BoosterCommands;
 use super::plane::{Moment, PlanarLaw, Plane, PlaneError};
 use super::self_test::SelfTest;
 use super::space::Space;
@@ -16,16 +17,25 @@ use crate::rules::arming::Uplink;
 use crate::rules::phase::{Event, Phase};
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::{ArmingLimits, Profile};
+use crate::vehicle::profile::{ArmingLimits, Profile, StartPoint};
 use crate::vehicle::rigid::RigidState;
 
 impl Computer {
-    /// The computer of a rocket at power-up on its pad. No ascent is flown: `believed` is its estimate of the state at
-    /// the release at apogee.
+    /// The computer of a rocket at power-up. `believed` is its estimate of the state at the start of the flight; one that
+    /// stands on its rail finds its attitude there by itself.
     pub fn in_space(mission: &Mission, law: Law, believed: &RigidState) -> Self {
         let space = Space::new(mission, law, believed);
         let closed_rad = mission.airframe.fins.closed_rad();
-        let (arming, countdown_s) = (mission.arming, mission.start.countdown_s);
+        let arming = match (mission.start.at, &mission.drop) {
+            (StartPoint::Drone, Some(drop)) => ArmingLimits {
+                tilt_max_deg: drop.tilt_max_deg,
+                rotation_max_deg_s: drop.rotation_max_deg_s,
+                speed_max_m_s: drop.speed_max_m_s,
+                ..mission.arming
+            },
+            _ => mission.arming,
+        };
+        let countdown_s = mission.start.countdown_s;
         Self::new(Vehicle::Space(Box::new(space)), arming, countdown_s, closed_rad)
     }
 
@@ -79,6 +89,7 @@ impl Computer {
                 fins_rad: [closed_rad; 4],
                 ignite: false,
                 parachute: false,
+                booster: BoosterCommands::default(),
             },
             self_test: SelfTest::NotBegun,
             readiness: Readiness::default(),

@@ -47,7 +47,29 @@ pub struct IgnitionOutlook {
     pub command_in_s: Option<f64>,
 }
 
+/// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
+/// 0.8 of its terminal speed.
+const AHEAD_S: f64 = 0.25;
+const AHEAD_STEPS: u32 = 16;
+
 impl IgnitionSettings {
+    /// Whether the certified motor lands from some point of the fall that begins at this height and vertical velocity. A
+    /// motor that is too strong for the present speed may suit the speed that is still to come.
+    pub fn lands_ahead(
+        &self,
+        column: &Column,
+        curve: &ThrustCurve,
+        height_m: f64,
+        vertical_m_s: f64,
+        fin_drag_area_m2: f64,
+    ) -> bool {
+        (1..=AHEAD_STEPS).any(|step| {
+            let after_s = self.delay_s + AHEAD_S * f64::from(step);
+            let (onset_m, onset_m_s) = column.fallen(height_m, vertical_m_s, fin_drag_area_m2, after_s);
+            column.band(&Burn::nominal(curve), 0.0, onset_m_s).is_some_and(|band| onset_m >= band.low_m)
+        })
+    }
+
     /// The outlook from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
     pub fn outlook(
         &self,

@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 pub use crate::rules::check::{Check, all_passed, first_refusal};
 use crate::rules::phase::UPLINK_SILENT_S;
 use crate::rules::verdict::LandingVerdict;
+use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::profile::ArmingLimits;
 
 /// The radio link to the station that asks for arming.
@@ -50,6 +51,8 @@ pub struct ArmingInput {
     pub rotation_rad_s: f64,
     pub speed_m_s: f64,
     pub self_test_passed: bool,
+    /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
+    pub hanging_m: Option<f64>,
     /// The estimator has settled.
     pub estimator_converged: bool,
     /// Number of fins that reached their commanded angle.
@@ -76,7 +79,7 @@ pub struct ArmingInput {
 pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
-    vec![
+    let mut checks = vec![
         Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
         Check::condition("pin", input.pin_out, "out", "in"),
         Check::condition("self-test", input.self_test_passed, "passed", "not passed"),
@@ -106,7 +109,16 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         },
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),
-    ]
+    ];
+    if let Some(height_m) = input.hanging_m {
+        checks.push(Check {
+            name: "height below the drone",
+            passed: height_m >= LOWEST_ARMED_M,
+            found: format!("{height_m:.1} m"),
+            required: format!("at least {LOWEST_ARMED_M} m"),
+        });
+    }
+    checks
 }
 
 /// The name of the uplink check, the only check that depends on the ground.
@@ -151,6 +163,7 @@ mod tests {
             rotation_rad_s: 0.0,
             speed_m_s: 0.0,
             self_test_passed: true,
+            hanging_m: None,
             estimator_converged: true,
             fins_answering: [true; 4],
             igniter_continuity: true,

@@ -11,21 +11,26 @@ use crate::guidance::descent::DescentGains;
 use crate::guidance::ignition::IgnitionSettings;
 use crate::guidance::powered::PoweredSettings;
 use crate::vehicle::airframe::{Airframe, BadValue};
-use crate::vehicle::profile::{ArmingLimits, GateLimits, TouchdownBox};
+use crate::vehicle::drop::Drop;
+use crate::vehicle::launch::Launch;
+use crate::vehicle::profile::{ArmingLimits, GateLimits, StartPoint, TouchdownBox};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// Default length of the countdown, s.
 const COUNTDOWN_S: f64 = 5.0;
 
-/// The start of a mission: at apogee, nose up.
+/// Where a mission starts, and the state at apogee, nose up, if it starts there.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ApogeeStart {
+pub struct Start {
+    /// Where the flight begins: `pad` needs the section `launch`, `drone` the section `drop`.
+    #[serde(default = "at_apogee")]
+    pub at: StartPoint,
     /// Time from the crew's start command to the start, s, 0 to 600.
     #[serde(default = "countdown_s")]
     pub countdown_s: f64,
-    /// Height of the centre of gravity above the pad, m.
+    /// Height of the centre of gravity above the pad at apogee, m.
     pub height_m: f64,
     /// Horizontal distance from the pad, m.
     pub distance_m: f64,
@@ -121,7 +126,13 @@ pub struct Mission {
     pub fin_soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright in that band, s.
     pub settle_s: f64,
-    pub start: ApogeeStart,
+    pub start: Start,
+    /// The rail and the booster stage, for a start from the pad.
+    #[serde(default)]
+    pub launch: Option<Launch>,
+    /// The drone, for a start below it.
+    #[serde(default)]
+    pub drop: Option<Drop>,
     #[serde(default)]
     pub estimator: EstimatorConfig,
     /// Steering by fins.
@@ -140,6 +151,10 @@ pub struct Mission {
     /// What counts as a landing: the landing paper's Table 2.
     pub touchdown_limits: TouchdownBox,
     pub leg_limits: LegLimits,
+}
+
+fn at_apogee() -> StartPoint {
+    StartPoint::Apogee
 }
 
 fn countdown_s() -> f64 {

@@ -9,7 +9,7 @@ use crate::draw::fault_shares;
 #[derive(Debug, Clone, Default)]
 pub struct Injector {
     waiting: Vec<TimedFault>,
-    /// When each phase was entered, s since apogee.
+    /// When each phase was entered, s since the start.
     entered_s: [Option<f64>; Phase::ALL.len()],
     happened: u64,
 }
@@ -32,7 +32,7 @@ impl Injector {
         self.happened
     }
 
-    /// What breaks at a time, s since apogee, in a phase. Call it before every frame.
+    /// What breaks at a time, s since the start, in a phase. Call it before every frame.
     pub fn due(&mut self, time_s: f64, phase: Phase) -> Vec<Breakage> {
         self.entered_s[usize::from(phase.index())].get_or_insert(time_s);
         let entered_s = self.entered_s;

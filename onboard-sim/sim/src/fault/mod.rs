@@ -1,7 +1,7 @@
 //! What breaks in a flight, and when.
 //!
 //! On a command line and in a scenario a fault is written `NAME[:VALUE]@WHEN`, for example `gnss-out@5`,
-//! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since apogee in seconds, or a phase with an
+//! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since the start of the flight in seconds, or a phase with an
 //! optional delay in seconds after the phase was entered. A delay `+0.5..4` is drawn uniformly for each flight.
 
 mod inject;
@@ -42,7 +42,7 @@ pub enum Breakage {
 /// When it breaks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum When {
-    /// Seconds after apogee.
+    /// Seconds after the start of the flight.
     Time(f64),
     /// Seconds after a phase was entered.
     Phase(Phase, f64),
@@ -103,12 +103,20 @@ const NAMES: &[(&str, &str, Build)] = &[
         let after_s = value.filter(|after_s| *after_s >= 0.0)?;
         Some(Breakage::Vehicle(Fault::EarlyBurnout { after_s }))
     }),
+    ("ascent-no-light", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::AscentNoLight))),
+    ("ascent-weak", "thrust over nominal, 0.01 to 1", |value| {
+        let scale = value.filter(|scale| (0.01..=1.0).contains(scale))?;
+        Some(Breakage::Vehicle(Fault::AscentWeak { scale }))
+    }),
+    ("separation-fails", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::SeparationFails))),
     ("reboot", "s", |value| value.filter(|down_s| (0.0..=10.0).contains(down_s)).map(Breakage::Reboot)),
     ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
 ];
 
 /// The phases, with their names in the text of a fault.
 const PHASES: &[(&str, Phase)] = &[
+    ("boost", Phase::Boost),
+    ("coast", Phase::Coast),
     ("apogee", Phase::Deploy),
     ("descent", Phase::AeroDescent),
     ("armed", Phase::LandArmed),
@@ -143,7 +151,7 @@ impl FromStr for When {
             return if time_s >= 0.0 {
                 Ok(Self::Time(time_s))
             } else {
-                Err(format!("{text} s is before apogee"))
+                Err(format!("{text} s is before the start"))
             };
         }
         let (name, delay) = text.split_once('+').unwrap_or((text, "0"));
@@ -217,6 +225,9 @@ impl fmt::Display for TimedFault {
             Breakage::Vehicle(Fault::LateLight { delay_s }) => write!(f, "late-light:{delay_s}"),
             Breakage::Vehicle(Fault::WeakMotor { scale }) => write!(f, "weak-motor:{scale}"),
             Breakage::Vehicle(Fault::EarlyBurnout { after_s }) => write!(f, "early-burnout:{after_s}"),
+            Breakage::Vehicle(Fault::AscentNoLight) => write!(f, "ascent-no-light"),
+            Breakage::Vehicle(Fault::AscentWeak { scale }) => write!(f, "ascent-weak:{scale}"),
+            Breakage::Vehicle(Fault::SeparationFails) => write!(f, "separation-fails"),
             Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
             Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
             Breakage::Vehicle(Fault::FinStuck { fin }) => write!(f, "fin-stuck:{fin}"),
@@ -236,6 +247,9 @@ mod tests {
             "fin-stuck:2@apogee",
             "gimbal-slow:0.3@ignition+0.3",
             "gimbal-stuck@powered",
+            "ascent-weak:0.6@boost",
+            "ascent-no-light@0",
+            "separation-fails@coast",
             "late-light:0.2@0",
             "reboot:0.5@descent+4",
             "link-loss@0",
@@ -259,7 +273,7 @@ mod tests {
             ("fin-stuck:1.5@5", "must be 0 to 3"),
             ("weak-motor@5", "must be thrust over nominal"),
             ("weak-motor:x@5", "`x` is no number"),
-            ("no-light@-1", "before apogee"),
+            ("no-light@-1", "before the start"),
             ("no-light@orbit", "neither a time nor a phase"),
             ("no-light@powered+soon", "no delay"),
             ("abort@powered+3..2", "no delay"),

@@ -102,6 +102,7 @@ impl PlanarFlight {
             fins_rad: self.plant.fins_rad().1,
             contact: self.plant.in_contact(),
             igniter_continuity: !self.lit,
+            booster_attached: false,
             pin_out: outside.pin_out,
             log: outside.log,
             uplink: outside.uplink,

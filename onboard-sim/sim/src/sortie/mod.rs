@@ -1,11 +1,12 @@
-//! One flight of a rocket in space: first on its pad, then from apogee until it is at rest. The ascent is not
-//! simulated.
+//! One flight of a rocket in space, from power-up until it is at rest: from its rail, from below a drone, or from an
+//! apogee that it is put to.
 //!
 //! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
 
 mod breakage;
 mod errors;
 mod rehearsal;
+mod start;
 
 use std::time::Duration;
 
@@ -19,6 +20,7 @@ use flight::guidance::baseline::Law;
 use flight::guidance::powered::PoweredReport;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use world::sensors::{SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
 use world::world::WorldError;
@@ -64,6 +66,10 @@ pub struct Sortie {
     computer: Computer,
     rehearsal: Option<Rehearsal>,
     world: World,
+    /// The state in which the fall began.
+    fall: Option<RigidState>,
+    /// Frames since the countdown of a hanging vehicle ended.
+    cleared_frames: u64,
     sensors: Option<Sensors>,
     sensor_faults: SensorFaults,
     /// The sensor samples of the last frame.
@@ -82,7 +88,7 @@ pub struct Sortie {
 }
 
 impl Sortie {
-    /// Flight `number` of a recipe, released at apogee at once.
+    /// Flight `number` of a recipe, started at once.
     ///
     /// # Errors
     /// It cannot be set up.
@@ -92,7 +98,7 @@ impl Sortie {
         Ok(Self { injector, ..Self::of(&mission, &recipe.dispersion, &drawn, law)?.released() })
     }
 
-    /// A flight without faults with the given draw, released at apogee at once.
+    /// A flight without faults with the given draw, started at once.
     ///
     /// # Errors
     /// The mission or the draw cannot be flown.
@@ -105,7 +111,7 @@ impl Sortie {
         Ok(Self::of(mission, dispersion, drawn, law)?.released())
     }
 
-    /// Flight `number` of a recipe at power-up, upright on its pad.
+    /// Flight `number` of a recipe at power-up: upright on its pad, on its rail, or below its drone.
     ///
     /// # Errors
     /// It cannot be set up.
@@ -114,35 +120,37 @@ impl Sortie {
         let airframe = &mission.airframe;
         let cg_station_m = airframe.mass.loaded_cg_station_m + drawn.truth.cg_offset_m[0];
         let standing = RigidState::upright(airframe.above_feet_m(cg_station_m));
-        let at_apogee = Self::of(&mission, &recipe.dispersion, &drawn, law)?;
-        let world = at_apogee.world_at(&standing)?;
+        let started = Self::of(&mission, &recipe.dispersion, &drawn, law)?;
+        let world = match (mission.start.at, drawn.hanging) {
+            (StartPoint::Pad, _) => started.world.clone(),
+            (StartPoint::Drone, Some(hanging)) => started.world.clone().hanging(hanging),
+            _ => start::world_at(&mission, &drawn, &standing)?,
+        };
         Ok(Self {
             world,
             rehearsal: Some(Rehearsal::new(recipe)?),
             injector: Injector::new(&recipe.faults, recipe.seed, number),
-            ..at_apogee
+            ..started
         })
     }
 
-    /// A flight in a world at apogee, with a computer at power-up.
+    /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
+        let drawn = Draw { apogee: start::falling(mission, drawn)?, ..*drawn };
+        let world = start::world(mission, &drawn)?;
         let (sensors, believed) = if dispersion.sensors {
             let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
-            let uncertainty = StartUncertainty::at_apogee();
-            (Some(sensors), believed_start(&drawn.apogee, &uncertainty, drawn.flight_seed))
+            let uncertainty = StartUncertainty::at_start(mission.start.at);
+            (Some(sensors), believed_start(world.state(), &uncertainty, drawn.flight_seed))
         } else {
-            (None, drawn.apogee)
+            (None, *world.state())
         };
         Ok(Self {
             computer: Computer::in_space(mission, law, &believed),
             rehearsal: None,
-            world: World::new(
-                &mission.airframe,
-                &mission.motor_curve,
-                &drawn.truth,
-                &drawn.apogee,
-                drawn.flight_seed,
-            )?,
+            world,
+            fall: None,
+            cleared_frames: 0,
             sensors,
             sensor_faults: SensorFaults::default(),
             measured: None,
@@ -157,25 +165,19 @@ impl Sortie {
             largest_errors: EstimatorErrors::default(),
             mission: mission.clone(),
             dispersion: *dispersion,
-            drawn: *drawn,
+            drawn,
             believed,
         })
-    }
-
-    fn world_at(&self, state: &RigidState) -> Result<World, SetUpError> {
-        let Draw { truth, flight_seed, .. } = &self.drawn;
-        let Mission { airframe, motor_curve, .. } = &self.mission;
-        Ok(World::new(airframe, motor_curve, truth, state, *flight_seed)?)
     }
 
     fn released(self) -> Self {
         Self { computer: self.computer.released(), ..self }
     }
 
-    /// Moves the simulation from the pad to apogee.
-    fn go_on_at_apogee(&mut self) {
+    /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
+    fn begin(&mut self) {
         // Both were already set up at power-up, which would have found any error.
-        if let Ok(world) = self.world_at(&self.drawn.apogee) {
+        if let Ok(world) = start::world(&self.mission, &self.drawn) {
             self.world = world;
         }
         if self.dispersion.sensors {
@@ -201,6 +203,7 @@ impl Sortie {
         {
             rehearsal.step();
         }
+        self.let_go_when_cleared();
         let feeling = self.feel();
         self.frame += 1;
         self.dead = self.frames_down > 0;
@@ -235,6 +238,7 @@ impl Sortie {
             fins_rad,
             contact,
             igniter_continuity,
+            booster_attached: self.world.booster_attached(),
             pin_out: outside.pin_out,
             log: outside.log,
             uplink: outside.uplink,
@@ -251,7 +255,7 @@ impl Sortie {
         output.answers.truncate(outside.requests.len());
         self.command(&output.commands);
         if output.released {
-            self.go_on_at_apogee();
+            self.begin();
         }
         Flown { output: Some(output), took }
     }
@@ -271,18 +275,43 @@ impl Sortie {
     }
 
     fn command(&mut self, commands: &Commands) {
-        let Commands { gimbal_rad, fins_rad, ignite, parachute } = *commands;
-        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute };
+        let Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = *commands;
+        let (ignite_booster, separate) = (booster.ignite, booster.separate);
+        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute, ignite_booster, separate };
+        let falls = !self.computer.mode().phase.before_apogee();
+        if falls && self.fall.is_none() {
+            self.fall = Some(*self.world.state());
+        }
         self.finite &= self.world.state().is_finite()
             && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());
-        if self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
+        if falls && self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
             self.largest_errors = self.largest_errors.or_larger(&self.errors());
         }
     }
 
+    /// A drone's pilot lets go some time after the countdown has ended.
+    fn let_go_when_cleared(&mut self) {
+        if !self.world.hangs() {
+            return;
+        }
+        let left_s = self.computer.mode().countdown_remaining_s(flight_time_s(self.frame));
+        self.cleared_frames =
+            if left_s.is_some_and(|left_s| left_s <= 0.0) { self.cleared_frames + 1 } else { 0 };
+        let after_s = self.mission.drop.map_or(0.0, |drop| drop.release_after_s);
+        if self.cleared_frames > 0 && flight_time_s(self.cleared_frames) > after_s {
+            self.world.let_go();
+        }
+    }
+
+    /// The state in which the fall began: that of the flight if it has, else as drawn.
+    pub fn fell_from(&self) -> &RigidState {
+        self.fall.as_ref().unwrap_or(&self.drawn.apogee)
+    }
+
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
-        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
+        let stays = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
+        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S && !stays
     }
 
     /// Flies to the end.
@@ -364,8 +393,8 @@ impl Sortie {
         &self.radio
     }
 
-    /// The flight computer's estimate of its state at apogee.
-    pub fn believed_at_apogee(&self) -> &RigidState {
+    /// The flight computer's estimate of its state at the start.
+    pub fn believed_at_start(&self) -> &RigidState {
         &self.believed
     }
 
@@ -415,5 +444,5 @@ fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
 
 fn at_rest(mission: &Mission) -> Actuators {
     let closed_rad = mission.airframe.fins.closed_rad();
-    Actuators { gimbal_rad: [0.0; 2], fins_rad: [closed_rad; 4], ignite: false, parachute: false }
+    Actuators { fins_rad: [closed_rad; 4], ..Actuators::NONE }
 }

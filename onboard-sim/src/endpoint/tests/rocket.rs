@@ -27,7 +27,7 @@ impl Airborne {
     }
 
     fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
-        let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+        let LoadedFlight::InSpace(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
         flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
         flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
         let mut rocket = Vehicle::in_space(&flight).unwrap();

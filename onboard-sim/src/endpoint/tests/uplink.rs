@@ -59,7 +59,7 @@ impl Pad {
     }
 
     fn in_space() -> Self {
-        let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+        let LoadedFlight::InSpace(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
         flight.recipe.dispersion = Dispersion::builtin("none").unwrap();
         Self::of(Vehicle::in_space(&flight).unwrap(), VehicleEndpoint::sending(&FROM_APOGEE))
     }

@@ -4,6 +4,7 @@ mod plane;
 mod space;
 
 use flight::computer::AbortEffect;
+use flight::computer::pilot::ApogeeAhead;
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
@@ -31,7 +32,7 @@ pub struct Snapshot {
     /// Time to release, s, while a countdown runs.
     pub countdown_s: Option<f64>,
     /// Time since ignition, s; stands still after touchdown.
-    pub since_ignition_s: Option<f64>,
+    pub since_zero_s: Option<f64>,
     /// Time before the pad may be approached, s.
     pub pad_wait_s: Option<f64>,
     /// What is known of the landing motor.
@@ -222,6 +223,27 @@ pub struct DescentFacts {
     pub touchdown_m: [f64; 2],
     /// The parachute.
     pub chute: Chute,
+    /// The way up; `None` in a flight without ascent.
+    pub ascent: Option<AscentFacts>,
+}
+
+/// The way up, as the flight computer knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AscentFacts {
+    pub booster: Booster,
+    /// The apogee that is expected; `None` under the ascent motor.
+    pub apogee: Option<ApogeeAhead>,
+    /// It is over.
+    pub over: bool,
+}
+
+/// The booster stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Booster {
+    Attached,
+    /// Its charge is fired, and the wire to it is still whole.
+    Separating,
+    Separated,
 }
 
 /// The parachute, as the flight computer knows it.
@@ -282,7 +304,7 @@ impl Vehicle {
             phase: mode.phase,
             interlocks: mode.interlocks,
             countdown_s: mode.countdown_remaining_s(time_s),
-            since_ignition_s: None,
+            since_zero_s: None,
             pad_wait_s: mode.pad_wait_remaining_s(time_s),
             motor: mode.motor_status(time_s),
             approach_wait_s: mode.approach_wait_s(time_s),

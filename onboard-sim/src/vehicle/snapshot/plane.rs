@@ -14,7 +14,7 @@ impl Vehicle {
         // The flight's clock stops when the flight does.
         let until_s = self.judged().map_or(self.time_s(), |judged| judged.impact.time_s);
         Snapshot {
-            since_ignition_s: plane.ignited_at_s().map(|at_s| until_s - at_s),
+            since_zero_s: plane.ignited_at_s().map(|at_s| until_s - at_s),
             gimbal_rad: [plant.gimbal_rad(), (0.0, 0.0)],
             fins_rad: plant.fins_rad(),
             thrust_n: plant.thrust_n(),

@@ -1,6 +1,6 @@
 //! The rocket's state at one instant, for telemetry: what its flight computer believes.
 
-use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, PilotOutput, touchdown_m};
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, PilotOutput, touchdown_from_below_m, touchdown_m};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::controller::ControlLevel;
 use flight::guidance::powered::{Plane, PoweredReport};
@@ -8,12 +8,14 @@ use flight::rules::phase::Phase;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 use sim::limits::Limits;
 
 use super::{
-    Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path, Prediction, Snapshot, violations,
+    AscentFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path, Prediction,
+    Snapshot, violations,
 };
 use crate::vehicle::{InSpace, Vehicle};
 
@@ -29,8 +31,9 @@ impl Vehicle {
         let limits = Limits::of(mission).legs;
         let mass = MassModel::new(&mission.airframe.mass, sortie.pilot().curve().propellant_mass_kg());
         let cg_m = mission.airframe.above_feet_m(mass.at(0.0).cg_station_m);
+        let hanging_m = sortie.computer().stance().hanging_m.filter(|height_m| height_m.is_finite());
         let believed = RigidState {
-            position_m: Vector3::z() * cg_m,
+            position_m: Vector3::z() * hanging_m.unwrap_or(cg_m),
             ..sortie.computer().believed_on_the_pad().unwrap_or_else(|| RigidState::upright(cg_m))
         };
         let (commands, world) = (sortie.computer().commands(), sortie.world());
@@ -76,7 +79,11 @@ impl Vehicle {
         let until_s = self.judged().map_or(flight_s, |judged| judged.impact.time_s - released_at_s);
         let sigmas = &estimate.sigmas;
         Snapshot {
-            since_ignition_s: pilot.ignited_at_s().map(|ignited_at_s| until_s - ignited_at_s),
+            since_zero_s: match space.sortie.mission().start.at {
+                // The clock of a launch starts with the ascent motor, and runs to the end.
+                StartPoint::Pad => Some(until_s),
+                _ => pilot.ignited_at_s().map(|ignited_at_s| until_s - ignited_at_s),
+            },
             motion: Motion::in_space(&estimate.state, feet_m, &estimate.wind_m_s),
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
             controller: Some(facts(frame / FRAMES_PER_PLAN, output.level, pilot.report())),
@@ -103,7 +110,12 @@ impl Vehicle {
         let outlook = pilot.outlook();
         let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
         let height_m = place.z - feet_m;
-        let touchdown = touchdown_m(place, velocity, height_m);
+        let rising = self.phase().before_apogee();
+        let touchdown = if rising {
+            touchdown_from_below_m(place, velocity)
+        } else {
+            touchdown_m(place, velocity, height_m)
+        };
         let motor = pilot.motor();
         let deciding = self.phase().in_descent();
         // Also on the ground, after a descent under it.
@@ -128,8 +140,28 @@ impl Vehicle {
                 _ if fired => Chute::Open,
                 _ => Chute::Stowed,
             },
+            ascent: ascent(space, self.phase()),
         }
     }
+}
+
+/// The way up of a flight from the pad.
+fn ascent(space: &InSpace, phase: Phase) -> Option<AscentFacts> {
+    let computer = space.sortie.computer();
+    if space.sortie.mission().start.at != StartPoint::Pad {
+        return None;
+    }
+    let attached = computer.piloted().is_some_and(|(input, _)| input.booster_attached);
+    let booster = match (attached, computer.commands().booster.separate) {
+        (true, false) => Booster::Attached,
+        (true, true) => Booster::Separating,
+        (false, _) => Booster::Separated,
+    };
+    Some(AscentFacts {
+        booster,
+        apogee: space.sortie.pilot().apogee_ahead(phase),
+        over: !phase.before_apogee(),
+    })
 }
 
 /// A rocket in the air, or on the ground after its flight.

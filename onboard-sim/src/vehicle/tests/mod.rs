@@ -2,6 +2,7 @@
 
 mod aborts;
 mod motor;
+mod pad;
 mod plane;
 mod space;
 

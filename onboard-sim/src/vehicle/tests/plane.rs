@@ -217,7 +217,7 @@ fn an_abort_in_the_countdown_releases_nothing() {
 /// How long an aborted vehicle had been burning, s, and the abort's landing.
 fn aborted_after(burning_s: f64) -> (Told, Vec<VehicleEvent>) {
     let mut vehicle = in_phase(Phase::Ignition);
-    vehicle.run_until(|v| v.snapshot().since_ignition_s.is_some_and(|since_s| since_s >= burning_s));
+    vehicle.run_until(|v| v.snapshot().since_zero_s.is_some_and(|since_s| since_s >= burning_s));
     assert_eq!(vehicle.snapshot().abort_effect, AbortEffect::LandHere);
     assert_eq!(vehicle.request(Asked::Abort).ending, Ending::Accepted);
     assert_eq!(vehicle.request(Asked::Abort).ending, Ending::Accepted, "repeated until answered");

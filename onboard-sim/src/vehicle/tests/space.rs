@@ -9,7 +9,7 @@ use super::*;
 use crate::fly::{LoadedFlight, load_flight};
 
 pub(super) fn flight_of(dispersion: &str, faults: &[&str]) -> RocketFlight {
-    let LoadedFlight::FromApogee(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+    let LoadedFlight::InSpace(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
     flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
     flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     *flight
@@ -88,7 +88,7 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
 #[test]
 fn every_built_in_mission_is_ready_on_its_pad() {
     for (name, _) in vehicles::mission::BUILTIN {
-        let LoadedFlight::FromApogee(flight) = load_flight(name).unwrap() else { panic!("from apogee") };
+        let LoadedFlight::InSpace(flight) = load_flight(name).unwrap() else { panic!("from apogee") };
         let mut rocket = rocket_of(&flight);
         rocket.run_until(|rocket| rocket.time_s() > rocket.ready_within_s());
         assert_eq!(rocket.snapshot().checks_failed, 0, "{name}: {:?}", rocket.arming_checks());

@@ -25,6 +25,9 @@ pub use self::start::believed_start;
 use crate::world::World;
 
 const MS_S: f64 = 1e-3;
+/// A hobby receiver loses its satellites under the acceleration of the ascent motor (its tracking loops follow 4 g) and
+/// finds them again this long after it, ms: a hot start takes 1 to 2 s.
+const REACQUIRED_MS: u32 = 1500;
 
 /// The truth that the sensors measure, after a millisecond.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +46,10 @@ pub struct SensorTruth {
     pub ground_m: f64,
     /// The motor burns.
     pub burning: bool,
-    /// Time since the parachute was ejected, s.
+    /// Time since the last charge was fired inside the vehicle, s: that of the parachute, or that of the booster.
     pub ejected_for_s: Option<f64>,
+    /// The ascent motor burns.
+    pub boosted: bool,
 }
 
 impl SensorTruth {
@@ -65,6 +70,7 @@ impl SensorTruth {
             ground_m: 0.0,
             burning: false,
             ejected_for_s: None,
+            boosted: false,
         }
     }
 
@@ -77,8 +83,12 @@ impl SensorTruth {
             cg_over_feet_m: world.cg_above_feet_m(),
             angular_acceleration_rad_s2: *world.angular_acceleration_rad_s2(),
             ground_m: world.ground_under_beam_m(),
-            burning: world.thrust_n() > 0.0,
-            ejected_for_s: world.parachute_ejected_s().map(|at_s| world.time_s() - at_s),
+            burning: world.thrust_n() > 0.0 || world.booster_thrust_n() > 0.0,
+            ejected_for_s: world
+                .parachute_ejected_s()
+                .or(world.charge_fired_s())
+                .map(|at_s| world.time_s() - at_s),
+            boosted: world.booster_thrust_n() > 0.0,
         }
     }
 }
@@ -133,6 +143,8 @@ pub struct Sensors {
     flaws: Flaws,
     /// Elapsed time at the first contact, ms.
     contact_ms: Option<u32>,
+    /// The last millisecond under the ascent motor.
+    boosted_ms: Option<u32>,
 }
 
 impl Sensors {
@@ -178,6 +190,7 @@ impl Sensors {
             force_sum_m_s2: Vector3::zeros(),
             flaws: Flaws::draw(params, seed),
             contact_ms: None,
+            boosted_ms: None,
         })
     }
 
@@ -191,7 +204,11 @@ impl Sensors {
         self.elapsed_ms += 1;
         self.rate_sum_rad_s += truth.state.rate_rad_s;
         self.force_sum_m_s2 += self.force_at_unit_m_s2(truth);
-        self.watch_satellites(truth, faults.gnss_out);
+        if truth.boosted {
+            self.boosted_ms = Some(self.elapsed_ms);
+        }
+        let unlocked = self.boosted_ms.is_some_and(|at_ms| self.elapsed_ms - at_ms < REACQUIRED_MS);
+        self.watch_satellites(truth, faults.gnss_out || unlocked);
         if !self.elapsed_ms.is_multiple_of(FRAME_MS) {
             return None;
         }

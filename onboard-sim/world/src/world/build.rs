@@ -4,18 +4,22 @@ use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::airframe::BadValue;
 use flight::vehicle::airframe::{Airframe, MassModel};
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+use flight::vehicle::launch::Launch;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::World;
 use crate::aero::Shape;
 use crate::ground::Ground;
+use crate::hanging::Hanging;
 use crate::linkage::Linkage;
 use crate::motor::Motor;
 use crate::parachute::Parachute;
 use crate::servo::Servo;
-use crate::truth::{SHAPE_MOST, Truth};
+use crate::stack::Stack;
+use crate::truth::{AscentTruth, SHAPE_MOST, Truth};
 use crate::wind::Wind;
 
 /// Why no world can be built from the data.
@@ -98,11 +102,42 @@ impl World {
             angular_acceleration_rad_s2: Vector3::zeros(),
             touchdown: None,
             rest: None,
+            stack: None,
+            separated_s: None,
+            hanging: None,
             airframe: airframe.clone(),
             truth: *truth,
         };
         world.wind.step(initial.position_m.z, 0.0);
         Ok(world)
+    }
+
+    /// The same world with the vehicle on its booster, at rest on the rail.
+    #[must_use]
+    pub fn on_rail(mut self, launch: &Launch, truth: &AscentTruth) -> Self {
+        let [about_x, about_y] = truth.rail_lean_rad;
+        let lean = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
+        let standing = launch.standing(self.cg_m().x);
+        self.state = RigidState {
+            position_m: lean * standing.position_m,
+            world_from_body: lean * standing.world_from_body,
+            ..standing
+        };
+        self.specific_force_m_s2 = self.state.world_from_body.inverse_transform_vector(&Vector3::new(
+            0.0,
+            0.0,
+            STANDARD_GRAVITY_M_S2,
+        ));
+        self.stack = Some(Box::new(Stack::new(launch, truth)));
+        self
+    }
+
+    /// The same world with the vehicle below a drone.
+    #[must_use]
+    pub fn hanging(mut self, hanging: Hanging) -> Self {
+        (self.state, self.specific_force_m_s2) = hanging.at(0.0);
+        self.hanging = Some(hanging);
+        self
     }
 
     /// The same world with the fins already at an opening angle, rad, held between their stops.

@@ -44,6 +44,9 @@ impl World {
             angular_acceleration_rad_s2: self.angular_acceleration_rad_s2,
             touchdown: self.touchdown,
             rest: self.rest,
+            stack: self.stack.clone(),
+            separated_s: self.separated_s,
+            hanging: self.hanging,
             ..other
         })
     }
@@ -66,7 +69,7 @@ mod tests {
     use crate::{Actuators, Fault};
 
     const IGNITED: Actuators =
-        Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, parachute: false };
+        Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, ..Actuators::NONE };
 
     fn airframe() -> Airframe {
         vehicles::airframe::builtin("mk2").unwrap()

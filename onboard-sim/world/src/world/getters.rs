@@ -108,6 +108,31 @@ impl World {
         self.parachute.ejected()
     }
 
+    /// Whether the wire between booster and vehicle is whole.
+    pub fn booster_attached(&self) -> bool {
+        self.stack.is_some()
+    }
+
+    /// Thrust of the ascent motor now, N.
+    pub fn booster_thrust_n(&self) -> f64 {
+        self.stack.as_ref().map_or(0.0, |stack| stack.thrust_n(self.time_s()))
+    }
+
+    /// When the separation charge was fired, s.
+    pub fn charge_fired_s(&self) -> Option<f64> {
+        self.stack.as_ref().map_or(self.separated_s, |stack| stack.charge_fired_s())
+    }
+
+    /// The vehicle hangs below its drone.
+    pub fn hangs(&self) -> bool {
+        self.hanging.is_some()
+    }
+
+    /// The drone lets the vehicle go.
+    pub fn let_go(&mut self) {
+        self.hanging = None;
+    }
+
     /// When the parachute was ejected, s.
     pub fn parachute_ejected_s(&self) -> Option<f64> {
         self.parachute.ejected_s()

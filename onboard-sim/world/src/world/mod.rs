@@ -8,6 +8,7 @@
 mod build;
 mod change;
 mod getters;
+mod riding;
 #[cfg(test)]
 mod tests;
 
@@ -23,10 +24,12 @@ use crate::aero::{Configuration, Flow, Load, Plume, Shape};
 use crate::body::{self, Inertia, Loads};
 use crate::fault::Fault;
 use crate::ground::{Ground, Rest, RestOutcome, Touchdown};
+use crate::hanging::Hanging;
 use crate::linkage::Linkage;
 use crate::motor::Motor;
 use crate::parachute::Parachute;
 use crate::servo::Servo;
+use crate::stack::Stack;
 use crate::truth::Truth;
 use crate::wind::Wind;
 
@@ -46,6 +49,22 @@ pub struct Actuators {
     pub ignite: bool,
     /// Ejects the parachute; only the first time counts.
     pub parachute: bool,
+    /// Fires the igniter of the ascent motor; only the first time counts.
+    pub ignite_booster: bool,
+    /// Fires the charge that separates the booster; only the first time counts.
+    pub separate: bool,
+}
+
+impl Actuators {
+    /// Everything at zero and nothing fired.
+    pub const NONE: Self = Self {
+        gimbal_rad: [0.0; 2],
+        fins_rad: [0.0; 4],
+        ignite: false,
+        parachute: false,
+        ignite_booster: false,
+        separate: false,
+    };
 }
 
 /// One vehicle, its air and its ground.
@@ -70,6 +89,11 @@ pub struct World {
     angular_acceleration_rad_s2: Vector3<f64>,
     touchdown: Option<Touchdown>,
     rest: Option<Rest>,
+    /// The booster with all that belongs to it, until it is separated.
+    stack: Option<Box<Stack>>,
+    separated_s: Option<f64>,
+    /// How it hangs, until it is let go.
+    hanging: Option<Hanging>,
 }
 
 /// Everything that acts within one part of a step.
@@ -121,10 +145,19 @@ impl World {
         if self.rest.is_some() {
             return;
         }
+        if let Some(hanging) = &self.hanging {
+            (self.state, self.specific_force_m_s2) = hanging.at(time_s + STEP_S);
+            self.angular_acceleration_rad_s2 = Vector3::zeros();
+            return;
+        }
         let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
         self.parachute.step(time_s, airspeed_m_s);
         self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S);
         self.mass = self.mass_model.at(self.motor.burnt_kg(time_s + 0.5 * STEP_S) * self.truth.mass_scale);
+        if let Some(stack) = self.stack.take() {
+            self.ride(*stack, time_s);
+            return;
+        }
         let cg_m = self.cg_m();
         if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
             self.move_near_ground(time_s);
@@ -149,6 +182,11 @@ impl World {
             Fault::FinStuck { fin } => {
                 if let Some(servo) = self.fins.get_mut(fin) {
                     servo.stick();
+                }
+            }
+            Fault::AscentNoLight | Fault::AscentWeak { .. } | Fault::SeparationFails => {
+                if let Some(stack) = &mut self.stack {
+                    stack.break_down(fault);
                 }
             }
             Fault::NoLight
@@ -176,6 +214,9 @@ impl World {
         }
         if actuators.parachute {
             self.parachute.eject(time_s);
+        }
+        if let Some(stack) = &mut self.stack {
+            stack.command(actuators.ignite_booster, actuators.separate, time_s);
         }
     }
 

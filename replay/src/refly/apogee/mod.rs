@@ -173,7 +173,7 @@ impl<'a> AtStart<'a> {
         options: &ReflyOptions,
     ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
         let Recorded { mut rerun, .. } = Recorded::of(self.recording)?;
-        let believed = state_to_log(rerun.flight.believed_at_apogee());
+        let believed = state_to_log(rerun.flight.believed_at_start());
         let start = flight_v1::PilotStart { believed, ..*self.pilot_start };
         let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
         let mut phase = rerun.flight.computer().mode().phase;

@@ -3,7 +3,7 @@
 use super::rms_and_max;
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, paragraph, table};
-use crate::report::track::{Flight, FromApogee};
+use crate::report::track::{Flight, InSpace};
 
 pub(super) fn html(flight: &Flight) -> String {
     let (Some(vehicle), Some(ignition_s)) = (&flight.vehicle, flight.ignition_s) else {
@@ -47,7 +47,7 @@ pub(super) fn html(flight: &Flight) -> String {
 }
 
 /// Impulse and burn time of a motor with a thrust curve.
-fn scales(from_apogee: &FromApogee) -> Vec<Vec<String>> {
+fn scales(from_apogee: &InSpace) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     if let Some((impulse, stretch)) = from_apogee.inferred_scales {
         rows.push(vec!["inferred impulse at the end, of certified".to_owned(), format!("{impulse:.4}")]);

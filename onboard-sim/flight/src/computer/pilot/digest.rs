@@ -10,6 +10,8 @@ remembers!(Pilot {
     known,
     estimator,
     estimate,
+    ascent,
+    apogee_m,
     ignited_at_s,
     outlook,
     powered,
@@ -26,6 +28,13 @@ remembers!(Pilot {
 // The mission, its motor and its masses come from the profile in the log; they do not change in flight.
 remembers!(Known { motor } but { mission, mass });
 
-remembers!(Outlook { ignition, commit_height_m, height_m, predicted_speed_m_s, touchdown_distance_m });
+remembers!(Outlook {
+    ignition,
+    commit_height_m,
+    height_m,
+    predicted_speed_m_s,
+    lands_ahead,
+    touchdown_distance_m
+});
 remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
 remembers!(Band { low_m, high_m });

@@ -79,7 +79,7 @@ impl Pilot {
             || found.predicted_touchdown_x_m > limits.fence_radius_m
             || found.height_disagreement_m > FAR_BEYOND * limits.height_disagreement_max_m
             || speed_error_m_s > FAR_BEYOND * limits.speed_error_max_fraction * found.predicted_speed_m_s
-            || self.outlook.ignition.band.is_none()
+            || !self.outlook.lands_ahead
     }
 }
 
@@ -119,7 +119,7 @@ mod tests {
     fn fall(wrong: Wrong) -> Ended {
         let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
         let start = RigidState::upright(250.0);
-        let mut pilot = Pilot::at_apogee(&mission, 0.0, &start, &StartUncertainty::at_apogee());
+        let mut pilot = Pilot::starting(&mission, 0.0, &start, &StartUncertainty::at_apogee());
         let (mut table, mut fins_rad) = (released(), [0.0; 4]);
         let ended = (1..1300).find_map(|frame| {
             let time_s = frame as f64 * 0.005;
@@ -132,6 +132,7 @@ mod tests {
                 fins_rad,
                 contact: false,
                 igniter_continuity: true,
+                booster_attached: false,
                 abort: false,
             };
             wrong(height_m, &mut estimate, &mut input);

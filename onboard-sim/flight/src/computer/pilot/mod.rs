@@ -4,6 +4,7 @@
 //! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the outlook and plans the
 //! landing.
 
+mod ascent;
 mod assumed;
 mod digest;
 mod fin_watch;
@@ -16,9 +17,12 @@ mod restart;
 mod sample;
 mod step;
 
+pub(super) use ascent::{AscentWatch, axial_m_s2};
 use fin_watch::FinWatch;
 use known::Known;
-pub use outlook::{Outlook, touchdown_m};
+pub use outlook::{ApogeeAhead, Outlook, apogee_ahead, touchdown_from_below_m, touchdown_m};
+
+use nalgebra::Vector3;
 
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
@@ -29,6 +33,7 @@ use crate::guidance::powered::{PoweredGuidance, PoweredReport};
 use crate::rules::phase::Phase;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::mission::Mission;
+use crate::vehicle::profile::StartPoint;
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
@@ -59,8 +64,19 @@ pub struct PilotInput {
     pub contact: bool,
     /// The igniter has continuity.
     pub igniter_continuity: bool,
+    /// The wire between booster and vehicle is whole.
+    pub booster_attached: bool,
     /// The operator asked for an abort.
     pub abort: bool,
+}
+
+/// The commands to the booster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BoosterCommands {
+    /// Current through the ascent motor's igniter.
+    pub ignite: bool,
+    /// Current through the charge that separates the booster.
+    pub separate: bool,
 }
 
 /// The commands of a frame.
@@ -74,6 +90,8 @@ pub struct PilotOutput {
     pub ignite: bool,
     /// The parachute is released.
     pub parachute: bool,
+    /// To the booster.
+    pub booster: BoosterCommands,
     /// The phase after the frame.
     pub phase: Phase,
     /// What decided where the nose points.
@@ -86,6 +104,9 @@ pub struct Pilot {
     known: Known,
     estimator: Estimator,
     estimate: Option<Estimate>,
+    ascent: AscentWatch,
+    /// Height at which the fall begins or began, m.
+    apogee_m: f64,
     ignited_at_s: Option<f64>,
     outlook: Outlook,
     powered: PoweredGuidance,
@@ -102,8 +123,8 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// A pilot released at apogee, with its estimate of its state and the uncertainty of that estimate.
-    pub fn at_apogee(
+    /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of that estimate.
+    pub fn starting(
         mission: &Mission,
         time_s: f64,
         believed: &RigidState,
@@ -114,6 +135,11 @@ impl Pilot {
         Self {
             estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
             estimate: None,
+            ascent: AscentWatch::default(),
+            apogee_m: match mission.start.at {
+                StartPoint::Drone => believed.position_m.z,
+                _ => mission.start.height_m,
+            },
             ignited_at_s: None,
             outlook: Outlook::default(),
             powered: PoweredGuidance::new(mission.powered),
@@ -133,6 +159,13 @@ impl Pilot {
         }
     }
 
+    /// This pilot on its rail, with attitude and gyro bias, body, rad/s, from there.
+    pub(super) fn standing(&self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        let config = &self.known.mission.estimator;
+        let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
+        Self { estimator: estimator.with_gyro_bias(gyro_bias_rad_s), ..self.clone() }
+    }
+
     /// Sets the law that flies the landing burn from now on.
     pub(crate) fn set_law(&mut self, law: Law) {
         self.baseline = match law {
@@ -149,6 +182,11 @@ impl Pilot {
     /// The estimator, to compare it with the truth.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
+    }
+
+    /// When the vehicle was felt to lift off, s.
+    pub fn lifted_off_s(&self) -> Option<f64> {
+        self.ascent.lifted_off_s()
     }
 
     /// The guidance of the landing burn, with the plan being flown.

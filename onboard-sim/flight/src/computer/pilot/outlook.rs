@@ -5,7 +5,8 @@ use nalgebra::{Vector2, Vector3};
 use super::Pilot;
 use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
-use crate::vehicle::atmosphere::Air;
+use crate::rules::phase::Phase;
+use crate::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 
 /// The commit height is the height that the parachute needs, times this.
 const COMMIT_MARGIN: f64 = 1.5;
@@ -23,6 +24,8 @@ pub struct Outlook {
     pub height_m: f64,
     /// Speed predicted for this moment from the fall alone, m/s.
     pub predicted_speed_m_s: f64,
+    /// The certified motor lands from here or from farther down.
+    pub lands_ahead: bool,
     /// Distance from the pad at which the vehicle would touch down without further steering, m.
     pub touchdown_distance_m: f64,
 }
@@ -47,7 +50,45 @@ pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m
     (place_m + velocity_m_s * to_ground_s).xy()
 }
 
+/// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40 m/s over g, and half as
+/// much again while it is slower.
+const TAKES_THE_WIND_S: f64 = 6.0;
+
+/// The apogee ahead of a coasting vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ApogeeAhead {
+    /// Its height, m.
+    pub height_m: f64,
+    /// Time until then, s.
+    pub in_s: f64,
+}
+
+/// The apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, while the air brakes it by so much,
+/// m/s^2: the drag falls with the square of the speed, so in the mean over the height half of it acts.
+pub fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAhead {
+    let slowing_m_s2 = STANDARD_GRAVITY_M_S2 + 0.5 * braking_m_s2.max(0.0);
+    let rising_m_s = vertical_m_s.max(0.0);
+    ApogeeAhead {
+        height_m: height_m + 0.5 * rising_m_s * rising_m_s / slowing_m_s2,
+        in_s: rising_m_s / slowing_m_s2,
+    }
+}
+
+/// Where a rising vehicle would touch down in still air without steering, m: it drifts to its apogee and until the air
+/// has stopped it.
+pub fn touchdown_from_below_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>) -> Vector2<f64> {
+    let in_s = apogee_ahead(place_m.z, velocity_m_s.z, 0.0).in_s;
+    (place_m + velocity_m_s * (in_s + TAKES_THE_WIND_S)).xy()
+}
+
 impl Pilot {
+    /// The apogee as it is expected on the way up; `None` under the ascent motor, and after apogee.
+    pub fn apogee_ahead(&self, phase: Phase) -> Option<ApogeeAhead> {
+        let estimate = self.estimate.as_ref().filter(|_| phase == Phase::Coast)?;
+        let braking_m_s2 = -estimate.specific_force_m_s2.x;
+        Some(apogee_ahead(estimate.state.position_m.z, estimate.state.velocity_m_s.z, braking_m_s2))
+    }
+
     /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, positive downwards;
     /// `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {

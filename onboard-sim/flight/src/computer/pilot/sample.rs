@@ -19,7 +19,7 @@ pub(super) fn released() -> PhaseTable {
 /// The pilot of mk2, upright at rest, 300 m up.
 pub(super) fn falling() -> Pilot {
     let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
-    Pilot::at_apogee(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
+    Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
 }
 
 /// The input of a frame with almost no specific force, turning at a rate.
@@ -36,6 +36,7 @@ pub(super) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
         fins_rad: [0.0; 4],
         contact: false,
         igniter_continuity: true,
+        booster_attached: false,
         abort: false,
     }
 }

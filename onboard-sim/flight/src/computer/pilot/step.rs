@@ -2,13 +2,14 @@
 
 use nalgebra::Vector3;
 
+use super::ascent::{AscentSeen, axial_m_s2, words_of_ascent};
 use super::known::Burning;
 use super::outlook::{commit_height_m, touchdown_m};
-use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
+use super::{BoosterCommands, FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
-use crate::estimation::estimator::{Estimate, VehicleNow};
+use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::guidance::controller::ControlLevel;
 use crate::guidance::descent::DescentSituation;
@@ -39,6 +40,19 @@ fn lies_across_the_air(estimate: &Estimate) -> bool {
     airspeed_m_s > AIR_TURNS_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
 }
 
+/// What the estimator may use before apogee. The booster's drag and masses are not those of the vehicle, so the air
+/// shows no wind. The barometer's ram error belongs to a flow from the nose, not from the tail, and its static ports lie
+/// in the booster's wake and in the charge's gas; the lidar looks into the booster.
+fn on_the_way_up(
+    measurements: &Measurements,
+    vehicle: &VehicleNow,
+    phase: Phase,
+) -> (Measurements, VehicleNow) {
+    let measurements = Measurements { pressure_altitude_m: None, lidar_range_m: None, ..*measurements };
+    let shaken = phase == Phase::Boost;
+    (measurements, VehicleNow { motor_burning: shaken, air_density_kg_m3: 0.0, ..*vehicle })
+}
+
 impl Pilot {
     /// One frame. Every event goes through the `table`.
     pub(crate) fn step(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
@@ -57,6 +71,7 @@ impl Pilot {
         if looking && table.mode().phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }
+        self.watch_the_ascent(table, input, &estimate);
         self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
         self.move_through_phases(table, input, &estimate);
         let mode = *table.mode();
@@ -87,6 +102,10 @@ impl Pilot {
             fins_rad: self.fins_rad,
             ignite: mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited,
             parachute: mode.phase == Phase::Chute,
+            booster: BoosterCommands {
+                ignite: mode.phase == Phase::Boost && self.ascent.lifted_off_s().is_none(),
+                separate: self.ascent.separates(),
+            },
             phase: mode.phase,
             level: match flying {
                 true if by_baseline.is_some() => ControlLevel::Stabiliser,
@@ -118,14 +137,20 @@ impl Pilot {
                     burning_s.is_some() || phase.in_landing_burn(),
                     self.known.mission.lidar_ahead_of_feet_m,
                 );
-                self.estimator.step(&measurements, &vehicle)
+                if phase.before_apogee() {
+                    let (measurements, vehicle) = on_the_way_up(&measurements, &vehicle, phase);
+                    self.estimator.step(&measurements, &vehicle)
+                } else {
+                    self.estimator.step(&measurements, &vehicle)
+                }
             }
         }
     }
 
-    /// Estimates motor and drag from the specific force along the axis; not on the ground or under the parachute.
+    /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
+    /// parachute.
     fn feel(&mut self, phase: Phase, input: &PilotInput, estimate: &Estimate, density_kg_m3: f64) {
-        if input.contact || phase == Phase::Chute {
+        if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
         let mass = self.known.mass_now(self.known.burning_s(input.time_s));
@@ -166,11 +191,19 @@ impl Pilot {
             vertical_m_s,
             fins_m2,
         );
+        let lands_ahead = ignition.band.is_some()
+            || self.known.mission.ignition.lands_ahead(
+                &column,
+                &self.known.mission.motor_curve,
+                height_m,
+                vertical_m_s,
+                fins_m2,
+            );
         let parachute = &self.known.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
         // The speed after the fall from apogee so far, with drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
-        let fallen_m = (self.known.mission.start.height_m - state.position_m.z).max(0.0);
+        let fallen_m = (self.apogee_m - state.position_m.z).max(0.0);
         let shed =
             libm::exp(-2.0 * self.known.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
         self.outlook = Outlook {
@@ -181,9 +214,40 @@ impl Pilot {
                 parachute.inflation_distance_m,
             ),
             height_m,
+            lands_ahead,
             predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
             touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
         };
+    }
+
+    /// Moves through the phases up to apogee.
+    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+        let phase = table.mode().phase;
+        let Some(launch) = self.known.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
+            return;
+        };
+        let pressure_altitude_m = match &input.sensed {
+            Sensed::Known(_) => None,
+            Sensed::Measured(measured) => measured.pressure_altitude_m,
+        };
+        let seen = AscentSeen {
+            time_s: input.time_s,
+            frame_s: self.known.mission.estimator.frame_s,
+            phase,
+            axial_specific_force_m_s2: axial_m_s2(&input.sensed),
+            pressure_altitude_m,
+            vertical_m_s: estimate.state.velocity_m_s.z,
+            booster_attached: input.booster_attached,
+            separate_before_apogee_s: launch.separate_before_apogee_s,
+        };
+        let Some(event) = self.ascent.look(&seen) else { return };
+        if let Event::Apogee { .. } = event {
+            self.apogee_m = estimate.state.position_m.z;
+        }
+        if let Some((severity, words)) = words_of_ascent(event, estimate) {
+            table.say(severity, words);
+        }
+        self.happen(table, event, input.time_s);
     }
 
     fn move_through_phases(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
@@ -378,9 +442,12 @@ impl Pilot {
         let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
             && !mode.interlocks.landing_motor_inhibited;
         if !(steering || burning) {
-            // On the ground they stay where they are: no servo needs to move there.
-            let keep = matches!(mode.phase, Phase::Touchdown | Phase::Safed);
-            return if keep { self.fins_rad } else { [fins.open_rad(); 4] };
+            return match mode.phase {
+                phase if phase.before_apogee() => [fins.closed_rad(); 4],
+                // On the ground they stay where they are: no servo needs to move there.
+                Phase::Touchdown | Phase::Safed => self.fins_rad,
+                _ => [fins.open_rad(); 4],
+            };
         }
         let largest_m2 = self.known.largest_fin_drag_area_m2();
         let situation = DescentSituation {

@@ -4,6 +4,8 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
+use crate::vehicle::profile::StartPoint;
+
 /// Standard gravity, m/s^2.
 pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
@@ -231,6 +233,14 @@ impl StartUncertainty {
             barometer_ram: 0.05,
             gnss_horizontal_offset_m: 0.1,
             gnss_vertical_offset_m: 0.1,
+        }
+    }
+
+    /// Where a flight begins. A vehicle below a drone has been carried up, with its estimator running.
+    pub fn at_start(start: StartPoint) -> Self {
+        match start {
+            StartPoint::Pad => Self::on_pad(),
+            StartPoint::Apogee | StartPoint::Drone | StartPoint::Ignition => Self::at_apogee(),
         }
     }
 

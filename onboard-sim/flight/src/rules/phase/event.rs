@@ -36,14 +36,26 @@ pub enum Event {
     /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the air sends
     /// [`Event::ReleasedAt`] instead.
     CountdownElapsed,
-    /// The countdown of a simulation that starts in the air ended, and the vehicle was released there.
+    /// The countdown is over, and the vehicle falls: a simulation that starts in the air let it go, or a drone did.
     ReleasedAt(StartPoint),
     /// The vehicle left the pad.
     LiftOff,
+    /// The ascent motor was commanded to light and the vehicle did not leave the pad in time.
+    NoLiftOff,
     /// The burning motor burnt out; the landing motor may do so on the ground.
     Burnout,
+    /// Apogee is near: separate the booster.
+    SeparationDue,
     /// Vertical speed changed sign.
-    Apogee,
+    Apogee {
+        /// The booster has not separated.
+        booster_attached: bool,
+    },
+    /// The drone let the vehicle go before it was cleared for it.
+    ReleasedEarly {
+        /// The parachute fills before the ground is reached.
+        parachute_fills: bool,
+    },
     /// All fins have reached their deployed angle.
     FinsConfirmed,
     /// The vehicle is close enough to the ground for the landing controller.
@@ -94,8 +106,11 @@ impl Event {
             Self::CountdownElapsed => "countdown elapsed",
             Self::ReleasedAt(_) => "release",
             Self::LiftOff => "lift-off",
+            Self::NoLiftOff => "no lift-off",
             Self::Burnout => "burn-out",
-            Self::Apogee => "apogee",
+            Self::SeparationDue => "separation",
+            Self::Apogee { .. } => "apogee",
+            Self::ReleasedEarly { .. } => "early release",
             Self::FinsConfirmed => "fins confirmed",
             Self::LandArm => "land arm",
             Self::IgnitionGate { .. } => "ignition gate",
@@ -134,11 +149,13 @@ pub enum Effect {
     RecordLoss = 9,
     /// The countdown was held: it is cancelled, but the vehicle is still armed.
     HoldCountdown = 10,
+    /// Fire the charge between booster and vehicle.
+    SeparateBooster = 11,
 }
 
 impl Effect {
     /// Every effect, in index order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::IgniteAscentMotor,
         Self::IgniteLandingMotor,
         Self::InhibitLandingMotor,
@@ -150,6 +167,7 @@ impl Effect {
         Self::ShowPadWait,
         Self::RecordLoss,
         Self::HoldCountdown,
+        Self::SeparateBooster,
     ];
 }
 

@@ -107,6 +107,11 @@ impl Phase {
         matches!(self, Self::Safe | Self::PadIdle | Self::PadArmed)
     }
 
+    /// On the pad or rising.
+    pub fn before_apogee(self) -> bool {
+        self.on_pad() || matches!(self, Self::Boost | Self::Coast)
+    }
+
     /// Falling without thrust, before ignition.
     pub fn in_descent(self) -> bool {
         matches!(self, Self::Deploy | Self::AeroDescent | Self::LandArmed)

@@ -134,23 +134,46 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
         }
+        // A drone's pilot lets go when he likes, but not before the countdown is over, and not while it is held.
+        (P::PadArmed, E::ReleasedAt(StartPoint::Drone)) if countdown_over(mode, time_s) => {
+            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
+        }
         (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::LandArmed, Effects::of(&[Effect::FinsOpen]))
         }
-        (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Ignition)) => {
-            Row::Refuse(Refusal::CountdownNotElapsed)
-        }
+        (
+            P::PadArmed,
+            E::CountdownElapsed
+            | E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone | StartPoint::Ignition),
+        ) => Row::Refuse(Refusal::CountdownNotElapsed),
         (_, E::CountdownElapsed) => wrong("end a countdown", "only PAD_ARMED counts down"),
         (_, E::ReleasedAt(StartPoint::Pad)) => wrong("release at the pad", "a pad start lifts off by itself"),
         (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),
+        // It falls, whatever the crew meant: without its motor, under the parachute if that still helps.
+        (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills }) => {
+            Row::Go(inhibited(mode), P::Chute, down_without_the_motor(parachute_fills))
+        }
+        (_, E::ReleasedEarly { .. }) => wrong("release early", "only a hanging vehicle is released"),
 
         // Ascent.
         // Also without a countdown: a rising vehicle must be controlled.
         (P::PadArmed, E::LiftOff) => {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Boost, Effects::NONE)
         }
+        // Nobody armed it, or its motor lit late after an abort: it rises, and comes down under the parachute.
+        (P::Safe | P::PadIdle, E::LiftOff) => {
+            Row::Go(inhibited(mode), P::Boost, Effects::of(&[Effect::InhibitLandingMotor]))
+        }
         (P::Boost, E::LiftOff) => go(phase),
-        (_, E::LiftOff) => wrong("lift off", "only PAD_ARMED and BOOST lift off"),
+        (_, E::LiftOff) => wrong("lift off", "only a vehicle on its pad and BOOST lift off"),
+        // The motor may still light: as after an abort on the pad.
+        (P::Boost, E::NoLiftOff) => {
+            let inhibited = inhibited(mode);
+            let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
+            let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
+            Row::Go(Mode { interlocks, ..inhibited }, P::PadIdle, Effects::of(&effects))
+        }
+        (_, E::NoLiftOff) => wrong("miss the lift-off", "only BOOST waits for it"),
         (P::Boost, E::Burnout) => go(P::Coast),
         // The landing motor burnt out, which happens once; the contact with the ground decides what follows.
         (P::Powered | P::Touchdown, E::Burnout) if mode.motor == Motor::Burning => {
@@ -158,9 +181,21 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         }
         (P::Powered, E::Burnout) => go(phase),
         (_, E::Burnout) => wrong("burn out", "only BOOST, POWERED and a motor still burning in TOUCHDOWN do"),
-        (P::Boost | P::Coast, E::Apogee) if locks.abort_latched => go_with(P::Chute, &[Effect::DeployChute]),
-        (P::Boost | P::Coast, E::Apogee) => go_with(P::Deploy, &[Effect::FinsOpen]),
-        (_, E::Apogee) => wrong("pass apogee", "only BOOST and COAST rise"),
+        (P::Boost | P::Coast, E::SeparationDue) => go_with(phase, &[Effect::SeparateBooster]),
+        (_, E::SeparationDue) => wrong("separate the booster", "only BOOST and COAST have one"),
+        (P::Boost | P::Coast, E::Apogee { .. }) if locks.abort_latched => {
+            go_with(P::Chute, &[Effect::DeployChute])
+        }
+        // A vehicle with its booster can neither steer nor land.
+        (P::Boost | P::Coast, E::Apogee { booster_attached: true }) => Row::Go(
+            inhibited(mode),
+            P::Chute,
+            Effects::of(&[Effect::InhibitLandingMotor, Effect::DeployChute]),
+        ),
+        (P::Boost | P::Coast, E::Apogee { booster_attached: false }) => {
+            go_with(P::Deploy, &[Effect::FinsOpen])
+        }
+        (_, E::Apogee { .. }) => wrong("pass apogee", "only BOOST and COAST rise"),
 
         // Descent.
         (P::Deploy, E::FinsConfirmed) => go(P::AeroDescent),
@@ -175,11 +210,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             may_light(locks, || go_with(P::Ignition, &[Effect::IgniteLandingMotor]))
         }
         (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
-        // Without the motor only the parachute brakes: too low to fill, it still takes off some of the speed.
         (P::Deploy | P::AeroDescent | P::LandArmed, E::GateShutForGood { parachute_fills }) => {
-            let effects = Effects::of(&TO_THE_PARACHUTE);
-            let effects = if parachute_fills { effects } else { effects.with(Effect::RecordLoss) };
-            Row::Go(inhibited(mode), P::Chute, effects)
+            Row::Go(inhibited(mode), P::Chute, down_without_the_motor(parachute_fills))
         }
         (_, E::GateShutForGood { .. }) => wrong("give up the ignition", "only a descent waits for it"),
 
@@ -223,6 +255,12 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
 
 /// What leads from a descent to the parachute.
 const TO_THE_PARACHUTE: [Effect; 3] = [Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute];
+
+/// Without the motor only the parachute brakes: too low to fill, it still takes off some of the speed.
+fn down_without_the_motor(parachute_fills: bool) -> Effects {
+    let effects = Effects::of(&TO_THE_PARACHUTE);
+    if parachute_fills { effects } else { effects.with(Effect::RecordLoss) }
+}
 
 /// The landing motor will not be lit any more.
 fn inhibited(mode: &Mode) -> Mode {

@@ -134,9 +134,37 @@ pub enum StartPoint {
     Pad,
     /// Released at apogee.
     Apogee,
+    /// Hanging below a drone, which lets it go.
+    Drone,
     /// Released at the instant of landing-motor ignition.
     Ignition,
 }
+
+impl StartPoint {
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pad => "pad",
+            Self::Apogee => "apogee",
+            Self::Drone => "drone",
+            Self::Ignition => "ignition",
+        }
+    }
+}
+
+impl core::str::FromStr for StartPoint {
+    type Err = UnknownStart;
+
+    fn from_str(name: &str) -> Result<Self, UnknownStart> {
+        let all = [Self::Pad, Self::Apogee, Self::Drone, Self::Ignition];
+        all.into_iter().find(|start| start.name() == name).ok_or(UnknownStart)
+    }
+}
+
+/// No flight begins there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("not a start: pad, apogee, drone or ignition is accepted")]
+pub struct UnknownStart;
 
 /// The state at the release, and the countdown before it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

@@ -19,6 +19,7 @@ fn actuators() -> impl Strategy<Value = Actuators> {
             fins_rad,
             ignite,
             parachute,
+            ..Actuators::NONE
         })
 }
 
@@ -70,7 +71,7 @@ proptest! {
         let mut rolled = initial;
         rolled.world_from_body *= half_roll;
         rolled.rate_rad_s = half_roll * initial.rate_rad_s;
-        let command = Actuators { gimbal_rad, fins_rad, ignite: true, parachute: false };
+        let command = Actuators { gimbal_rad, fins_rad, ignite: true, ..Actuators::NONE };
         // Half a roll moves fin 1 to the place of fin 3, and reverses both gimbal axes.
         let [one, two, three, four] = fins_rad;
         let rolled_command = Actuators {

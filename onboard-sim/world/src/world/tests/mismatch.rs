@@ -4,7 +4,7 @@ use super::*;
 use crate::wind::Wind;
 
 const LIT: Actuators =
-    Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: true, parachute: false };
+    Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: true, ..Actuators::NONE };
 
 /// Air force along the nose, N, at 30 m/s down with the fins open, without and with a burning motor.
 fn air_n(truth: &Truth, lit: bool) -> f64 {

@@ -5,13 +5,13 @@ use vehicles::motors;
 
 use super::*;
 
+mod ascent;
 mod invariants;
 mod landing;
 mod mismatch;
 mod planar;
 
-const OPEN: Actuators =
-    Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: false, parachute: false };
+const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ..Actuators::NONE };
 
 fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
     let airframe = vehicles::airframe::builtin(name).unwrap();

@@ -15,9 +15,11 @@ fn every_event() -> Vec<Event> {
         Event::ReleasedAt(StartPoint::Pad),
         Event::ReleasedAt(StartPoint::Apogee),
         Event::ReleasedAt(StartPoint::Ignition),
+        Event::ReleasedAt(StartPoint::Drone),
         Event::LiftOff,
+        Event::NoLiftOff,
         Event::Burnout,
-        Event::Apogee,
+        Event::SeparationDue,
         Event::FinsConfirmed,
         Event::LandArm,
         Event::ThrustConfirmed,
@@ -32,6 +34,8 @@ fn every_event() -> Vec<Event> {
         events.push(Event::IgnitionGate { open: flag });
         events.push(Event::Contact { thrust_below_weight: flag });
         events.push(Event::GateShutForGood { parachute_fills: flag });
+        events.push(Event::ReleasedEarly { parachute_fills: flag });
+        events.push(Event::Apogee { booster_attached: flag });
         for gate_open in flags {
             events.push(Event::AbortRequested { above_commit_height: flag, gate_open });
         }
@@ -65,8 +69,8 @@ const LATER_S: f64 = 10.0;
 /// The next phase and the effects of an event for a vehicle with everything in order; `None` is a refusal.
 fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
     use Effect::{
-        DeployChute, Disarm, FinsOpen, IgniteLandingMotor, InhibitLandingMotor, RecordLoss, ShowPadWait,
-        StartCountdown,
+        DeployChute, Disarm, FinsOpen, IgniteLandingMotor, InhibitLandingMotor, RecordLoss, SeparateBooster,
+        ShowPadWait, StartCountdown,
     };
     use Event as E;
     use Phase as P;
@@ -78,9 +82,21 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
         (P::PadIdle, E::ArmRequested { checks_passed: true }) => (P::PadArmed, &[]),
         (P::PadArmed, E::StartRequested { .. }) => (P::PadArmed, &[StartCountdown]),
         (P::PadArmed | P::Boost, E::LiftOff) => (P::Boost, &[]),
+        (P::Safe | P::PadIdle, E::LiftOff) => (P::Boost, &[InhibitLandingMotor]),
+        (P::Boost, E::NoLiftOff) => (P::PadIdle, &[InhibitLandingMotor, Disarm, ShowPadWait]),
+        (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills: true }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
+        }
+        (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills: false }) => {
+            (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute, RecordLoss])
+        }
+        (P::Boost | P::Coast, E::SeparationDue) => (phase, &[SeparateBooster]),
+        (P::Boost | P::Coast, E::Apogee { booster_attached: true }) => {
+            (P::Chute, &[InhibitLandingMotor, DeployChute])
+        }
         (P::Boost, E::Burnout) => (P::Coast, &[]),
         (P::Powered, E::Burnout) => (P::Powered, &[]),
-        (P::Boost | P::Coast, E::Apogee) => (P::Deploy, &[FinsOpen]),
+        (P::Boost | P::Coast, E::Apogee { booster_attached: false }) => (P::Deploy, &[FinsOpen]),
         (P::Deploy, E::FinsConfirmed) => (P::AeroDescent, &[]),
         (P::AeroDescent, E::LandArm) | (P::LandArmed, E::IgnitionGate { open: false }) => (P::LandArmed, &[]),
         (P::LandArmed, E::IgnitionGate { open: true }) => (P::Ignition, &[IgniteLandingMotor]),
@@ -189,7 +205,7 @@ fn a_pad_start_flies_the_whole_sequence() {
         Event::CountdownElapsed,
         Event::LiftOff,
         Event::Burnout,
-        Event::Apogee,
+        Event::Apogee { booster_attached: false },
         Event::FinsConfirmed,
         Event::LandArm,
         Event::IgnitionGate { open: false },
@@ -261,7 +277,7 @@ fn an_abort_while_rising_ends_under_the_parachute_at_apogee() {
     for phase in [Phase::Boost, Phase::Coast] {
         let aborted = transition(&in_order(phase), ABORT, 1.0).mode;
         assert!(aborted.interlocks.landing_motor_inhibited && aborted.interlocks.abort_latched);
-        let answer = transition(&aborted, Event::Apogee, 2.0);
+        let answer = transition(&aborted, Event::Apogee { booster_attached: false }, 2.0);
         assert_eq!(answer.mode.phase, Phase::Chute);
         assert!(answer.effects.contains(Effect::DeployChute));
     }
@@ -328,7 +344,7 @@ fn likely_event() -> impl Strategy<Value = Event> {
         Event::LandArm,
         Event::IgnitionGate { open: true },
         Event::LiftOff,
-        Event::Apogee,
+        Event::Apogee { booster_attached: false },
         Event::Hold { cause: HoldCause::UplinkSilent },
         Event::ThrustConfirmed,
         Event::Contact { thrust_below_weight: true },

@@ -1,0 +1,291 @@
+//! Detects lift-off, burn-out, the moment to separate the booster, and apogee, from what the sensors show.
+
+use alloc::format;
+use alloc::string::String;
+
+use super::Sensed;
+use crate::computer::memory::remembers;
+use crate::computer::news::Severity;
+use crate::estimation::estimator::Estimate;
+use crate::rules::phase::{Event, Phase};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+
+/// Specific force along the axis above which the vehicle is being pushed, m/s^2. At rest it is 9.8; the slowest lift-off
+/// that the rail guides well has 5 times the weight.
+const PUSHED_M_S2: f64 = 1.5 * STANDARD_GRAVITY_M_S2;
+/// Speed gained without a break that counts as lift-off, m/s. A knock of 20 g that lasts 10 ms gives 2 m/s.
+const LIFTED_OFF_M_S: f64 = 3.0;
+/// Longest time from the ignition command to lift-off, s. Igniters of ascent motors need up to 2 s.
+const LIFT_OFF_WITHIN_S: f64 = 3.0;
+/// How long the vehicle must brake before the motor counts as burnt out, s. Drag alone brakes at once; a dip of the thrust
+/// below the drag is shorter.
+const BRAKING_S: f64 = 0.1;
+/// Frames with a falling estimate that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
+const FALLING_FRAMES: u32 = 3;
+/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, whatever the estimate
+/// says. It is six times the noise of a barometer in its own exhaust or wake.
+const SUNK_M: f64 = 6.0;
+const SUNK_S: f64 = 0.2;
+/// After the separation charge the pressure in the vehicle is not that of the air, s: three times its time of 0.3 s.
+const CHARGE_LASTS_S: f64 = 1.0;
+
+/// What the watch sees of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AscentSeen {
+    pub(super) time_s: f64,
+    pub(super) frame_s: f64,
+    pub(super) phase: Phase,
+    /// Along the axis, as measured, m/s^2.
+    pub(super) axial_specific_force_m_s2: f64,
+    pub(super) pressure_altitude_m: Option<f64>,
+    /// As estimated, up, m/s.
+    pub(super) vertical_m_s: f64,
+    /// The wire between booster and vehicle is whole.
+    pub(super) booster_attached: bool,
+    pub(super) separate_before_apogee_s: f64,
+}
+
+/// The watch's memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::computer) struct AscentWatch {
+    gained_m_s: f64,
+    lifted_off_s: Option<f64>,
+    braking_s: f64,
+    separating_since_s: Option<f64>,
+    falling_frames: u32,
+    highest_m: f64,
+    sunk_s: f64,
+}
+
+remembers!(AscentWatch {
+    gained_m_s,
+    lifted_off_s,
+    braking_s,
+    separating_since_s,
+    falling_frames,
+    highest_m,
+    sunk_s
+});
+
+impl Default for AscentWatch {
+    fn default() -> Self {
+        Self {
+            gained_m_s: 0.0,
+            lifted_off_s: None,
+            braking_s: 0.0,
+            separating_since_s: None,
+            falling_frames: 0,
+            highest_m: f64::NEG_INFINITY,
+            sunk_s: 0.0,
+        }
+    }
+}
+
+impl AscentWatch {
+    /// When the vehicle lifted off, s.
+    pub(super) fn lifted_off_s(&self) -> Option<f64> {
+        self.lifted_off_s
+    }
+
+    /// The separation charge gets current.
+    pub(super) fn separates(&self) -> bool {
+        self.separating_since_s.is_some()
+    }
+
+    /// The event of this frame, if there is one.
+    pub(super) fn look(&mut self, seen: &AscentSeen) -> Option<Event> {
+        self.feel_the_pressure(seen);
+        if self.lifted_off_s.is_none() {
+            return self.wait_for_lift_off(seen);
+        }
+        match seen.phase {
+            Phase::Boost if self.has_burnt_out(seen) => Some(Event::Burnout),
+            Phase::Coast if self.separation_is_due(seen) => {
+                self.separating_since_s = Some(seen.time_s);
+                Some(Event::SeparationDue)
+            }
+            Phase::Boost | Phase::Coast if self.has_passed_apogee(seen) => {
+                Some(Event::Apogee { booster_attached: seen.booster_attached })
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the vehicle lifts off in this frame, in which it feels this along its axis, m/s^2.
+    pub(in crate::computer) fn feels_lift_off(&mut self, axial_m_s2: f64, frame_s: f64, time_s: f64) -> bool {
+        let gain_m_s = (axial_m_s2 - STANDARD_GRAVITY_M_S2) * frame_s;
+        self.gained_m_s = if axial_m_s2 > PUSHED_M_S2 { self.gained_m_s + gain_m_s } else { 0.0 };
+        let lifts_off = self.gained_m_s >= LIFTED_OFF_M_S;
+        if lifts_off {
+            self.lifted_off_s = Some(time_s);
+        }
+        lifts_off
+    }
+
+    fn wait_for_lift_off(&mut self, seen: &AscentSeen) -> Option<Event> {
+        if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s, seen.time_s) {
+            return Some(Event::LiftOff);
+        }
+        (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
+    }
+
+    fn has_burnt_out(&mut self, seen: &AscentSeen) -> bool {
+        let braking = seen.axial_specific_force_m_s2 < 0.0;
+        self.braking_s = if braking { self.braking_s + seen.frame_s } else { 0.0 };
+        self.braking_s >= BRAKING_S
+    }
+
+    fn separation_is_due(&self, seen: &AscentSeen) -> bool {
+        let to_apogee_s = seen.vertical_m_s / STANDARD_GRAVITY_M_S2;
+        self.separating_since_s.is_none() && to_apogee_s <= seen.separate_before_apogee_s
+    }
+
+    fn has_passed_apogee(&mut self, seen: &AscentSeen) -> bool {
+        self.falling_frames = if seen.vertical_m_s < 0.0 { self.falling_frames + 1 } else { 0 };
+        self.falling_frames >= FALLING_FRAMES || self.sunk_s >= SUNK_S
+    }
+
+    fn feel_the_pressure(&mut self, seen: &AscentSeen) {
+        let disturbed = self.separating_since_s.is_some_and(|since_s| seen.time_s - since_s < CHARGE_LASTS_S);
+        if let Some(altitude_m) = seen.pressure_altitude_m.filter(|_| !disturbed) {
+            self.highest_m = self.highest_m.max(altitude_m);
+        }
+        let sunk = seen.pressure_altitude_m.map(|altitude_m| altitude_m < self.highest_m - SUNK_M);
+        match sunk {
+            _ if disturbed => self.sunk_s = 0.0,
+            Some(false) => self.sunk_s = 0.0,
+            Some(true) => self.sunk_s += seen.frame_s,
+            // Samples come in some frames only; between them the last one counts.
+            None if self.sunk_s > 0.0 => self.sunk_s += seen.frame_s,
+            None => {}
+        }
+    }
+}
+
+/// What is felt along the axis, m/s^2.
+pub(in crate::computer) fn axial_m_s2(sensed: &Sensed) -> f64 {
+    match sensed {
+        Sensed::Known(estimate) => estimate.specific_force_m_s2.x,
+        Sensed::Measured(measured) => measured.imu.specific_force_m_s2.x,
+    }
+}
+
+/// What the crew is told of an event.
+pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Severity, String)> {
+    let state = &estimate.state;
+    let told = match event {
+        Event::LiftOff => (Severity::Notice, "LIFT-OFF".into()),
+        Event::NoLiftOff => (
+            Severity::Critical,
+            format!("no lift-off within {LIFT_OFF_WITHIN_S} s: the ascent motor may still light"),
+        ),
+        Event::Burnout => {
+            let words = format!(
+                "ascent motor burnt out at {:.0} m, {:.0} m/s",
+                state.position_m.z, state.velocity_m_s.z
+            );
+            (Severity::Notice, words)
+        }
+        Event::Apogee { booster_attached: true } => {
+            (Severity::Critical, "the booster has not separated: no landing, parachute".into())
+        }
+        Event::Apogee { booster_attached: false } => {
+            (Severity::Notice, format!("APOGEE at {:.0} m", state.position_m.z))
+        }
+        _ => return None,
+    };
+    Some(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(time_s: f64, phase: Phase, force_m_s2: f64, vertical_m_s: f64) -> AscentSeen {
+        AscentSeen {
+            time_s,
+            frame_s: 0.005,
+            phase,
+            axial_specific_force_m_s2: force_m_s2,
+            pressure_altitude_m: None,
+            vertical_m_s,
+            booster_attached: false,
+            separate_before_apogee_s: 2.0,
+        }
+    }
+
+    fn lifted_off() -> AscentWatch {
+        AscentWatch { lifted_off_s: Some(0.3), ..AscentWatch::default() }
+    }
+
+    #[test]
+    fn a_knock_is_no_lift_off_and_a_push_of_five_g_is_one_after_75_ms() {
+        let mut watch = AscentWatch::default();
+        for (frame, force_m_s2) in [200.0, 200.0, 9.8, 9.8].into_iter().enumerate() {
+            let event = watch.look(&seen(0.005 * frame as f64, Phase::Boost, force_m_s2, 0.0));
+            assert_eq!(event, None, "{frame}");
+        }
+        // 40 m/s^2 over the weight: 3 m/s after 75 ms.
+        let events: Vec<_> = (0..15)
+            .filter_map(|frame| watch.look(&seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 0.0)))
+            .collect();
+        assert_eq!(events, [Event::LiftOff]);
+    }
+
+    #[test]
+    fn without_a_push_there_is_no_lift_off_after_three_seconds() {
+        let mut watch = AscentWatch::default();
+        assert_eq!(watch.look(&seen(2.995, Phase::Boost, 9.81, 0.0)), None);
+        assert_eq!(watch.look(&seen(3.0, Phase::Boost, 9.81, 0.0)), Some(Event::NoLiftOff));
+        // Nobody waits for a lift-off after an abort, but it is still noticed.
+        assert_eq!(watch.look(&seen(9.0, Phase::PadIdle, 9.81, 0.0)), None);
+        let late = (0..15).filter_map(|_| watch.look(&seen(9.1, Phase::PadIdle, 49.81, 0.0)));
+        assert_eq!(late.collect::<Vec<_>>(), [Event::LiftOff]);
+    }
+
+    #[test]
+    fn a_dip_of_the_thrust_is_no_burn_out() {
+        let mut watch = lifted_off();
+        for frame in 0..100 {
+            // 50 ms below the drag, then thrust again.
+            let force_m_s2 = if frame % 20 < 10 { -5.0 } else { 30.0 };
+            assert_eq!(watch.look(&seen(0.5, Phase::Boost, force_m_s2, 40.0)), None, "{frame}");
+        }
+        let out = (0..20).filter_map(|_| watch.look(&seen(0.5, Phase::Boost, -5.0, 40.0)));
+        assert_eq!(out.collect::<Vec<_>>(), [Event::Burnout]);
+    }
+
+    #[test]
+    fn the_booster_is_separated_once_and_apogee_says_whether_it_went() {
+        let mut watch = lifted_off();
+        assert_eq!(watch.look(&seen(5.0, Phase::Coast, -2.0, 20.0)), None);
+        assert_eq!(watch.look(&seen(5.1, Phase::Coast, -2.0, 19.6)), Some(Event::SeparationDue));
+        assert!(watch.separates());
+        assert_eq!(watch.look(&seen(5.2, Phase::Coast, -2.0, 18.6)), None);
+        let stuck = AscentSeen { booster_attached: true, ..seen(7.2, Phase::Coast, 0.0, -0.01) };
+        let events: Vec<_> = (0..3).filter_map(|_| watch.look(&stuck)).collect();
+        assert_eq!(events, [Event::Apogee { booster_attached: true }]);
+    }
+
+    /// The ejection charge raises the pressure: the barometer shows a fall that is none.
+    #[test]
+    fn the_charges_pressure_is_no_apogee_and_a_lasting_one_is() {
+        let mut watch = lifted_off();
+        let at = |time_s: f64, altitude_m: f64| AscentSeen {
+            pressure_altitude_m: Some(altitude_m),
+            ..seen(time_s, Phase::Coast, -2.0, 15.0)
+        };
+        assert_eq!(watch.look(&at(5.0, 280.0)), Some(Event::SeparationDue));
+        for frame in 0..190 {
+            let time_s = 5.005 + 0.005 * f64::from(frame);
+            assert_eq!(watch.look(&at(time_s, 240.0)), None, "{time_s}");
+        }
+        // A stuck estimate, and a barometer that has sunk for 0.2 s.
+        let events: Vec<_> = (0..45)
+            .filter_map(|frame| {
+                watch.look(&at(7.0 + 0.005 * f64::from(frame), 273.0)).map(|event| (frame, event))
+            })
+            .collect();
+        assert_eq!(events.first(), Some(&(39, Event::Apogee { booster_attached: false })));
+    }
+}

@@ -1,0 +1,72 @@
+//! A start below a drone, as data.
+
+use serde::Deserialize;
+
+use super::airframe::BadValue;
+
+/// Below this height a hanging vehicle is never armed, m: a motor that is lit there has no room to brake a fall, and
+/// people may stand under it.
+pub const LOWEST_ARMED_M: f64 = 10.0;
+
+/// A vehicle that hangs tail-down below a drone, until the drone lets it go.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drop {
+    /// Height of the centre of gravity above the ground, m.
+    pub height_m: f64,
+    /// Fastest drift of the drone, in any direction, m/s.
+    pub drift_m_s: f64,
+    /// Length of the rope from the drone to the nose, m.
+    pub rope_m: f64,
+    /// Largest angle of the swing, degrees.
+    pub swing_deg: f64,
+    /// Time from the end of the countdown until the drone's pilot lets go, s.
+    pub release_after_s: f64,
+    /// What arming allows a hanging vehicle, in the mean over a second: tilt, degrees, rotation rate, degrees per second, and
+    /// speed, m/s. On a pad it has to stand still.
+    #[serde(default = "tilt_max_deg")]
+    pub tilt_max_deg: f64,
+    #[serde(default = "rotation_max_deg_s")]
+    pub rotation_max_deg_s: f64,
+    #[serde(default = "speed_max_m_s")]
+    pub speed_max_m_s: f64,
+}
+
+/// Half of what the ignition gate allows.
+fn tilt_max_deg() -> f64 {
+    10.0
+}
+
+/// A swing of 8 degrees on 2.3 m of rope and vehicle turns at 17 degrees per second.
+fn rotation_max_deg_s() -> f64 {
+    30.0
+}
+
+/// A drone that drifts at 2 m/s, and the swing's 0.7 m/s.
+fn speed_max_m_s() -> f64 {
+    3.0
+}
+
+impl Drop {
+    /// Checks that every value is inside its range.
+    ///
+    /// # Errors
+    /// [`BadValue`] names the first key with a wrong value.
+    pub fn validate(&self) -> Result<(), BadValue> {
+        for (key, found, range, required) in [
+            ("drop.height_m", self.height_m, LOWEST_ARMED_M..=150.0, "10 to 150"),
+            ("drop.drift_m_s", self.drift_m_s, 0.0..=5.0, "0 to 5"),
+            ("drop.rope_m", self.rope_m, 0.05..=10.0, "0.05 to 10"),
+            ("drop.swing_deg", self.swing_deg, 0.0..=30.0, "0 to 30"),
+            ("drop.tilt_max_deg", self.tilt_max_deg, 0.0..=45.0, "0 to 45"),
+            ("drop.rotation_max_deg_s", self.rotation_max_deg_s, 0.0..=360.0, "0 to 360"),
+            ("drop.speed_max_m_s", self.speed_max_m_s, 0.0..=10.0, "0 to 10"),
+            ("drop.release_after_s", self.release_after_s, 0.0..=60.0, "0 to 60"),
+        ] {
+            if !range.contains(&found) {
+                return Err(BadValue { key, found, required });
+            }
+        }
+        Ok(())
+    }
+}

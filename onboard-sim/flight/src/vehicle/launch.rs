@@ -1,0 +1,173 @@
+//! The ascent as data: the rail on the pad, and the booster stage that carries the vehicle up.
+//!
+//! Stations are heights above the landing vehicle's nozzle exit, towards the nose positive. The booster sits below it, so
+//! its stations are negative.
+
+use alloc::string::String;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+use super::airframe::BadValue;
+use super::rigid::{RigidState, upright};
+use super::thrust_curve::ThrustCurve;
+
+/// A launch from a rail.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Launch {
+    pub rail: Rail,
+    /// Time before the expected apogee at which the booster is separated, s. A stack that is still fast points along its
+    /// path; close to apogee it would follow the path over the top.
+    pub separate_before_apogee_s: f64,
+    pub booster: Booster,
+}
+
+/// The rail.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rail {
+    /// Travel until nothing guides the stack any more, m.
+    pub length_m: f64,
+    /// Angle from the vertical, degrees.
+    pub tilt_deg: f64,
+    /// Direction of the tilt in the world, from x towards y, degrees.
+    pub towards_deg: f64,
+}
+
+/// The booster stage, and the air on the whole stack. Coefficients are on the reference area of the vehicle's body.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Booster {
+    /// Name of a built-in motor, or the text of its `.eng` or `.rse` file.
+    pub motor: String,
+    /// The certified thrust curve of that motor. The reader of the mission looks it up.
+    #[serde(skip, default = "ThrustCurve::none")]
+    pub motor_curve: ThrustCurve,
+    /// From its lower end, which is its nozzle, to the landing vehicle's nozzle exit, m.
+    pub length_m: f64,
+    /// Mass with the empty motor case, kg.
+    pub dry_kg: f64,
+    /// Centre of gravity of that mass, m.
+    pub cg_station_m: f64,
+    /// Moment of inertia of that mass about a cross axis through its centre of gravity, kg m^2.
+    pub pitch_inertia_kg_m2: f64,
+    pub roll_inertia_kg_m2: f64,
+    /// Middle of the propellant, m.
+    pub propellant_station_m: f64,
+    /// Axial drag coefficient of the whole stack, nose first.
+    pub stack_drag_coefficient: f64,
+    /// Of the nose.
+    pub nose: NormalForce,
+    /// Of the booster's fins.
+    pub fins: NormalForce,
+    /// Distance from the axis at which the force on a fin acts, m.
+    pub fin_radius_m: f64,
+    /// Momentum that the separation charge gives the vehicle, N s.
+    pub separation_impulse_n_s: f64,
+}
+
+/// A force across the axis in proportion to the angle of attack.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NormalForce {
+    /// Slope of the coefficient, 1/rad.
+    pub slope_per_rad: f64,
+    /// Where the force acts, m.
+    pub station_m: f64,
+}
+
+impl Booster {
+    /// Distance from the stack's lower end up to a station, m.
+    pub fn above_lower_end_m(&self, station_m: f64) -> f64 {
+        station_m + self.length_m
+    }
+}
+
+impl Launch {
+    /// The vehicle on the rail, at rest: its centre of gravity at a station, m, above the pad at the origin.
+    pub fn standing(&self, cg_station_m: f64) -> RigidState {
+        let (sin, cos) = libm::sincos(self.rail.towards_deg.to_radians());
+        let axis = Vector3::new(-sin, cos, 0.0) * self.rail.tilt_deg.to_radians();
+        let world_from_body = UnitQuaternion::from_scaled_axis(axis) * upright();
+        RigidState {
+            position_m: world_from_body * Vector3::x() * self.booster.above_lower_end_m(cg_station_m),
+            world_from_body,
+            ..RigidState::upright(0.0)
+        }
+    }
+
+    /// Checks that every value is inside its range.
+    ///
+    /// # Errors
+    /// [`BadValue`] names the first key with a wrong value.
+    pub fn validate(&self) -> Result<(), BadValue> {
+        let (rail, booster) = (&self.rail, &self.booster);
+        let within = |key, found: f64, range: core::ops::RangeInclusive<f64>, required| {
+            if range.contains(&found) { Ok(()) } else { Err(BadValue { key, found, required }) }
+        };
+        within("launch.rail.length_m", rail.length_m, 0.5..=10.0, "0.5 to 10")?;
+        // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
+        within("launch.rail.tilt_deg", rail.tilt_deg, 0.0..=30.0, "0 to 30")?;
+        within("launch.rail.towards_deg", rail.towards_deg, -360.0..=360.0, "-360 to 360")?;
+        within("launch.separate_before_apogee_s", self.separate_before_apogee_s, 0.0..=10.0, "0 to 10")?;
+        within("launch.booster.length_m", booster.length_m, 0.05..=3.0, "0.05 to 3")?;
+        within("launch.booster.dry_kg", booster.dry_kg, 0.01..=20.0, "0.01 to 20")?;
+        for (key, found) in [
+            ("launch.booster.cg_station_m", booster.cg_station_m),
+            ("launch.booster.propellant_station_m", booster.propellant_station_m),
+            ("launch.booster.fins.station_m", booster.fins.station_m),
+        ] {
+            within(
+                key,
+                found,
+                -booster.length_m..=0.0,
+                "between launch.booster.length_m below the vehicle and 0",
+            )?;
+        }
+        for (key, found) in [
+            ("launch.booster.pitch_inertia_kg_m2", booster.pitch_inertia_kg_m2),
+            ("launch.booster.roll_inertia_kg_m2", booster.roll_inertia_kg_m2),
+        ] {
+            within(key, found, 1e-6..=10.0, "above 0 to 10")?;
+        }
+        within("launch.booster.nose.station_m", booster.nose.station_m, 0.0..=3.0, "0 to 3")?;
+        for (key, found) in [
+            ("launch.booster.stack_drag_coefficient", booster.stack_drag_coefficient),
+            ("launch.booster.nose.slope_per_rad", booster.nose.slope_per_rad),
+            ("launch.booster.fins.slope_per_rad", booster.fins.slope_per_rad),
+        ] {
+            within(key, found, 0.0..=100.0, "0 to 100")?;
+        }
+        within("launch.booster.fin_radius_m", booster.fin_radius_m, 0.001..=1.0, "0.001 to 1")?;
+        within("launch.booster.separation_impulse_n_s", booster.separation_impulse_n_s, 0.0..=20.0, "0 to 20")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_hand_the_rail_leans_where_it_says() {
+        let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let mut launch = mission.launch.unwrap();
+        (launch.rail.tilt_deg, launch.rail.towards_deg) = (30.0, 90.0);
+        launch.booster.length_m = 0.6;
+        let standing = launch.standing(0.4);
+        // A metre above the lower end, 30 degrees from the vertical towards y.
+        assert!((standing.position_m - Vector3::new(0.0, 0.5, 0.866_025_403_784)).norm() < 1e-9);
+        assert!((standing.nose_in_world() - standing.position_m).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_bad_value_is_named_in_the_error() {
+        let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let mut launch = mission.launch.unwrap();
+        assert_eq!(launch.validate(), Ok(()));
+        launch.booster.fins.station_m = 0.1;
+        let error = launch.validate().unwrap_err().to_string();
+        let expected = "launch.booster.fins.station_m is 0.1; between launch.booster.length_m below the vehicle and 0 is accepted";
+        assert_eq!(error, expected);
+    }
+}

@@ -1,0 +1,232 @@
+//! The rocket from its rail, and from below a drone.
+
+use super::space::flight_of;
+use super::*;
+use flight::computer::AbortEffect;
+use flight::vehicle::profile::StartPoint;
+use world::RestOutcome;
+
+fn from(start: StartPoint, dispersion: &str, faults: &[&str]) -> Told {
+    let mut flight = flight_of(dispersion, faults);
+    flight.recipe = flight.recipe.starting_at(start).unwrap();
+    Told::of(Vehicle::in_space(&flight).unwrap())
+}
+
+fn sortie(rocket: &Vehicle) -> &Sortie {
+    let Flight::Space(space) = &rocket.flight else { panic!("in space") };
+    &space.sortie
+}
+
+/// Started as far as it takes, and then flown to the end.
+fn flown(rocket: Told) -> (Told, Vec<VehicleEvent>) {
+    let mut rocket = rocket.run_to(Phase::PadArmed);
+    rocket.request(Asked::Start);
+    let events = rocket.run_until(Vehicle::is_over);
+    (rocket, events)
+}
+
+#[test]
+fn from_the_pad_it_passes_every_phase_and_lands() {
+    for dispersion in ["none", "field"] {
+        let (rocket, events) = flown(from(StartPoint::Pad, dispersion, &[]));
+        let expected = [
+            Phase::PadArmed,
+            Phase::Boost,
+            Phase::Coast,
+            Phase::Deploy,
+            Phase::AeroDescent,
+            Phase::LandArmed,
+            Phase::Ignition,
+            Phase::Powered,
+            Phase::Touchdown,
+        ];
+        assert_eq!(phases(&events), expected);
+        for words in [
+            "ascent motor commanded to light",
+            "LIFT-OFF",
+            "burnt out at",
+            "booster commanded to separate",
+            "APOGEE at",
+        ] {
+            assert!(said(&events, words), "{words}: {events:?}");
+        }
+        assert!(!said(&events, "no ascent is flown"));
+        assert!(rocket.judged().unwrap().landed, "{dispersion}");
+        let fell_from_m = sortie(&rocket).fell_from().position_m.z;
+        assert!((270.0..335.0).contains(&fell_from_m), "{fell_from_m}");
+    }
+}
+
+/// What the station shows on the way up: booster and apogee, and the clock since lift-off.
+#[test]
+fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
+    let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(Phase::Boost);
+    let ascent = |rocket: &Vehicle| rocket.snapshot().descent.unwrap().ascent.unwrap();
+    rocket.run_until(|rocket| rocket.snapshot().descent.is_some());
+    assert_eq!((ascent(&rocket).booster, ascent(&rocket).apogee), (Booster::Attached, None));
+    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
+    rocket.run_until(|rocket| rocket.phase() == Phase::Coast);
+    let told = ascent(&rocket).apogee.unwrap();
+    let began_s = rocket.snapshot().since_zero_s.unwrap();
+    rocket.run_until(|rocket| ascent(rocket).booster == Booster::Separated);
+    rocket.run_until(|rocket| rocket.phase() == Phase::Deploy);
+    let reached_m = sortie(&rocket).world().state().position_m.z;
+    assert!((told.height_m - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
+    let took_s = rocket.snapshot().since_zero_s.unwrap() - began_s;
+    assert!((told.in_s - took_s).abs() < 0.05 * took_s, "{told:?}, {took_s}");
+    rocket.advance();
+    assert!(ascent(&rocket).over && ascent(&rocket).apogee.is_none());
+}
+
+#[test]
+fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
+    for phase in [Phase::Boost, Phase::Coast] {
+        let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(phase);
+        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+        let events = rocket.run_until(Vehicle::is_over);
+        assert_eq!(phases(&events).last(), Some(&Phase::Touchdown));
+        assert!(phases(&events).contains(&Phase::Chute) && !phases(&events).contains(&Phase::Ignition));
+        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        assert!(impact_m_s.abs() < 10.0, "{impact_m_s}");
+    }
+}
+
+#[test]
+fn an_ascent_motor_that_does_not_light_leaves_an_aborted_vehicle_on_its_pad() {
+    let (rocket, events) = flown(from(StartPoint::Pad, "field", &["ascent-no-light@0"]));
+    assert_eq!(phases(&events), [Phase::PadArmed, Phase::Boost, Phase::PadIdle]);
+    assert!(said(&events, "no lift-off within 3 s") && said(&events, "keep away for 60 s"));
+    let after = rocket.snapshot();
+    assert!(
+        after.interlocks.abort_latched && after.interlocks.landing_motor_inhibited && !after.interlocks.armed
+    );
+    assert!(sortie(&rocket).world().booster_attached());
+}
+
+/// A vehicle with its booster can neither steer nor land: no burn, parachute at apogee.
+#[test]
+fn a_booster_that_does_not_separate_inhibits_the_motor_and_opens_the_parachute() {
+    let (rocket, events) = flown(from(StartPoint::Pad, "field", &["separation-fails@0"]));
+    assert_eq!(
+        phases(&events),
+        [Phase::PadArmed, Phase::Boost, Phase::Coast, Phase::Chute, Phase::Touchdown]
+    );
+    assert!(said(&events, "the booster has not separated"));
+    assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+    let world = sortie(&rocket).world();
+    assert!(world.booster_attached() && world.thrust_begins_s().is_none());
+    let impact_m_s = world.touchdown().unwrap().vertical_m_s;
+    assert!(impact_m_s > -10.0, "{impact_m_s}");
+    assert_eq!(world.rest().unwrap().outcome, RestOutcome::BodyStrike);
+}
+
+/// Early and late detections: what the sensors do wrong on the way up must not light the motor early, nor lose the apogee.
+#[test]
+fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
+    for fault in [
+        "gnss-out@0",
+        "barometer-out@0",
+        "reboot:0.5@boost+0.3",
+        "reboot:1@coast+2",
+        "accelerometer-bias:200@coast+1",
+        "accelerometer-bias:-200@coast+1",
+        "ascent-weak:0.7@0",
+        "ascent-weak:0.5@0",
+    ] {
+        let (rocket, events) = flown(from(StartPoint::Pad, "field", &[fault]));
+        let seen = phases(&events);
+        let rose = seen.iter().position(|phase| *phase == Phase::Coast).expect("it coasted");
+        assert!(
+            seen[rose + 1..].iter().any(|phase| matches!(phase, Phase::Deploy | Phase::Chute)),
+            "{fault}: {seen:?}"
+        );
+        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
+        assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
+        // Apogee was felt within half a second of the true one.
+        let fall_m_s = sortie(&rocket).fell_from().velocity_m_s.z;
+        assert!(fall_m_s.abs() < 5.0, "{fault}: {fall_m_s}");
+    }
+}
+
+#[test]
+fn below_a_drone_it_swings_is_armed_and_falls_when_it_is_let_go() {
+    let (rocket, events) = flown(from(StartPoint::Drone, "none", &[]));
+    assert_eq!(
+        phases(&events),
+        [
+            Phase::PadArmed,
+            Phase::Deploy,
+            Phase::AeroDescent,
+            Phase::LandArmed,
+            Phase::Ignition,
+            Phase::Powered,
+            Phase::Touchdown
+        ]
+    );
+    assert!(rocket.judged().unwrap().landed);
+}
+
+#[test]
+fn hanging_it_is_not_armed_too_low() {
+    let mut flight = flight_of("none", &[]);
+    flight.recipe = flight.recipe.starting_at(StartPoint::Drone).unwrap();
+    flight.recipe.mission.drop.as_mut().unwrap().height_m = 9.0;
+    let mut rocket = Told::of(Vehicle::in_space(&flight).unwrap());
+    rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle && rocket.time_s() > 5.0);
+    let checks = rocket.arming_checks();
+    let height = checks.iter().find(|check| check.name == "height below the drone").unwrap();
+    assert!(!height.passed && height.required == "at least 10 m", "{height:?}");
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::NotNow);
+}
+
+/// Every release that nobody cleared: disarmed, armed, counting down, held.
+#[test]
+fn released_before_it_was_cleared_it_inhibits_the_motor_and_opens_the_parachute() {
+    let ways: [(Phase, &[Asked]); 4] = [
+        (Phase::PadIdle, &[]),
+        (Phase::PadArmed, &[]),
+        (Phase::PadArmed, &[Asked::Start]),
+        (Phase::PadArmed, &[Asked::Start, Asked::Hold]),
+    ];
+    for (phase, asked) in ways {
+        let mut rocket = from(StartPoint::Drone, "field", &[]).run_to(phase);
+        for asked in asked {
+            assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
+        }
+        rocket.advance();
+        let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
+        space.sortie.world_mut().let_go();
+        let events = rocket.run_until(Vehicle::is_over);
+        assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown], "{asked:?}");
+        assert!(said(&events, "RELEASED before it was cleared"));
+        assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
+    }
+}
+
+#[test]
+fn an_abort_while_it_hangs_inhibits_the_motor_and_stays_on_the_drone() {
+    let mut rocket = from(StartPoint::Drone, "field", &[]).run_to(Phase::PadArmed);
+    rocket.request(Asked::Start);
+    assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+    for _ in 0..2_000 {
+        rocket.advance();
+    }
+    assert_eq!(rocket.phase(), Phase::PadIdle);
+    assert!(sortie(&rocket).world().hangs() && rocket.snapshot().interlocks.landing_motor_inhibited);
+}
+
+/// A held countdown does not let a drone's pilot clear the release: nothing falls by itself.
+#[test]
+fn a_hold_while_it_hangs_keeps_it_hanging() {
+    let mut rocket = from(StartPoint::Drone, "field", &[]).run_to(Phase::PadArmed);
+    rocket.request(Asked::Start);
+    rocket.request(Asked::Hold);
+    for _ in 0..3_000 {
+        rocket.advance();
+    }
+    assert_eq!(rocket.phase(), Phase::PadArmed);
+    assert!(sortie(&rocket).world().hangs());
+}
