@@ -30,7 +30,7 @@ pub(crate) struct MotorsArguments {
     #[arg(long, default_value_t = 5, value_name = "N")]
     best: usize,
     /// Flights of each of them.
-    #[arg(long, default_value_t = 120, value_name = "N")]
+    #[arg(long, default_value_t = 60, value_name = "N")]
     flights: u64,
     /// List every motor that cannot be landed on, with its reason.
     #[arg(long)]

@@ -146,7 +146,8 @@ impl Card {
 
 /// What a controller that knows everything could do with the certified vehicle and motor in still air.
 pub(crate) fn certified_window(mission: &Mission) -> Option<Clairvoyant> {
-    attainable::window(mission, &draw(mission, &Dispersion::default(), 0, 0))
+    let drawn = draw(mission, &Dispersion::default(), 0, 0);
+    attainable::window(mission, &drawn, &drawn.apogee)
 }
 
 impl Order<'_> {
