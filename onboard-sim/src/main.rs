@@ -37,8 +37,17 @@ enum Command {
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     Campaign(cli::campaign::CampaignArguments),
     /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
+    ///
+    /// Each motor gets the ballast and the height of the start with which one ignition height suits the largest scatter of
+    /// impulse, burn time and ignition delay; `scatter` is that as a multiple of what the mission plans for (1 and more is
+    /// good). The best ones are then flown.
+    #[command(after_help = cli::motors::EXAMPLE)]
     Motors(cli::motors::MotorsArguments),
     /// Write the page that a team takes to the field, and the mission to load; refused for what cannot land.
+    ///
+    /// The folder gets card.html and card.txt (the same page), mission.toml (for fly, campaign and the vehicle) and day.toml
+    /// (the set of dispersions with the wind of the day).
+    #[command(after_help = cli::card::EXAMPLE)]
     Card(cli::card::CardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {

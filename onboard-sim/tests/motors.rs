@@ -84,7 +84,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
     assert!(refused(&["motors", "--ballast", "1"]).contains("`1` is not FROM:TO"));
     assert!(refused(&["motors", "--tube", "90"]).contains("--tube 90: must be above 0 and up to 74 mm"));
     assert!(refused(&["card", "--wind", "40"]).contains("--wind 40: must be 0 to 27 m/s"));
-    assert!(refused(&["card", "--mass", "-1"]).contains("--mass -1: a mass in kg above 0"));
+    assert!(refused(&["card", "--mass", "0"]).contains("--mass 0: a mass in kg above 0"));
     assert!(refused(&["card", "--motor", "Z9"]).contains("--motor Z9: neither a motor file nor one of the "));
     let none = refused(&["motors", "--mission", "mini-f10", "--tube", "10"]);
     assert!(none.contains("mini-f10 lands on none of these motors"), "{none}");

@@ -24,14 +24,11 @@ const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "day.toml"];
 /// Most flights of a card.
 const FLIGHTS_MAX: u64 = 10_000;
 
-/// Write the page that a team takes to the field, and the mission to load; refused for what cannot land.
-///
-/// The folder gets card.html and card.txt (the same page), mission.toml (for fly, campaign and the vehicle) and day.toml (the
-/// set of dispersions with the wind of the day).
-///
-/// Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --wind 3 --out card
+/// For the help.
+pub(crate) const EXAMPLE: &str =
+    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --wind 3 --out card";
+
 #[derive(Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct CardArguments {
     #[command(flatten)]
     choices: Choices,

@@ -14,15 +14,11 @@ use super::output::{refuse_loss, write_file};
 /// Most flights of a motor.
 const FLIGHTS_MAX: u64 = 100_000;
 
-/// Rank motors by how well a mission's airframe lands on them.
-///
-/// Each motor gets the ballast and the height of the start with which one ignition height suits the largest scatter of
-/// impulse, burn time and ignition delay; `scatter` is that as a multiple of what the mission plans for (1 and more is
-/// good). The best ones are then flown.
-///
-/// Example: onboard-sim motors --mission mini-f10 --from node_modules/thrustcurve-db/thrustcurve-db.json --csv motors.csv
+/// For the help.
+pub(crate) const EXAMPLE: &str = "Example: onboard-sim motors --mission mini-f10 --from \
+    node_modules/thrustcurve-db/thrustcurve-db.json --csv motors.csv";
+
 #[derive(Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct MotorsArguments {
     #[command(flatten)]
     choices: Choices,
