@@ -2,13 +2,13 @@
 
 mod cli;
 
-use std::fs::File;
-use std::io::{BufWriter, IsTerminal as _, Write as _};
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand};
+use cli::output::{refuse_loss, write_file};
 use onboard_sim::fly::{builtins, load_flight, load_planar};
 use onboard_sim::landability::{self, Axis};
 use onboard_sim::paper;
@@ -36,6 +36,19 @@ enum Command {
     Landability(LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     Campaign(cli::campaign::CampaignArguments),
+    /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
+    ///
+    /// Each motor gets the ballast and the height of the start with which one ignition height suits the largest scatter of
+    /// impulse, burn time and ignition delay; `scatter` is that as a multiple of what the mission plans for (1 and more is
+    /// good). The best ones are then flown.
+    #[command(after_help = cli::motors::EXAMPLE)]
+    Motors(cli::motors::MotorsArguments),
+    /// Write the page that a team takes to the field, and the mission to load; refused for what cannot land.
+    ///
+    /// The folder gets card.html and card.txt (the same page), mission.toml (for fly, campaign and the vehicle) and day.toml
+    /// (the set of dispersions with the wind of the day).
+    #[command(after_help = cli::card::EXAMPLE)]
+    Card(cli::card::CardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper {
         /// As JSON.
@@ -102,6 +115,8 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
         Command::Landability(arguments) => map_landability(&arguments),
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
+        Command::Motors(arguments) => cli::motors::run(&arguments),
+        Command::Card(arguments) => cli::card::run(&arguments),
         Command::Paper { json } => repeat_paper(json),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
@@ -154,36 +169,6 @@ fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode>
         write_file(path, arguments.force, |out| landability::write_svg(&map, &profile.name, out))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// An existing file is replaced only on request; a pipe or a device has no content that could be lost.
-fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
-    let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
-    let is_device = std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir());
-    anyhow::ensure!(force || is_device || !there, "{} exists already; --force replaces it", path.display());
-    Ok(())
-}
-
-/// Write under a temporary name first, so that a file with the final name is always complete.
-fn write_file(
-    path: &Path,
-    force: bool,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> anyhow::Result<()> {
-    refuse_loss(path, force)?;
-    let is_device = std::fs::metadata(path).is_ok_and(|found| !found.is_file());
-    let unfinished = if is_device { path.to_owned() } else { path.with_added_extension("unfinished") };
-    let written = File::create(&unfinished).and_then(|file| {
-        let mut out = BufWriter::new(file);
-        write(&mut out)?;
-        out.flush()?;
-        if is_device {
-            Ok(())
-        } else {
-            out.get_ref().sync_all().and_then(|()| std::fs::rename(&unfinished, path))
-        }
-    });
-    written.with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {

@@ -1,4 +1,4 @@
-//! Pictures of a campaign, as SVG.
+//! Pictures of a campaign, as SVG; and the frame, axes and scales of a picture for others.
 
 use core::fmt::{self, Write};
 
@@ -8,12 +8,18 @@ use crate::row::Row;
 use crate::statistics::sorted;
 use crate::summary::numbers;
 
-const WIDTH: f64 = 520.0;
-const HEIGHT: f64 = 400.0;
-const LEFT: f64 = 60.0;
-const RIGHT: f64 = 20.0;
-const TOP: f64 = 40.0;
-const BOTTOM: f64 = 60.0;
+/// Width of a picture.
+pub const WIDTH: f64 = 520.0;
+/// Height of a picture.
+pub const HEIGHT: f64 = 400.0;
+/// Left margin.
+pub const LEFT: f64 = 60.0;
+/// Right margin.
+pub const RIGHT: f64 = 20.0;
+/// Top margin.
+pub const TOP: f64 = 40.0;
+/// Bottom margin.
+pub const BOTTOM: f64 = 60.0;
 /// Bars of a histogram.
 const BARS: usize = 40;
 /// Values beyond this fraction at each end go into the last bar, so that one crash does not hide the rest.
@@ -47,7 +53,8 @@ pub fn pictures(rows: &[Row], legs: &LegLimits) -> [String; 4] {
     ]
 }
 
-fn drawn(draw: impl FnOnce(&mut String) -> fmt::Result) -> String {
+/// A picture with a white ground.
+pub fn drawn(draw: impl FnOnce(&mut String) -> fmt::Result) -> String {
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
          font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
@@ -60,15 +67,20 @@ fn drawn(draw: impl FnOnce(&mut String) -> fmt::Result) -> String {
 
 /// One axis of a picture: its values and their positions.
 #[derive(Clone, Copy)]
-struct Scale {
-    from: f64,
-    to: f64,
-    from_px: f64,
-    to_px: f64,
+pub struct Scale {
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Position of the first value.
+    pub from_px: f64,
+    /// Position of the last value.
+    pub to_px: f64,
 }
 
 impl Scale {
-    fn px(&self, value: f64) -> f64 {
+    /// Position of a value.
+    pub fn px(&self, value: f64) -> f64 {
         self.from_px + (value - self.from) / (self.to - self.from) * (self.to_px - self.from_px)
     }
 
@@ -87,7 +99,28 @@ impl Scale {
     }
 }
 
-fn frame(x: Scale, y: Scale, [title, x_label, y_label]: [&str; 3], out: &mut String) -> fmt::Result {
+/// Title, axes and marks.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn frame(x: Scale, y: Scale, labels: [&str; 3], out: &mut String) -> fmt::Result {
+    framed([x, y], y.marks(), labels, out)
+}
+
+/// The same without marks on the vertical axis, for an axis of names.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn frame_of_names(x: Scale, y: Scale, labels: [&str; 3], out: &mut String) -> fmt::Result {
+    framed([x, y], core::iter::empty(), labels, out)
+}
+
+fn framed(
+    [x, y]: [Scale; 2],
+    y_marks: impl Iterator<Item = f64>,
+    [title, x_label, y_label]: [&str; 3],
+    out: &mut String,
+) -> fmt::Result {
     writeln!(out, r#"<text x="{LEFT}" y="24" font-size="14">{title}</text>"#)?;
     for value in x.marks() {
         let px = x.px(value);
@@ -99,7 +132,7 @@ fn frame(x: Scale, y: Scale, [title, x_label, y_label]: [&str; 3], out: &mut Str
         let base = y.from_px + 16.0;
         writeln!(out, r#"<text x="{px:.1}" y="{base:.1}" text-anchor="middle">{}</text>"#, plain(value))?;
     }
-    for value in y.marks() {
+    for value in y_marks {
         let px = y.px(value);
         writeln!(
             out,

@@ -39,5 +39,10 @@ pub mod computer;
 // another build of `flight` than the one under test.
 #[cfg(test)]
 #[path = "../../vehicles/src/lib.rs"]
-#[allow(dead_code, unreachable_pub, reason = "a crate's public items, of which the unit tests use some")]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    unused_imports,
+    reason = "a crate's public items, of which the unit tests use some"
+)]
 mod vehicles;

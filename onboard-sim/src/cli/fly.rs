@@ -24,7 +24,7 @@ use tokio::sync::watch;
 use super::campaign::text_of;
 
 /// The strongest mean wind that can be requested, m/s.
-const WIND_MAX_M_S: f64 = 30.0;
+pub(super) const WIND_MAX_M_S: f64 = 30.0;
 
 #[derive(Args)]
 pub(crate) struct FlyArguments {
@@ -182,7 +182,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 }
 
 /// The text of a set of dispersions with this mean wind. The log keeps the text, and a replay draws from it again.
-fn with_wind(toml: &str, wind_m_s: f64) -> String {
+pub(super) fn with_wind(toml: &str, wind_m_s: f64) -> String {
     const KEY: &str = "wind_m_s";
     let is_wind = |line: &&str| {
         line.trim_start().strip_prefix(KEY).is_some_and(|rest| rest.trim_start().starts_with('='))

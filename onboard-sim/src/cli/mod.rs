@@ -1,6 +1,10 @@
 //! The subcommands of the program, one file each.
 
 pub(crate) mod campaign;
+pub(crate) mod card;
+mod choices;
 mod cost;
 pub(crate) mod fly;
+pub(crate) mod motors;
+pub(crate) mod output;
 mod single;

@@ -1,9 +1,12 @@
 //! Motor files in the two formats that hobbyists use: RASP (`.eng`) and `RockSim` (`.rse`).
 
+mod plausible;
 mod rasp;
 mod rocksim;
 
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
+
+pub use self::rasp::to_rasp;
 
 /// Why a motor file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,11 +67,14 @@ pub fn from_file_text(file_name: &str, text: &str) -> Result<ThrustCurve, Thrust
     }
 }
 
-fn checked(data: MotorData) -> Result<ThrustCurve, ThrustCurveError> {
-    ThrustCurve::new(data).ok_or(ThrustCurveError::Missing {
+/// The motor of data whose masses and size are on this line.
+fn checked((data, line): (MotorData, usize)) -> Result<ThrustCurve, ThrustCurveError> {
+    let curve = ThrustCurve::new(data).ok_or(ThrustCurveError::Missing {
         what: "thrust",
         required: "a motor has at least one point with thrust after the first",
-    })
+    })?;
+    plausible::check(&curve, line)?;
+    Ok(curve)
 }
 
 /// A number that is finite and not negative, or the reason why not.

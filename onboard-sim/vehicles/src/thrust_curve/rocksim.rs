@@ -6,7 +6,8 @@ use roxmltree::{Document, Node};
 
 use super::{ThrustCurveError, bad, check_masses, not_negative, push_point};
 
-pub(super) fn parse(text: &str) -> Result<MotorData, ThrustCurveError> {
+/// The data, and the line of the engine.
+pub(super) fn parse(text: &str) -> Result<(MotorData, usize), ThrustCurveError> {
     let document = Document::parse(text).map_err(|error| ThrustCurveError::Xml(error.to_string()))?;
     let mut engines = document.descendants().filter(|node| node.has_tag_name("engine"));
     let engine = engines.next().ok_or(ThrustCurveError::Missing {
@@ -25,7 +26,7 @@ pub(super) fn parse(text: &str) -> Result<MotorData, ThrustCurveError> {
     for point in engine.descendants().filter(|node| node.has_tag_name("eng-data")) {
         push_point(&mut points, line_of(&point), attribute(&point, "t")?, attribute(&point, "f")?)?;
     }
-    Ok(MotorData {
+    let data = MotorData {
         name: attribute(&engine, "code")?.to_owned(),
         manufacturer: engine.attribute("mfg").unwrap_or_default().to_owned(),
         diameter_m: number("dia")? / 1000.0,
@@ -33,7 +34,8 @@ pub(super) fn parse(text: &str) -> Result<MotorData, ThrustCurveError> {
         propellant_mass_kg,
         total_mass_kg,
         points,
-    })
+    };
+    Ok((data, line))
 }
 
 fn attribute<'a>(node: &Node<'a, '_>, name: &'static str) -> Result<&'a str, ThrustCurveError> {

@@ -62,6 +62,22 @@ fn at_offset(state: &RigidState, offset_m: &Vector3<f64>) -> RigidState {
     }
 }
 
+/// A step along the rail: the state afterwards and the specific force, body axes, m/s^2.
+fn guided(stack: &mut Stack, before: &RigidState, load: &Load, mass_kg: f64) -> (RigidState, Vector3<f64>) {
+    let along = before.nose_in_world();
+    let pushed_m_s2 = load.force_n.x / mass_kg - STANDARD_GRAVITY_M_S2 * along.z;
+    let speed_m_s = before.velocity_m_s.dot(&along);
+    let next_m_s = stack.slide(speed_m_s, pushed_m_s2, STEP_S);
+    let after = RigidState {
+        position_m: before.position_m + along * (0.5 * (speed_m_s + next_m_s) * STEP_S),
+        velocity_m_s: along * next_m_s,
+        ..*before
+    };
+    let acceleration_m_s2 = along * ((next_m_s - speed_m_s) / STEP_S);
+    let felt_m_s2 = acceleration_m_s2 + Vector3::z() * STANDARD_GRAVITY_M_S2;
+    (after, before.world_from_body.inverse_transform_vector(&felt_m_s2))
+}
+
 impl World {
     /// One step with the booster. `stack` is the world's own, taken out of it.
     pub(super) fn ride(&mut self, mut stack: Stack, time_s: f64) {
@@ -72,7 +88,7 @@ impl World {
         let acting = self.acting_on(&stack, &mass, time_s);
         let (after, felt_m_s2) = if stack.on_rail() {
             let load = acting.load(&before, &before.world_from_body.to_rotation_matrix(), 0.5);
-            self.guided(&mut stack, &before, &load, mass.inertia.mass_kg)
+            guided(&mut stack, &before, &load, mass.inertia.mass_kg)
         } else {
             body::rk4_step(&before, &mass.inertia, &acting, STANDARD_GRAVITY_M_S2, STEP_S)
         };
@@ -116,28 +132,6 @@ impl World {
             thrust_place_m: stack.nozzle_m() - cg_m,
             jet_damping_m_s: stack.jet_damping_m_s(cg_m.x),
         }
-    }
-
-    /// A step along the rail: the state afterwards and the specific force, body axes, m/s^2.
-    fn guided(
-        &self,
-        stack: &mut Stack,
-        before: &RigidState,
-        load: &Load,
-        mass_kg: f64,
-    ) -> (RigidState, Vector3<f64>) {
-        let along = before.nose_in_world();
-        let pushed_m_s2 = load.force_n.x / mass_kg - STANDARD_GRAVITY_M_S2 * along.z;
-        let speed_m_s = before.velocity_m_s.dot(&along);
-        let next_m_s = stack.slide(speed_m_s, pushed_m_s2, STEP_S);
-        let after = RigidState {
-            position_m: before.position_m + along * (0.5 * (speed_m_s + next_m_s) * STEP_S),
-            velocity_m_s: along * next_m_s,
-            ..*before
-        };
-        let acceleration_m_s2 = along * ((next_m_s - speed_m_s) / STEP_S);
-        let felt_m_s2 = acceleration_m_s2 + Vector3::z() * STANDARD_GRAVITY_M_S2;
-        (after, before.world_from_body.inverse_transform_vector(&felt_m_s2))
     }
 
     /// The stages part: from now on the vehicle flies alone.

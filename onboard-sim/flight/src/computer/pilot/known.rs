@@ -3,7 +3,7 @@
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::MotorEstimate;
 use crate::guidance::powered::PoweredSituation;
-use crate::guidance::vertical::{Braking, Column};
+use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
@@ -51,8 +51,7 @@ impl Known {
     }
 
     pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
-        let each_m2 = self.airframe().fins.drag_coefficient * self.airframe().body.reference_area_m2;
-        each_m2 * fins_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+        self.airframe().fin_drag_area_m2(fins_rad)
     }
 
     pub(super) fn largest_fin_drag_area_m2(&self) -> f64 {
@@ -96,24 +95,8 @@ impl Known {
     }
 
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {
-        let mission = &self.mission;
-        let scaled = |area_m2: f64| self.motor.air_scale() * area_m2;
-        Column {
-            mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
-            gravity_m_s2: mission.gravity_m_s2,
-            air_density_kg_m3: density_kg_m3,
-            body_drag_area_m2: scaled(self.body_drag_area_m2()),
-            burning_body_drag_area_m2: scaled(self.burning_body_drag_area_m2()),
-            crossflow_area_m2: self.crossflow_area_m2(),
-            soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
-            hard: Braking {
-                tilt_rad: 0.0,
-                fin_drag_area_m2: scaled(self.burning_fins(self.largest_fin_drag_area_m2())),
-            },
-            touchdown_m_s: 0.5 * (mission.powered.final_box.u_min_m_s + mission.powered.final_box.u_max_m_s),
-            latest_after_s: mission.powered.latest_after_s,
-            settle_s: mission.settle_s,
-        }
+        let mass_kg = self.mass.at(0.0).mass_kg;
+        Column::of_mission(&self.mission, mass_kg, density_kg_m3, self.motor.air_scale(), soft_tilt_deg)
     }
 
     pub(super) fn feet_below_cg_m(&self, mass: &MassProperties) -> f64 {

@@ -13,6 +13,7 @@
 //! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
 //! burn and the tilt late in it.
 
+mod certified;
 mod fall;
 
 use self::fall::Fall;

@@ -73,6 +73,12 @@ impl Airframe {
             * (self.body.axial_drag_coefficient + 4.0 * self.fins.drag_coefficient * libm::sin(opening_rad))
     }
 
+    /// Drag area of the fins together at their opening angles, m^2.
+    pub fn fin_drag_area_m2(&self, openings_rad: &[f64; 4]) -> f64 {
+        let each_m2 = self.fins.drag_coefficient * self.body.reference_area_m2;
+        each_m2 * openings_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+    }
+
     /// Height of a station above the feet when upright, m.
     pub fn above_feet_m(&self, station_m: f64) -> f64 {
         station_m - self.legs.foot_station_m

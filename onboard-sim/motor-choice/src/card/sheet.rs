@@ -1,0 +1,258 @@
+//! What stands on a card. Text and HTML show the same sheet.
+
+use flight::vehicle::atmosphere::Air;
+
+use super::Card;
+use crate::flown::Flown;
+
+/// A card's content.
+pub(super) struct Sheet {
+    pub(super) title: String,
+    pub(super) subtitle: String,
+    pub(super) sections: Vec<Section>,
+    /// To be ticked off, in order.
+    pub(super) checks: Vec<String>,
+    pub(super) notes: Vec<String>,
+}
+
+pub(super) struct Section {
+    pub(super) title: &'static str,
+    /// What, its value, and a remark.
+    pub(super) rows: Vec<[String; 3]>,
+}
+
+fn row(what: &str, value: String, remark: impl Into<String>) -> [String; 3] {
+    [what.to_owned(), value, remark.into()]
+}
+
+/// A share with its interval.
+fn rate(flown: &Flown) -> String {
+    let legs = flown.legs;
+    format!(
+        "{} of {}: {:.0} % ({:.0} to {:.0})",
+        legs.count,
+        legs.of,
+        100.0 * legs.share,
+        100.0 * legs.low,
+        100.0 * legs.high
+    )
+}
+
+fn most_frequent(flown: &Flown) -> String {
+    flown.failure.as_ref().map_or_else(String::new, |(reason, count)| {
+        let of = flown.legs.of - flown.legs.count;
+        format!("not landed: {of}, of them {count} by {reason}")
+    })
+}
+
+impl Card {
+    pub(super) fn sheet(&self) -> Sheet {
+        let choice = &self.landing.choice;
+        let curve = &self.landing.candidate.curve;
+        Sheet {
+            title: format!("Landing card: {}", self.mission.name),
+            subtitle: format!(
+                "{}, {:.3} kg, {} m/s of wind. Simulated, not flown.",
+                self.landing.candidate.name(),
+                choice.mass.loaded_kg,
+                self.winds.today_m_s
+            ),
+            sections: vec![self.vehicle(), self.heights(), self.wind(), self.margins()],
+            checks: self.checks(),
+            notes: vec![
+                format!(
+                    "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; data: {}.",
+                    self.landing.candidate.name(),
+                    curve.total_impulse_n_s(),
+                    curve.burn_time_s(),
+                    curve.peak_thrust_n(),
+                    1e3 * curve.propellant_mass_kg(),
+                    1e3 * curve.total_mass_kg(),
+                    1e3 * curve.diameter_m(),
+                    1e3 * curve.length_m(),
+                    self.landing.candidate.origin
+                ),
+                format!(
+                    "The same flights again: onboard-sim campaign --profile mission.toml --dispersion day.toml --seed {} \
+                     --flights {} --out flights",
+                    self.seed, self.winds.today.legs.of
+                ),
+                "A rate is the share of simulated flights that landed within the limits of the legs, with Wilson's 95 % \
+                 interval. More flights make it narrower; only flights make it true."
+                    .to_owned(),
+            ],
+        }
+    }
+
+    fn vehicle(&self) -> Section {
+        let choice = &self.landing.choice;
+        let (mass, ballast) = (&choice.mass, &choice.ballast);
+        let motor_kg = self.landing.candidate.curve.total_mass_kg();
+        let empty_kg = mass.loaded_kg - motor_kg;
+        let empty_cg_m =
+            (mass.loaded_kg * mass.loaded_cg_station_m - motor_kg * mass.propellant_station_m) / empty_kg;
+        let ballast_words = match ballast.mass_kg {
+            0.0 => "none".to_owned(),
+            mass_kg if mass_kg < 0.0 => format!("take out {:.3} kg", -mass_kg),
+            mass_kg => format!("add {mass_kg:.3} kg"),
+        };
+        Section {
+            title: "Set before the flight",
+            rows: vec![
+                row(
+                    "Mass, motor in",
+                    format!("{:.3} kg", mass.loaded_kg),
+                    format!("{empty_kg:.3} kg without the motor"),
+                ),
+                row(
+                    "Balance, motor in",
+                    format!("{:.0} mm above the nozzle", 1e3 * mass.loaded_cg_station_m),
+                    format!("centre of gravity; {:.0} mm without the motor", 1e3 * empty_cg_m),
+                ),
+                row(
+                    "Ballast",
+                    ballast_words,
+                    format!(
+                        "at {:.0} mm; the airframe without motor and ballast is {:.3} kg",
+                        1e3 * ballast.station_m,
+                        self.frame.mass_kg()
+                    ),
+                ),
+                row("Load", "mission.toml".to_owned(), format!("mission {}", self.mission.name)),
+            ],
+        }
+    }
+
+    fn heights(&self) -> Section {
+        let choice = &self.landing.choice;
+        let window = &choice.window;
+        let command_m = window.onset_m + self.mission.ignition.delay_s * window.speed_m_s;
+        let mut rows = vec![
+            row(
+                "Apogee or drop",
+                format!("{:.0} m above the pad", choice.start_height_m),
+                "height of the centre of gravity at rest",
+            ),
+            row(
+                "Ignition command, about",
+                format!("{command_m:.0} m above the ground"),
+                format!("height of the feet, falling at {:.1} m/s; the computer decides", window.speed_m_s),
+            ),
+            row(
+                "Thrust begins, about",
+                format!("{:.0} m", window.onset_m),
+                format!(
+                    "a landing exists from {:.1} to {:.1} m",
+                    window.heights.low_m, window.heights.high_m
+                ),
+            ),
+        ];
+        if let Some(bound) = self.clairvoyant {
+            rows.push(row(
+                "No controller lands it",
+                format!("below {:.1} or above {:.1} m", bound.low_m, bound.high_m),
+                "ignition command, certified motor, still air",
+            ));
+        }
+        Section { title: "Heights", rows }
+    }
+
+    fn wind(&self) -> Section {
+        let winds = &self.winds;
+        let limit = match winds.steady_m_s {
+            None => "lands in no wind that was tried".to_owned(),
+            Some(wind_m_s) if wind_m_s >= winds.steady_tried_m_s => {
+                format!("above {wind_m_s:.0} m/s, not tried")
+            }
+            Some(wind_m_s) => format!("{wind_m_s:.0} m/s"),
+        };
+        Section {
+            title: "Wind and expected rate",
+            rows: vec![
+                row(
+                    &format!("Lands at {} m/s", winds.today_m_s),
+                    rate(&winds.today),
+                    most_frequent(&winds.today),
+                ),
+                row(
+                    &format!("Lands at {} m/s", winds.windier_m_s),
+                    rate(&winds.windier),
+                    most_frequent(&winds.windier),
+                ),
+                row(
+                    "Hard limit, steady wind",
+                    limit,
+                    "the vehicle exactly as in its data, no gusts; a real one stops earlier",
+                ),
+                row(
+                    "Do not fly above",
+                    format!("{} m/s", winds.limit_m_s()),
+                    "mean wind 10 m above the ground; above it fewer flights land, or none was flown",
+                ),
+            ],
+        }
+    }
+
+    fn margins(&self) -> Section {
+        let choice = &self.landing.choice;
+        let window = &choice.window;
+        let impulse_n_s = self.landing.candidate.curve.total_impulse_n_s();
+        let [low, high] = window.impulse_scales;
+        Section {
+            title: "What may differ",
+            rows: vec![
+                row(
+                    "Impulse of the motor",
+                    format!("{:+.1} to {:+.1} %", 100.0 * (low - 1.0), 100.0 * (high - 1.0)),
+                    format!(
+                        "{:.1} to {:.1} N s, all else as in the data",
+                        low * impulse_n_s,
+                        high * impulse_n_s
+                    ),
+                ),
+                row(
+                    "Mass, certified motor",
+                    format!("{:.3} to {:.3} kg", choice.landing_kg[0], choice.landing_kg[1]),
+                    "outside no landing exists; the flights above differ by what their dispersions say",
+                ),
+                row(
+                    "Scatter it stands",
+                    format!("{:.2}", window.scatter),
+                    "impulse, burn time and igniter at once, over what the mission plans for; 1 and more is good",
+                ),
+            ],
+        }
+    }
+
+    fn checks(&self) -> Vec<String> {
+        let choice = &self.landing.choice;
+        let (mission, airframe) = (&self.mission, &self.mission.airframe);
+        let chute = &airframe.parachute;
+        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
+        let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
+        let chute_m_s = libm::sqrt(2.0 * choice.mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
+        let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
+        vec![
+            format!("Weigh the vehicle with its motor: {:.3} kg, to 5 g.", choice.mass.loaded_kg),
+            format!(
+                "Balance it on an edge: {:.0} mm above the nozzle, to 3 mm.",
+                1e3 * choice.mass.loaded_cg_station_m
+            ),
+            format!(
+                "Read the label of the motor: {}. No other delay grain, no ejection charge.",
+                self.landing.candidate.name()
+            ),
+            format!("Measure the continuity of {igniters}; the pin stays in until the pad is clear."),
+            "Move fins and gimbal through their travel; each returns to its mark.".to_owned(),
+            "Load mission.toml; the ground station shows its name and no failed self-test.".to_owned(),
+            format!(
+                "Measure the wind for ten minutes: mean below {} m/s.",
+                self.winds.limit_m_s()
+            ),
+            format!("Nobody within {:.0} m of the pad, the fence of the mission.", mission.gate.fence_radius_m),
+            format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
+            "After the flight: a motor that was not lit is live. Nobody approaches for 60 s; then the pin first."
+                .to_owned(),
+        ]
+    }
+}

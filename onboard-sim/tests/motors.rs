@@ -1,0 +1,188 @@
+//! Tests the command lines of `motors` and `card`: their files, their refusals, and that what they write is flown.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn run(directory: &Path, arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_onboard-sim");
+    Command::new(program).current_dir(directory).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// The built-in motor F10; its header is line 10.
+const F10: &str = include_str!("../vehicles/motors/Apogee_F10.eng");
+
+#[test]
+fn motors_of_a_folder_are_ranked_into_files_that_are_not_overwritten() {
+    let directory = tempfile::tempdir().unwrap();
+    let folder = directory.path().join("motors");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("F10.eng"), F10).unwrap();
+    fs::write(folder.join("grams.eng"), F10.replace("0.0407 0.0841", "40.7 84.1")).unwrap();
+    let arguments = [
+        "motors",
+        "--mission",
+        "mini-f10",
+        "--from",
+        "motors",
+        "--best",
+        "1",
+        "--flights",
+        "1",
+        "--csv",
+        "motors.csv",
+        "--picture",
+        "motors.svg",
+    ];
+    let ranked = run(directory.path(), &arguments);
+    assert_eq!(ranked.status.code(), Some(0), "{}", stderr(&ranked));
+    let table = stdout(&ranked);
+    assert!(table.lines().nth(1).unwrap().contains("Apogee F10"), "{table}");
+    assert!(table.contains("line 10: propellant mass is '40.7 kg"), "{table}");
+    assert!(stderr(&ranked).contains("2 of 2 motors") && stderr(&ranked).contains("1 of 1 flights"));
+    let csv = fs::read_to_string(directory.path().join("motors.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 3, "{csv}");
+    assert_eq!(names(directory.path()), ["motors", "motors.csv", "motors.svg"], "nothing unfinished is left");
+    let again = run(directory.path(), &arguments);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(stderr(&again).contains("motors.csv exists already; --force replaces it"), "{}", stderr(&again));
+    let forced = run(directory.path(), &[&arguments[..], &["--force", "--jobs", "1"]].concat());
+    assert_eq!(forced.status.code(), Some(0), "{}", stderr(&forced));
+    assert_eq!(fs::read_to_string(directory.path().join("motors.csv")).unwrap(), csv, "on any threads");
+}
+
+#[test]
+fn a_folder_without_motors_and_a_wrong_value_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str]| {
+        let output = run(directory.path(), arguments);
+        assert_ne!(output.status.code(), Some(0), "{arguments:?}");
+        stderr(&output)
+    };
+    assert!(refused(&["motors", "--from", "."]).contains(". holds no file that ends in .eng, .rse or .json"));
+    assert!(refused(&["motors", "--from", "no.eng"]).contains("cannot read no.eng"));
+    fs::write(directory.path().join("list.json"), "{}").unwrap();
+    assert!(refused(&["motors", "--from", "list.json"]).contains("list.json: not a list of motors"));
+    assert!(refused(&["motors", "--ballast", "1"]).contains("`1` is not FROM:TO"));
+    assert!(refused(&["motors", "--tube", "90"]).contains("--tube 90: must be above 0 and up to 74 mm"));
+    assert!(refused(&["card", "--wind", "40"]).contains("--wind 40: must be 0 to 27 m/s"));
+    assert!(refused(&["card", "--mass", "0"]).contains("--mass 0: a mass in kg above 0"));
+    assert!(refused(&["card", "--motor", "Z9"]).contains("--motor Z9: neither a motor file nor one of the "));
+    let none = refused(&["motors", "--mission", "mini-f10", "--tube", "10"]);
+    assert!(none.contains("mini-f10 lands on none of these motors"), "{none}");
+    let heavy = refused(&["card", "--mission", "mini-f10", "--mass", "0.6"]);
+    assert!(heavy.contains("--mass 0.6: the airframe without its motor weighs 0.746 kg and the motor 0.084"));
+    assert_eq!(names(directory.path()), ["list.json"]);
+}
+
+#[test]
+fn a_card_is_written_whole_and_its_mission_flies_the_same_flights() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("f10.eng"), F10).unwrap();
+    let arguments = [
+        "card",
+        "--mission",
+        "mini-f10",
+        "--motor",
+        "f10.eng",
+        "--mass",
+        "0.85",
+        "--wind",
+        "2",
+        "--flights",
+        "2",
+    ];
+    let written = run(directory.path(), &arguments);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let card = directory.path().join("card");
+    assert_eq!(names(&card), ["card.html", "card.txt", "day.toml", "mission.toml"]);
+    let text = fs::read_to_string(card.join("card.txt")).unwrap();
+    for expected in
+        ["0.850 kg", "Apogee or drop", "Lands at 2 m/s", "Lands at 5 m/s", "[ ] Weigh the vehicle"]
+    {
+        assert!(text.contains(expected), "{expected} in\n{text}");
+    }
+    assert!(stdout(&written).starts_with(&text));
+    let html = fs::read_to_string(card.join("card.html")).unwrap();
+    assert!(html.contains("<td class=\"v\">0.850 kg</td>") && html.ends_with("</html>\n"));
+
+    // The campaign on the written files lands as many of the same flights.
+    let landed = text.lines().find(|line| line.contains("Lands at 2 m/s")).unwrap();
+    let count = landed.split_whitespace().nth(4).unwrap();
+    let flown = run(
+        directory.path(),
+        &[
+            "campaign",
+            "--profile",
+            "card/mission.toml",
+            "--dispersion",
+            "card/day.toml",
+            "--seed",
+            "1",
+            "--flights",
+            "2",
+            "--out",
+            "flights",
+        ],
+    );
+    assert_eq!(flown.status.code(), Some(0), "{}", stderr(&flown));
+    let legs = format!("legs    {count} of 2");
+    assert!(stdout(&flown).contains(&legs), "{legs}\n{}", stdout(&flown));
+
+    let again = run(directory.path(), &arguments);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(stderr(&again).contains("card.html exists already; --force"), "{}", stderr(&again));
+}
+
+#[test]
+fn what_cannot_land_gets_no_card_but_the_bound_and_the_nearest() {
+    let directory = tempfile::tempdir().unwrap();
+    let refused = run(directory.path(), &["card", "--mission", "mk2", "--motor", "H42", "--mass", "3.1"]);
+    assert_eq!(refused.status.code(), Some(1));
+    let words = stderr(&refused);
+    for expected in [
+        "error: Cesaroni H42 (built in): no landing exists at 3.100 kg; it would land at 2.",
+        "  bound: ",
+        "  nearest mass on this motor: 2.",
+        "kg more than that",
+        "AT H45W at 3.100 kg, scatter 1.1",
+    ] {
+        assert!(words.contains(expected), "{expected} in\n{words}");
+    }
+    let overlap = F10.replace("0.31 22.806", "0.1 22.806");
+    fs::write(directory.path().join("bad.eng"), overlap).unwrap();
+    let broken = run(directory.path(), &["card", "--mission", "mini-f10", "--motor", "bad.eng"]);
+    assert!(
+        stderr(&broken).contains("--motor bad.eng: line 14: time is '0.1'; times must"),
+        "{}",
+        stderr(&broken)
+    );
+    assert_eq!(names(directory.path()), ["bad.eng"]);
+}
+
+#[test]
+fn the_help_has_an_example() {
+    let directory = tempfile::tempdir().unwrap();
+    for command in ["motors", "card"] {
+        let help = stdout(&run(directory.path(), &[command, "--help"]));
+        assert!(help.contains(&format!("Example: onboard-sim {command} --mission mini-f10")), "{help}");
+    }
+}
