@@ -8,6 +8,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::Line;
 
 use super::titled;
+use crate::model::motion::Motion;
 use crate::model::vehicle::Sample;
 use crate::model::{Model, words};
 use crate::view::number::{age_mark, row, text_row};
@@ -60,8 +61,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
     lines.push(row(theme, "tilt", tilt, 1, "deg", now));
     lines.push(booster(descent, theme, now));
-    let horizontal = motion.map(|motion| motion.map(|m| m.horizontal_m_s()));
-    let distance = motion.map(|motion| motion.map(|m| m.distance_m()));
+    let horizontal = motion.map(|motion| motion.map(Motion::horizontal_m_s));
+    let distance = motion.map(|motion| motion.map(Motion::distance_m));
     lines.push(row(theme, "horizontal", horizontal, 1, "m/s", now));
     lines.push(row(theme, "distance", distance, 1, "m", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 0, "m", now));
