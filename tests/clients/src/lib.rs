@@ -57,6 +57,9 @@ pub static READERS: PythonPackages = PythonPackages::with_dependencies(
     ],
 );
 
+/// A simulator of ascents.
+pub static ROCKETPY: PythonPackages = PythonPackages::with_dependencies("rocketpy", &["rocketpy==1.13.0"]);
+
 /// Rerun with its command-line program.
 pub static RERUN: PythonPackages = PythonPackages::with_dependencies("rerun", &["rerun-sdk==0.36.3"]);
 
