@@ -111,15 +111,24 @@ pub(crate) fn nominal_fall_speed_m_s(
 
 #[cfg(test)]
 mod tests {
-    use crate::vehicle::thrust_curve::ThrustCurve;
+    use crate::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 
     use super::*;
 
     /// A massless motor with 40 N for ten seconds on 2 kg, without air, at 10 m/s^2: the vehicle brakes at 10 m/s^2.
     fn brake() -> (Brake, ThrustCurve) {
-        let curve =
-            crate::vehicles::thrust_curve::from_rasp("T 38 200 0 0.000001 0.3 M\n0.001 40\n9.999 40\n10 0")
-                .unwrap();
+        // No motor file may say so: it is not read from one.
+        let at = |(time_s, thrust_n)| ThrustPoint { time_s, thrust_n };
+        let curve = ThrustCurve::new(MotorData {
+            name: "T".into(),
+            manufacturer: "M".into(),
+            diameter_m: 0.038,
+            length_m: 0.2,
+            propellant_mass_kg: 1e-6,
+            total_mass_kg: 0.3,
+            points: [(0.0, 0.0), (0.001, 40.0), (9.999, 40.0), (10.0, 0.0)].map(at).to_vec(),
+        })
+        .unwrap();
         let brake = Brake {
             mass_at_ignition_kg: 2.0,
             gravity_m_s2: 10.0,

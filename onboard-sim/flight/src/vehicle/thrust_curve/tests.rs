@@ -39,7 +39,7 @@ fn the_last_fall_of_the_thrust_through_a_value_is_found() {
     assert!((motor.falls_through_s(10.0).unwrap() - 3.75).abs() < 1e-12);
     assert!((motor.falls_through_s(0.0).unwrap() - 4.0).abs() < 1e-12);
     assert_eq!(motor.falls_through_s(40.0), None);
-    let two_humps = from_rasp("T 1 1 0 1 2 M\n1 30\n2 10\n3 30\n4 0").unwrap();
+    let two_humps = from_rasp("T 38 200 0 0.1 0.2 M\n1 30\n2 10\n3 30\n4 0").unwrap();
     assert!((two_humps.falls_through_s(20.0).unwrap() - 10.0 / 3.0).abs() < 1e-12);
 }
 

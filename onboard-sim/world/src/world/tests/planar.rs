@@ -1,6 +1,7 @@
 //! The controller's planar equations are the world's motion in its x-z plane.
 
 use flight::vehicle::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
+use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 
 use super::*;
 
@@ -12,7 +13,17 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
     airframe.gimbal.servo.rate_deg_s = 1e6;
     airframe.gimbal.servo.delay_s = 0.0;
     airframe.gimbal.servo.slop_deg = 0.0;
-    let motor = vehicles::thrust_curve::from_rasp("C 38 194 0 1e-9 0.1 M\n0 33.3\n5 33.3\n").unwrap();
+    // No motor file may have so little propellant: it is not read from one.
+    let motor = ThrustCurve::new(MotorData {
+        name: "C".to_owned(),
+        manufacturer: "M".to_owned(),
+        diameter_m: 0.038,
+        length_m: 0.194,
+        propellant_mass_kg: 1e-9,
+        total_mass_kg: 0.1,
+        points: [0.0, 5.0].map(|time_s| ThrustPoint { time_s, thrust_n: 33.3 }).to_vec(),
+    })
+    .unwrap();
     let truth = Truth { ignition_delay_s: 0.0, ..Truth::default() };
     let planar = PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.45, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: -0.2 };
     let mut world = World::new(&airframe, &motor, &truth, &RigidState::from(planar), 1).unwrap();
