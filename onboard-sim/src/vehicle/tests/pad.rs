@@ -70,6 +70,7 @@ fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
     let began_s = rocket.snapshot().since_zero_s.unwrap();
     rocket.run_until(|rocket| ascent(rocket).booster == Booster::Separated);
     rocket.run_until(|rocket| !rocket.phase().before_apogee());
+    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteNow, "from the first frame on");
     let reached_m = sortie(&rocket).world().state().position_m.z;
     assert!((told.height_m - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
     let took_s = rocket.snapshot().since_zero_s.unwrap() - began_s;

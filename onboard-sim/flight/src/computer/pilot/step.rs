@@ -63,6 +63,8 @@ impl Pilot {
         let density_kg_m3 =
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         self.feel(table.mode().phase, input, &estimate, density_kg_m3);
+        // Before the outlook: at apogee an abort has to know at once whether the parachute has room.
+        self.watch_the_ascent(table, input, &estimate);
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         // A drop lasts for two seconds or three, and its speed changes all the time.
         let dropped = self.known.mission.start.at == StartPoint::Drone;
@@ -74,7 +76,6 @@ impl Pilot {
         if looking && table.mode().phase.in_descent() {
             self.look_ahead(&estimate, density_kg_m3);
         }
-        self.watch_the_ascent(table, input, &estimate);
         self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
         self.move_through_phases(table, input, &estimate);
         let mode = *table.mode();
