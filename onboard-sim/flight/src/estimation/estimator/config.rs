@@ -64,6 +64,9 @@ pub struct EstimatorConfig {
     pub wind_shear_exponent: f64,
     /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
     pub sideways_force_share: f64,
+    /// How often the sideways force is linearised for one correction of the wind. Once is enough where the fins feel most of
+    /// the wind; a body without large fins, which feels the square of it, needs about five.
+    pub wind_passes: u32,
     /// A measurement that differs from its prediction by more than this many standard deviations is rejected.
     pub gate_sigmas: f64,
     /// Beyond these limits the estimate is unhealthy.
@@ -111,6 +114,7 @@ impl Default for EstimatorConfig {
             wind_walk_m_s_sqrt_s: 0.5,
             wind_shear_exponent: 1.0 / 7.0,
             sideways_force_share: 0.1,
+            wind_passes: 1,
             gate_sigmas: 5.0,
             health: HealthLimits::default(),
         }
@@ -178,6 +182,10 @@ impl EstimatorConfig {
             if !(found.is_finite() && found >= 0.0) {
                 return Err(EstimatorConfigError { field, found, accepted: "a finite number not below 0" });
             }
+        }
+        if !(1..=10).contains(&self.wind_passes) {
+            let (field, found) = ("wind_passes", f64::from(self.wind_passes));
+            return Err(EstimatorConfigError { field, found, accepted: "1 to 10" });
         }
         Ok(())
     }

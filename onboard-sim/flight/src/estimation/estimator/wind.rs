@@ -4,7 +4,7 @@
 //! the body's cross-flow drag (Hoerner, "Fluid-Dynamic Drag", 1965, cross-flow principle). It corrects only the
 //! estimated wind, because a wrong drag coefficient must not tilt the attitude.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Rotation3, Vector2, Vector3};
 
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
 use super::{Estimator, VehicleNow};
@@ -72,15 +72,16 @@ impl Estimator {
         }
         let Some(mean) = self.sideways.take(&self.specific_force_m_s2) else { return };
         let body_from_world = self.nominal.world_from_body.inverse().to_rotation_matrix();
+        let mean_over_s = f64::from(FRAMES) * self.config.frame_s;
+        let at_m_s = self.linearised_at_m_s(vehicle, &mean, &body_from_world, mean_over_s);
+        let through_air = self.nominal.velocity_m_s - at_m_s.push(0.0);
         let in_body = body_from_world * through_air;
         let (felt, slope) = felt_sideways(vehicle, &in_body, &self.rate_rad_s);
         let by_velocity: Matrix2x3<f64> = slope * body_from_world.matrix().fixed_rows::<2>(1);
         let by_attitude = by_velocity * through_air.cross_matrix();
-        let mean_over_s = f64::from(FRAMES) * self.config.frame_s;
-        let noise_m_s2_sqrt_hz = self.noise.accelerometer_m_s2_sqrt_hz;
-        let white = noise_m_s2_sqrt_hz * noise_m_s2_sqrt_hz / mean_over_s;
-        let share = self.config.sideways_force_share * felt.norm();
-        let noise = white + share * share * COEFFICIENT_ERROR_LASTS_S / mean_over_s;
+        let noise = self.sideways_variance(&felt, mean_over_s);
+        // At the estimated wind, on the line through the point where the force was linearised.
+        let felt = felt - by_velocity.fixed_columns::<2>(0) * (self.nominal.wind_m_s - at_m_s);
         for axis in 0..2 {
             let sensitivity = [
                 (VELOCITY, by_velocity[(axis, 0)]),
@@ -101,10 +102,86 @@ impl Estimator {
     }
 }
 
+impl Estimator {
+    /// Variance of the mean sideways force, felt as such, (m/s^2)^2.
+    fn sideways_variance(&self, felt_m_s2: &Vector2<f64>, mean_over_s: f64) -> f64 {
+        let noise_m_s2_sqrt_hz = self.noise.accelerometer_m_s2_sqrt_hz;
+        let white = noise_m_s2_sqrt_hz * noise_m_s2_sqrt_hz / mean_over_s;
+        let share = self.config.sideways_force_share * felt_m_s2.norm();
+        white + share * share * COEFFICIENT_ERROR_LASTS_S / mean_over_s
+    }
+
+    /// The wind at which the sideways force is linearised: the estimated wind, or with more passes the most likely wind by
+    /// the steps of Gauss and Newton (the iterated filter; Bell and Cathey, IEEE Trans. Automatic Control 38, 1993). The
+    /// body's cross-flow force grows with the square of the wind and has no slope in still air. Linearised there, all of
+    /// a first force counts as the fins', and the wind comes out as much as three times too strong, or the force is rejected.
+    fn linearised_at_m_s(
+        &mut self,
+        vehicle: &VehicleNow,
+        mean_m_s2: &Vector2<f64>,
+        body_from_world: &Rotation3<f64>,
+        mean_over_s: f64,
+    ) -> Vector2<f64> {
+        let estimated_m_s = self.nominal.wind_m_s;
+        if self.config.wind_passes <= 1 {
+            return estimated_m_s;
+        }
+        self.catch_up();
+        let prior = Matrix2::from_fn(|row, column| {
+            self.covariance.between(&[(WIND + row, 1.0)], &[(WIND + column, 1.0)])
+        });
+        let mut at_m_s = estimated_m_s;
+        for _ in 1..self.config.wind_passes {
+            let in_body = body_from_world * (self.nominal.velocity_m_s - at_m_s.push(0.0));
+            let (felt, slope) = felt_sideways(vehicle, &in_body, &self.rate_rad_s);
+            let by_wind = -slope * body_from_world.matrix().fixed_view::<2, 2>(1, 0);
+            let noise = Matrix2::identity() * self.sideways_variance(&felt, mean_over_s);
+            let seen = by_wind * prior * by_wind.transpose() + noise;
+            let missed = mean_m_s2 - felt - by_wind * (estimated_m_s - at_m_s);
+            let Some(inverse) = seen.try_inverse() else { break };
+            at_m_s = estimated_m_s + prior * by_wind.transpose() * inverse * missed;
+        }
+        if at_m_s.iter().all(|wind| wind.is_finite()) { at_m_s } else { estimated_m_s }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::VEHICLE;
+    use super::super::{EstimatorConfig, ImuSample, Measurements, StartUncertainty};
     use super::*;
+    use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+    use crate::vehicle::rigid::RigidState;
+
+    /// The wind that a body with small fins feels after a fifth of a second of a fall through a wind of 8 m/s.
+    fn felt_of_8_m_s(wind_passes: u32) -> Vector2<f64> {
+        const FRAME_S: f64 = 0.005;
+        let vehicle = VehicleNow { mass_kg: 1.2, fin_drag_area_m2: 0.003, ..VEHICLE };
+        let mut state = RigidState::upright(25.0);
+        state.velocity_m_s.z = -8.0;
+        let config = EstimatorConfig { wind_passes, ..EstimatorConfig::default() };
+        let mut estimator = Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &state);
+        for _ in 0..40 {
+            let through_air = state.velocity_m_s - Vector3::new(8.0, 0.0, 0.0);
+            let in_body = state.world_from_body.inverse_transform_vector(&through_air);
+            let felt_m_s2 = vehicle.air_force_n(&in_body, &Vector3::zeros()) / vehicle.mass_kg;
+            state.velocity_m_s +=
+                FRAME_S * (state.world_from_body * felt_m_s2 - Vector3::z() * STANDARD_GRAVITY_M_S2);
+            let imu = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: felt_m_s2 };
+            let seen = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
+            estimator.step(&seen, &vehicle);
+        }
+        estimator.estimate().wind_m_s
+    }
+
+    #[test]
+    fn a_body_with_small_fins_needs_several_passes() {
+        let once = felt_of_8_m_s(1);
+        assert!((once.x - 8.0).abs() > 3.0, "{once}");
+        let often = felt_of_8_m_s(6);
+        // The prior of still air still counts a little.
+        assert!((often - Vector2::new(8.0, 0.0)).norm() < 1.0, "{often}");
+    }
 
     #[test]
     fn the_slope_is_the_difference_quotient() {
