@@ -8,6 +8,9 @@ const BUILTIN: &[(&str, &str)] = &[
     ("mk3", include_str!("../airframes/mk3.toml")),
     ("mk2-h53", include_str!("../airframes/mk2-h53.toml")),
     ("mini-f10", include_str!("../airframes/mini-f10.toml")),
+    ("vlr", include_str!("../airframes/vlr.toml")),
+    ("vlr-f15", include_str!("../airframes/vlr-f15.toml")),
+    ("vlr-f16", include_str!("../airframes/vlr-f16.toml")),
 ];
 
 /// Why an airframe cannot be used.

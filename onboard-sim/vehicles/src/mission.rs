@@ -26,6 +26,9 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("mk3", include_str!("../missions/mk3.toml")),
     ("mk2-h53", include_str!("../missions/mk2-h53.toml")),
     ("mini-f10", include_str!("../missions/mini-f10.toml")),
+    ("vlr", include_str!("../missions/vlr.toml")),
+    ("vlr-f15", include_str!("../missions/vlr-f15.toml")),
+    ("vlr-f16", include_str!("../missions/vlr-f16.toml")),
 ];
 
 /// Why a mission cannot be flown.

@@ -7,6 +7,9 @@ use super::thrust_curve::{self, ThrustCurveError};
 /// Name and RASP text of every built-in motor.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("F10", include_str!("../motors/Apogee_F10.eng")),
+    ("F13-RCT", include_str!("../motors/AeroTech_F13-RCT.eng")),
+    ("F15", include_str!("../motors/Estes_F15.eng")),
+    ("F16-RCJ", include_str!("../motors/AeroTech_F16-RCJ.eng")),
     ("F30", include_str!("../motors/Cesaroni_73F30-6A.eng")),
     ("G12", include_str!("../motors/AeroTech_G12ST.eng")),
     ("G33", include_str!("../motors/Cesaroni_143G33-9A.eng")),

@@ -34,7 +34,7 @@ fn the_error_for_an_unknown_name_lists_the_known_names() {
     let error = builtin("Z99").unwrap_err().to_string();
     assert_eq!(
         error,
-        "no motor is named 'Z99'; these are built in: F10, F30, G12, G33, H42, H45W, H53, I243"
+        "no motor is named 'Z99'; these are built in: F10, F13-RCT, F15, F16-RCJ, F30, G12, G33, H42, H45W, H53, I243"
     );
 }
 
