@@ -57,7 +57,8 @@ pub fn vector_to_log(vector: &Vector3<f64>) -> v1::Vector3 {
     v1::Vector3 { x: vector.x, y: vector.y, z: vector.z }
 }
 
-fn vector_from_log(vector: &v1::Vector3) -> Vector3<f64> {
+/// A recorded vector.
+pub fn vector_from_log(vector: &v1::Vector3) -> Vector3<f64> {
     Vector3::new(vector.x, vector.y, vector.z)
 }
 

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use flight::guidance::baseline::Controller;
 use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
+use flight::vehicle::profile::StartPoint;
 use nalgebra::Vector3;
 use protocol::log::flight_v1::{Estimate, PilotStart, TruthSample};
 use protocol::log::record::{Event, EventLevel, Record};
@@ -45,12 +46,15 @@ pub fn start(flight: &Sortie) -> Record {
     Record::PilotStart(Box::new(pilot_start(flight)))
 }
 
-/// The flight computer's estimate at its start, and its settings that the text of its mission does not contain.
+/// The flight computer's estimate before its first frame, and its settings that the text of its mission does not contain.
 pub fn pilot_start(flight: &Sortie) -> PilotStart {
     let mission = flight.mission();
+    let estimate = flight.pilot().estimator().estimate();
+    let stood = mission.start.at == StartPoint::Pad;
     PilotStart {
         time_s: 0.0,
-        believed: state_to_log(flight.believed_at_start()),
+        believed: state_to_log(&estimate.state),
+        gyro_bias_rad_s: stood.then(|| vector_to_log(&estimate.gyro_bias_rad_s)),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
     }

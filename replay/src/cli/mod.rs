@@ -66,7 +66,7 @@ enum Question {
     /// The plant starts in the recorded state of that moment and the controller with its memory; the record is not used
     /// afterwards. With nothing changed, a simulated flight is reproduced bit for bit.
     ///
-    /// A flight from apogee is flown again from apogee with the recorded draw up to that moment, because a log does not
+    /// A flight in space is flown again from its start with the recorded draw up to that moment, because a log does not
     /// hold the internal states of gusts, servos and sensors. The answer says how many recorded frames were reproduced.
     Refly(refly::Ask),
     /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.

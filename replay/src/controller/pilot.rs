@@ -11,7 +11,7 @@ use flight::vehicle::mission::Mission;
 use nmpc::SolveStatus;
 use prost_reflect::MessageDescriptor;
 use protocol::log::flight_v1;
-use tick_log::pilot::{PilotLogError, input_from_log, state_from_log, tick_to_log};
+use tick_log::pilot::{PilotLogError, input_from_log, state_from_log, tick_to_log, vector_from_log};
 
 use super::{Decided, Decides, Moment, Replayed, phase_name};
 use crate::log::pilot_descriptor;
@@ -85,7 +85,12 @@ impl LoggedPilot {
         let other_law = at_frame.zip(law_of(REFLOWN_BY)?);
         let law = Law::of(controller, schedule.base());
         let believed = state_from_log(&start.believed);
-        let computer = Computer::in_space(schedule.base(), law, &believed).released();
+        let computer = Computer::in_space(schedule.base(), law, &believed);
+        let computer = match &start.gyro_bias_rad_s {
+            Some(bias) => computer.standing(&believed, vector_from_log(bias)),
+            None => computer,
+        }
+        .released();
         Ok(Self { computer, schedule, other_law, next: FIRST_FRAME, compares_digests: true })
     }
 

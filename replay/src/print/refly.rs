@@ -36,7 +36,7 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     if let Some(Reached { frames, identical, first_different }) = report.reached {
         writeln!(
             output,
-            "flown again from apogee up to there: {identical} of {frames} recorded frames identical"
+            "flown again from its start up to there: {identical} of {frames} recorded frames identical"
         )?;
         if let Some(frame) = first_different {
             writeln!(

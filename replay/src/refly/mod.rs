@@ -7,7 +7,7 @@
 //! flight is reproduced bit for bit.
 //!
 //! For a flight from apogee, the recorded truth is not enough, because no log holds the internal states of gusts,
-//! servos and sensors. So the flight is flown again from apogee, with the recorded draw and seed, up to that moment,
+//! servos and sensors. So the flight is flown again from its start, with the recorded draw and seed, up to that moment,
 //! and compared with the record frame by frame on the way. From there on the changed settings apply to world and flight
 //! computer.
 //!
@@ -117,7 +117,7 @@ pub enum ReflyError {
     #[error(transparent)]
     World(#[from] WorldError),
     /// The log does not say how its flight from apogee was flown, or this build does not know it.
-    #[error("{name}: cannot be flown again from apogee: {reason}")]
+    #[error("{name}: cannot be flown again from its start: {reason}")]
     Recipe {
         /// The file.
         name: String,

@@ -13,6 +13,8 @@ use onboard_sim::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use proptest::prelude::*;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
+use replay::log::Recording;
+use replay::refly::{ReflyOptions, refly};
 use replay::verify::{Obstacle, Verification, VerifyReport, verify};
 use sim::plane::draw::draw;
 use sim::plane::{DeadlinePolicy, PlanarFlight};
@@ -55,7 +57,8 @@ impl Flown {
         let toml = vehicles::profile::BUILTIN.iter().find(|(name, _)| *name == "paper-calibrated").unwrap().1;
         let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
         let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
-        Self::fly(Vehicle::in_plane(flight), toml, crew)
+        let header = LogHeader { profile_toml: Some(toml.to_owned()), ..LogHeader::default() };
+        Self::fly(Vehicle::in_plane(flight), header, crew)
     }
 
     fn in_space(crew: &[Reached], faults: &[&str]) -> Self {
@@ -66,13 +69,12 @@ impl Flown {
         let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
         let recipe =
             Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
-        let toml = recipe.mission_toml.clone();
-        Self::fly(Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), &toml, crew)
+        let header = tick_log::sortie::header("test", &recipe, 0, 0);
+        Self::fly(Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), header, crew)
     }
 
-    fn fly(mut vehicle: Vehicle, toml: &str, crew: &[Reached]) -> Self {
+    fn fly(mut vehicle: Vehicle, header: LogHeader, crew: &[Reached]) -> Self {
         vehicle.set_log_state(LogState { running: true, space_bytes: 1 << 40 });
-        let header = LogHeader { profile_toml: Some(toml.to_owned()), ..LogHeader::default() };
         let mut flown =
             Self { folder: tempfile::tempdir().unwrap(), records: Vec::new(), header, phases: Vec::new() };
         let mut crew = crew.iter().peekable();
@@ -245,16 +247,30 @@ fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
 
 #[test]
 fn if_frames_on_the_pad_are_lost_the_pilot_is_still_verified_from_its_release() {
-    let flown = Flown::in_space(&armed_and_started(1_200), &[]);
-    // Left out by the writer's sequence number, as if a chunk were damaged.
+    for start in [StartPoint::Apogee, StartPoint::Pad] {
+        let flown = Flown::from(start, &armed_and_started(2_600), &[]);
+        // Left out by the writer's sequence number, as if a chunk were damaged.
+        let path = flown.written(flown.records.iter().cloned());
+        let whole = flown.folder.path().join("gap.mcap");
+        without_frames(&path, &whole, 500..510);
+        let report = verify(&whole).unwrap().remove(0);
+        assert_eq!(report.obstacle, Some(Obstacle::FramesLost { after: 500, before: 511 }));
+        assert_eq!(report.outcome, Verification::NotReplayable);
+        assert_eq!((report.ticks_compared, report.ticks_different), (report.ticks_recorded, 0), "{start:?}");
+        assert!(report.ticks_compared > 2_000);
+    }
+}
+
+/// The attitude and the gyro's bias that the computer found on its rail are in the log: the flight can be flown again.
+#[test]
+fn a_flight_from_the_pad_is_flown_again_as_recorded() {
+    let flown = Flown::from(StartPoint::Pad, &armed_and_started(2_600), &[]);
     let path = flown.written(flown.records.iter().cloned());
-    let whole = flown.folder.path().join("gap.mcap");
-    without_frames(&path, &whole, 500..510);
-    let report = verify(&whole).unwrap().remove(0);
-    assert_eq!(report.obstacle, Some(Obstacle::FramesLost { after: 500, before: 511 }));
-    assert_eq!(report.outcome, Verification::NotReplayable);
-    assert_eq!((report.ticks_compared, report.ticks_different), (report.ticks_recorded, 0));
-    assert!(report.ticks_compared > 2_000);
+    let recording = Recording::open(&path).unwrap();
+    let report = refly(&recording, &ReflyOptions::default()).unwrap();
+    let reached = report.reached.expect("the frames before the landing were flown again");
+    assert_eq!((reached.identical, reached.first_different), (reached.frames, None));
+    assert!(reached.frames > 2_000);
 }
 
 /// Copies a log without the records of `/computer/frame` that have these sequence numbers in their channel.

@@ -80,6 +80,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         believed: state_to_log(&believed),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
+        gyro_bias_rad_s: None,
     };
     Fall { start, ticks }
 });

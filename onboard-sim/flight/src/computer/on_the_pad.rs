@@ -29,7 +29,7 @@ impl Computer {
     /// A motor may light that nobody lit.
     fn wait_on_the_rail(&mut self, input: &Input<'_>) {
         if let (Vehicle::Space(space), Feeling::InSpace(sensed)) = (&mut self.vehicle, &input.feeling)
-            && space.lifts_off(sensed, input.time_s)
+            && space.pilot.feels_lift_off(sensed)
         {
             self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
             if self.happen(Event::LiftOff).is_ok() {

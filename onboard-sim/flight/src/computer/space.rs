@@ -3,7 +3,7 @@
 use super::pad::PadWatch;
 use super::table::PhaseTable;
 use crate::computer::memory::remembers;
-use crate::computer::pilot::{AscentWatch, Pilot, PilotInput, PilotOutput, Sensed, axial_m_s2};
+use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
 use crate::estimation::estimator::StartUncertainty;
 use crate::guidance::baseline::Law;
 use crate::rules::phase::Phase;
@@ -16,8 +16,6 @@ use crate::vehicle::rigid::RigidState;
 #[derive(Debug, Clone)]
 pub(super) struct Space {
     pub(super) pad: PadWatch,
-    /// Watches for a lift-off that nobody asked for.
-    rail: AscentWatch,
     pub(super) pilot: Pilot,
     /// The last frame in the air.
     pub(super) last: Option<(PilotInput, PilotOutput)>,
@@ -26,24 +24,18 @@ pub(super) struct Space {
 }
 
 // The last frame in the air came with its input, and its decisions are compared as output.
-remembers!(Space { pad, rail, pilot, gate_refusal } but { last });
+remembers!(Space { pad, pilot, gate_refusal } but { last });
 
 impl Space {
     pub(super) fn new(mission: &Mission, law: Law, believed: &RigidState) -> Self {
         let uncertainty = StartUncertainty::at_start(mission.start.at);
         let mut pilot = Pilot::starting(mission, 0.0, believed, &uncertainty);
         pilot.set_law(law);
-        Self { pad: PadWatch::default(), rail: AscentWatch::default(), pilot, last: None, gate_refusal: None }
+        Self { pad: PadWatch::default(), pilot, last: None, gate_refusal: None }
     }
 
     pub(super) fn start_point(&self) -> StartPoint {
         self.pilot.mission().start.at
-    }
-
-    /// Whether a vehicle on its rail lifts off in this frame, without having been started.
-    pub(super) fn lifts_off(&mut self, sensed: &Sensed, time_s: f64) -> bool {
-        let frame_s = self.pilot.mission().estimator.frame_s;
-        self.rail.feels_lift_off(axial_m_s2(sensed), frame_s, time_s)
     }
 
     /// Whether the parachute fills before a vehicle that falls from its drone meets the ground.
@@ -65,7 +57,7 @@ impl Space {
                 world_from_body: start.world_from_body,
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
             };
-            self.pilot = self.pilot.standing(&believed, start.gyro_bias_rad_s);
+            self.pilot.stand(&believed, start.gyro_bias_rad_s);
         }
     }
 

@@ -3,6 +3,8 @@
 
 use alloc::boxed::Box;
 
+use nalgebra::Vector3;
+
 use super::motor_watch::MotorWatch;
 use super::news::Readiness;
 use super::pilot::BoosterCommands;
@@ -37,6 +39,15 @@ impl Computer {
         };
         let countdown_s = mission.start.countdown_s;
         Self::new(Vehicle::Space(Box::new(space)), arming, countdown_s, closed_rad)
+    }
+
+    /// The same computer after it has found its state and the bias of its gyro, body, rad/s, on its rail.
+    #[must_use]
+    pub fn standing(mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        if let Vehicle::Space(space) = &mut self.vehicle {
+            space.pilot.stand(believed, gyro_bias_rad_s);
+        }
+        self
     }
 
     /// The computer of the planar vehicle at power-up in its rig, which releases it in the state `release`.

@@ -22,6 +22,7 @@ use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
+use nalgebra::Vector3;
 use world::sensors::{SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
 use world::world::WorldError;
 use world::{Actuators, World};
@@ -62,14 +63,11 @@ pub struct Sortie {
     mission: Mission,
     dispersion: Dispersion,
     drawn: Draw,
-    believed: RigidState,
     computer: Computer,
     rehearsal: Option<Rehearsal>,
     world: World,
     /// The state in which the fall began.
     fall: Option<RigidState>,
-    /// Frames since the countdown of a hanging vehicle ended.
-    cleared_frames: u64,
     sensors: Option<Sensors>,
     sensor_faults: SensorFaults,
     /// The sensor samples of the last frame.
@@ -150,7 +148,6 @@ impl Sortie {
             rehearsal: None,
             world,
             fall: None,
-            cleared_frames: 0,
             sensors,
             sensor_faults: SensorFaults::default(),
             measured: None,
@@ -166,7 +163,6 @@ impl Sortie {
             mission: mission.clone(),
             dispersion: *dispersion,
             drawn,
-            believed,
         })
     }
 
@@ -291,14 +287,10 @@ impl Sortie {
 
     /// A drone's pilot lets go some time after the countdown has ended.
     fn let_go_when_cleared(&mut self) {
-        if !self.world.hangs() {
-            return;
-        }
-        let left_s = self.computer.mode().countdown_remaining_s(flight_time_s(self.frame));
-        self.cleared_frames =
-            if left_s.is_some_and(|left_s| left_s <= 0.0) { self.cleared_frames + 1 } else { 0 };
         let after_s = self.mission.drop.map_or(0.0, |drop| drop.release_after_s);
-        if self.cleared_frames > 0 && flight_time_s(self.cleared_frames) > after_s {
+        let ended_s = self.computer.mode().countdown_end_s;
+        if self.world.hangs() && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
+        {
             self.world.let_go();
         }
     }
@@ -393,9 +385,10 @@ impl Sortie {
         &self.radio
     }
 
-    /// The flight computer's estimate of its state at the start.
-    pub fn believed_at_start(&self) -> &RigidState {
-        &self.believed
+    /// The same flight of a computer that has found its state and the bias of its gyro, body, rad/s, on its rail.
+    #[must_use]
+    pub fn standing(self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
+        Self { computer: self.computer.standing(believed, gyro_bias_rad_s), ..self }
     }
 
     /// The mission as flown.

@@ -13,8 +13,8 @@ use protocol::log::flight_v1;
 use protocol::log::record::Record;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
-use tick_log::pilot::{state_to_log, tick_to_log};
-use tick_log::sortie;
+use tick_log::pilot::tick_to_log;
+use tick_log::sortie::{self, pilot_start};
 use world::Truth;
 
 use self::place::{find, phase_of, put_where_it_believes, recorded_frame};
@@ -173,8 +173,8 @@ impl<'a> AtStart<'a> {
         options: &ReflyOptions,
     ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
         let Recorded { mut rerun, .. } = Recorded::of(self.recording)?;
-        let believed = state_to_log(rerun.flight.believed_at_start());
-        let start = flight_v1::PilotStart { believed, ..*self.pilot_start };
+        let flight_v1::PilotStart { believed, gyro_bias_rad_s, .. } = pilot_start(&rerun.flight);
+        let start = flight_v1::PilotStart { believed, gyro_bias_rad_s, ..*self.pilot_start };
         let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
         let mut phase = rerun.flight.computer().mode().phase;
         while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {

@@ -7,6 +7,7 @@ use sim::dispersion::Dispersion;
 use sim::fault::{Breakage, FaultError, TimedFault};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+use tick_log::pilot::{state_from_log, vector_from_log};
 use tick_log::sortie as sortie_log;
 
 use crate::controller::LoggedPilot;
@@ -68,6 +69,10 @@ impl Recorded {
             faults,
         };
         let flight = Sortie::new(&recipe, number)?;
+        let flight = match &pilot_start.gyro_bias_rad_s {
+            Some(bias) => flight.standing(&state_from_log(&pilot_start.believed), vector_from_log(bias)),
+            None => flight,
+        };
         // An abort that no fault caused came from the crew.
         let by_fault = recipe.faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);

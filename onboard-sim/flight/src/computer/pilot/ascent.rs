@@ -47,9 +47,9 @@ pub(super) struct AscentSeen {
 
 /// The watch's memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::computer) struct AscentWatch {
+pub(super) struct AscentWatch {
     gained_m_s: f64,
-    lifted_off_s: Option<f64>,
+    lifted_off: bool,
     braking_s: f64,
     separating_since_s: Option<f64>,
     falling_frames: u32,
@@ -59,7 +59,7 @@ pub(in crate::computer) struct AscentWatch {
 
 remembers!(AscentWatch {
     gained_m_s,
-    lifted_off_s,
+    lifted_off,
     braking_s,
     separating_since_s,
     falling_frames,
@@ -71,7 +71,7 @@ impl Default for AscentWatch {
     fn default() -> Self {
         Self {
             gained_m_s: 0.0,
-            lifted_off_s: None,
+            lifted_off: false,
             braking_s: 0.0,
             separating_since_s: None,
             falling_frames: 0,
@@ -82,9 +82,9 @@ impl Default for AscentWatch {
 }
 
 impl AscentWatch {
-    /// When the vehicle lifted off, s.
-    pub(super) fn lifted_off_s(&self) -> Option<f64> {
-        self.lifted_off_s
+    /// The vehicle has left its rail.
+    pub(super) fn has_lifted_off(&self) -> bool {
+        self.lifted_off
     }
 
     /// The separation charge gets current.
@@ -95,7 +95,7 @@ impl AscentWatch {
     /// The event of this frame, if there is one.
     pub(super) fn look(&mut self, seen: &AscentSeen) -> Option<Event> {
         self.feel_the_pressure(seen);
-        if self.lifted_off_s.is_none() {
+        if !self.lifted_off {
             return self.wait_for_lift_off(seen);
         }
         match seen.phase {
@@ -112,18 +112,15 @@ impl AscentWatch {
     }
 
     /// Whether the vehicle lifts off in this frame, in which it feels this along its axis, m/s^2.
-    pub(in crate::computer) fn feels_lift_off(&mut self, axial_m_s2: f64, frame_s: f64, time_s: f64) -> bool {
+    pub(super) fn feels_lift_off(&mut self, axial_m_s2: f64, frame_s: f64) -> bool {
         let gain_m_s = (axial_m_s2 - STANDARD_GRAVITY_M_S2) * frame_s;
         self.gained_m_s = if axial_m_s2 > PUSHED_M_S2 { self.gained_m_s + gain_m_s } else { 0.0 };
-        let lifts_off = self.gained_m_s >= LIFTED_OFF_M_S;
-        if lifts_off {
-            self.lifted_off_s = Some(time_s);
-        }
-        lifts_off
+        self.lifted_off = self.gained_m_s >= LIFTED_OFF_M_S;
+        self.lifted_off
     }
 
     fn wait_for_lift_off(&mut self, seen: &AscentSeen) -> Option<Event> {
-        if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s, seen.time_s) {
+        if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
             return Some(Event::LiftOff);
         }
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
@@ -150,20 +147,16 @@ impl AscentWatch {
         if let Some(altitude_m) = seen.pressure_altitude_m.filter(|_| !disturbed) {
             self.highest_m = self.highest_m.max(altitude_m);
         }
-        let sunk = seen.pressure_altitude_m.map(|altitude_m| altitude_m < self.highest_m - SUNK_M);
-        match sunk {
-            _ if disturbed => self.sunk_s = 0.0,
-            Some(false) => self.sunk_s = 0.0,
-            Some(true) => self.sunk_s += seen.frame_s,
-            // Samples come in some frames only; between them the last one counts.
-            None if self.sunk_s > 0.0 => self.sunk_s += seen.frame_s,
-            None => {}
-        }
+        // Samples come in some frames only; between them the last one counts.
+        let sunk = seen
+            .pressure_altitude_m
+            .map_or(self.sunk_s > 0.0, |altitude_m| altitude_m < self.highest_m - SUNK_M);
+        self.sunk_s = if sunk && !disturbed { self.sunk_s + seen.frame_s } else { 0.0 };
     }
 }
 
 /// What is felt along the axis, m/s^2.
-pub(in crate::computer) fn axial_m_s2(sensed: &Sensed) -> f64 {
+pub(super) fn axial_m_s2(sensed: &Sensed) -> f64 {
     match sensed {
         Sensed::Known(estimate) => estimate.specific_force_m_s2.x,
         Sensed::Measured(measured) => measured.imu.specific_force_m_s2.x,
@@ -215,7 +208,7 @@ mod tests {
     }
 
     fn lifted_off() -> AscentWatch {
-        AscentWatch { lifted_off_s: Some(0.3), ..AscentWatch::default() }
+        AscentWatch { lifted_off: true, ..AscentWatch::default() }
     }
 
     #[test]

@@ -17,10 +17,10 @@ mod restart;
 mod sample;
 mod step;
 
-pub(super) use ascent::{AscentWatch, axial_m_s2};
+use ascent::{AscentWatch, axial_m_s2};
 use fin_watch::FinWatch;
 use known::Known;
-pub use outlook::{ApogeeAhead, Outlook, apogee_ahead, touchdown_from_below_m, touchdown_m};
+pub use outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
 
 use nalgebra::Vector3;
 
@@ -163,11 +163,16 @@ impl Pilot {
         }
     }
 
-    /// This pilot on its rail, with attitude and gyro bias, body, rad/s, from there.
-    pub(super) fn standing(&self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
+    /// Takes over the state on the rail, and the gyro's bias, body, rad/s, from there.
+    pub(super) fn stand(&mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) {
         let config = &self.known.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
-        Self { estimator: estimator.with_gyro_bias(gyro_bias_rad_s), ..self.clone() }
+        self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
+    }
+
+    /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
+    pub(super) fn feels_lift_off(&mut self, sensed: &Sensed) -> bool {
+        self.ascent.feels_lift_off(axial_m_s2(sensed), self.known.mission.estimator.frame_s)
     }
 
     /// Sets the law that flies the landing burn from now on.
@@ -186,11 +191,6 @@ impl Pilot {
     /// The estimator, to compare it with the truth.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
-    }
-
-    /// When the vehicle was felt to lift off, s.
-    pub fn lifted_off_s(&self) -> Option<f64> {
-        self.ascent.lifted_off_s()
     }
 
     /// The guidance of the landing burn, with the plan being flown.

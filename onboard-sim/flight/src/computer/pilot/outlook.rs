@@ -65,7 +65,7 @@ pub struct ApogeeAhead {
 
 /// The apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, while the air brakes it by so much,
 /// m/s^2: the drag falls with the square of the speed, so in the mean over the height half of it acts.
-pub fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAhead {
+fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAhead {
     let slowing_m_s2 = STANDARD_GRAVITY_M_S2 + 0.5 * braking_m_s2.max(0.0);
     let rising_m_s = vertical_m_s.max(0.0);
     ApogeeAhead {

@@ -107,7 +107,7 @@ impl Pilot {
             ignite: mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited,
             parachute: mode.phase == Phase::Chute,
             booster: BoosterCommands {
-                ignite: mode.phase == Phase::Boost && self.ascent.lifted_off_s().is_none(),
+                ignite: mode.phase == Phase::Boost && !self.ascent.has_lifted_off(),
                 separate: self.ascent.separates(),
             },
             phase: mode.phase,
@@ -141,12 +141,12 @@ impl Pilot {
                     burning_s.is_some() || phase.in_landing_burn(),
                     self.known.mission.lidar_ahead_of_feet_m,
                 );
-                if phase.before_apogee() {
-                    let (measurements, vehicle) = on_the_way_up(&measurements, &vehicle, phase);
-                    self.estimator.step(&measurements, &vehicle)
+                let (measurements, vehicle) = if phase.before_apogee() {
+                    on_the_way_up(&measurements, &vehicle, phase)
                 } else {
-                    self.estimator.step(&measurements, &vehicle)
-                }
+                    (measurements, vehicle)
+                };
+                self.estimator.step(&measurements, &vehicle)
             }
         }
     }

@@ -100,9 +100,7 @@ impl Estimator {
             self.gates.wind.count(correction.accepted);
         }
     }
-}
 
-impl Estimator {
     /// Variance of the mean sideways force, felt as such, (m/s^2)^2.
     fn sideways_variance(&self, felt_m_s2: &Vector2<f64>, mean_over_s: f64) -> f64 {
         let noise_m_s2_sqrt_hz = self.noise.accelerometer_m_s2_sqrt_hz;
