@@ -35,6 +35,7 @@ mod paper;
 pub mod problem;
 mod resample;
 pub mod rollout;
+pub mod space;
 mod workspace;
 
 pub use bound::best_touchdown_speed_m_s;

@@ -95,9 +95,13 @@ impl Pilot {
                     if planning {
                         self.plan(time_s, &estimate, burning, &input.fins_rad);
                     }
+                    self.fin_share = self.powered.fin_share(time_s).unwrap_or(self.fin_share);
                     self.gimbal(time_s, &estimate, burning, &input.fins_rad)
                 }
-                None => [0.0; 2],
+                None => match situation.as_ref().filter(|_| self.balances(&mode)) {
+                    Some(burning) => self.turned_towards(&Aim::upright(), &estimate, burning),
+                    None => [0.0; 2],
+                },
             };
             self.fins_rad = self.fins(&mode, &estimate, &mass, density_kg_m3, burning.is_some());
         }
@@ -400,6 +404,12 @@ impl Pilot {
             height_m,
             self.known.mission.fin_place,
         );
+        if self.known.mission.powered.space.is_some() {
+            let fins_m2 = self.known.largest_fin_drag_area_m2();
+            let situation = self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2);
+            self.powered.plan(time_s, state, &situation, None);
+            return;
+        }
         let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
         self.powered.plan(time_s, state, &preferred, fallback.as_ref());
     }
@@ -411,13 +421,24 @@ impl Pilot {
         situation: &Burning,
         fins_rad: &[f64; 4],
     ) -> [f64; 2] {
-        let thrust_n = self.known.burn().thrust_n(situation.burning_s);
         let fins_m2 = self.known.fin_drag_area_m2(fins_rad);
         let aim: Aim = self.powered.aim(
             time_s,
             &estimate.state,
             &self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2),
         );
+        self.turned_towards(&aim, estimate, situation)
+    }
+
+    /// Whether the thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the
+    /// gimbal holds it upright until the thrust ends.
+    fn balances(&self, mode: &Mode) -> bool {
+        self.known.mission.powered.space.is_some() && mode.phase == Phase::Touchdown
+    }
+
+    /// The gimbal's command that turns the nose as an aim wants.
+    fn turned_towards(&mut self, aim: &Aim, estimate: &Estimate, situation: &Burning) -> [f64; 2] {
+        let thrust_n = self.known.burn().thrust_n(situation.burning_s);
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
             thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2
         } else {
@@ -428,7 +449,7 @@ impl Pilot {
             &estimate.state.world_from_body,
             &estimate.state.rate_rad_s,
             turning_rad_s2,
-            &aim,
+            aim,
             limit_rad,
         )
     }

@@ -10,7 +10,7 @@ use nmpc::{Solution, SolveStatus};
 // The settings come from the mission. A search does not depend on the workspace. The trial solutions are cleared before
 // each solve and only keep their capacity. (If a problem cannot be posed, the trial keeps an older final time, which is
 // reported but decides nothing.)
-remembers!(PoweredGuidance { plane, flown, report } but { settings, workspace, trial, set_aside });
+remembers!(PoweredGuidance { plane, flown, report, space } but { settings, workspace, trial, set_aside });
 
 remembers!(Plane { along, across });
 remembers!(Flown { begins_s, turning_rad_s2, plan });

@@ -27,6 +27,9 @@ impl PoweredGuidance {
     /// The planned planar states and the step between them, s, if there is a plan. They are in the frame that moves
     /// with the air along the plane; [`Plane::over_ground`] converts them.
     pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
+        if let Some(in_space) = self.space.projected() {
+            return Some(in_space);
+        }
         let flown = self.flown.as_ref()?;
         Some((&flown.plan.solution.states, flown.plan.solution.step_s))
     }
@@ -48,7 +51,7 @@ impl PoweredGuidance {
         fallback: Option<&PoweredSituation<'_>>,
     ) -> Option<LandingSolved> {
         let plane = decided.plane?;
-        if self.is_flown_out(time_s) {
+        if self.is_flown_out(time_s) || self.settings.space.is_some() {
             return None;
         }
         let mut again = self.clone();

@@ -17,6 +17,7 @@ mod plane;
 mod report;
 mod settings;
 mod situation;
+mod space;
 
 use alloc::vec::Vec;
 
@@ -29,6 +30,8 @@ pub use report::PoweredReport;
 pub use settings::PoweredSettings;
 use situation::Ahead;
 pub use situation::PoweredSituation;
+use space::SpaceGuidance;
+pub use space::SpaceSettings;
 
 use nalgebra::Vector3;
 
@@ -78,6 +81,7 @@ pub struct PoweredGuidance {
     workspace: FreeTimeWorkspace,
     trial: FreeTimeSolution,
     set_aside: FreeTimeSolution,
+    space: SpaceGuidance,
 }
 
 impl PoweredGuidance {
@@ -91,6 +95,7 @@ impl PoweredGuidance {
             workspace: FreeTimeWorkspace::default(),
             trial: FreeTimeSolution::default(),
             set_aside: FreeTimeSolution::default(),
+            space: SpaceGuidance::default(),
         }
     }
 
@@ -101,7 +106,7 @@ impl PoweredGuidance {
 
     /// Time until the flown plan ends, s.
     pub fn left_s(&self, time_s: f64) -> Option<f64> {
-        self.flown.as_ref().map(|flown| flown.left_s(time_s))
+        self.space.left_s(time_s).or_else(|| self.flown.as_ref().map(|flown| flown.left_s(time_s)))
     }
 
     /// Plans the landing from a state at a time. If the preferred problem ends in a hard landing, it tries the
@@ -119,8 +124,14 @@ impl PoweredGuidance {
         if self.is_flown_out(time_s) {
             return;
         }
+        let nothing = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+        if let Some(space) = &self.settings.space {
+            let planned = self.space.plan(time_s, &plane, state, preferred, &self.settings, space);
+            self.report = planned.unwrap_or(nothing);
+            return;
+        }
         let Some((problem, situation)) = self.solve_either(time_s, &plane, state, preferred, fallback) else {
-            self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+            self.report = nothing;
             return;
         };
         self.take(time_s, &problem, situation);
@@ -280,6 +291,13 @@ impl PoweredGuidance {
         core::mem::swap(&mut flown.plan, &mut self.trial);
     }
 
+    /// Share of the fins' drag area that the plan has at a time, if it is one in space.
+    pub fn fin_share(&self, time_s: f64) -> Option<f64> {
+        let planned = self.space.fin_share(time_s)?;
+        // Too low for any landing: brake.
+        Some(if self.report.level == ControlLevel::Stabiliser { 1.0 } else { planned })
+    }
+
     /// The wanted direction of the nose at a time.
     pub fn aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
         let thrust_n = situation.burn.thrust_n(situation.burning_s);
@@ -292,6 +310,12 @@ impl PoweredGuidance {
         let lean = |direction: &Vector3<f64>| {
             libm::tan(level_m_s2(-decay * state.velocity_m_s.dot(direction) - air_m_s2.dot(direction)))
         };
+        if self.report.level != ControlLevel::Stabiliser
+            && let Some(aim) =
+                self.space.aim(time_s, state, &self.settings, |astray_m_s| level_m_s2(-decay * astray_m_s))
+        {
+            return aim;
+        }
         let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
         let Some((flown, plane)) = flown.zip(self.plane.as_ref()) else {
             // Upright, with a lean against the sideways velocity.

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Homing;
+use super::{Homing, SpaceSettings};
 use crate::vehicle::profile::{FinalBox, SolverLimits, StateWeights};
 
 /// The settings of the landing burn.
@@ -44,6 +44,9 @@ pub struct PoweredSettings {
     pub across_homing_per_s2: f64,
     /// Largest lean across the plane, degrees.
     pub across_lean_max_deg: f64,
+    /// If it is there, the landing is planned in space, not in a plane.
+    #[serde(default)]
+    pub space: Option<SpaceSettings>,
     /// Limits of the solver.
     pub solver: SolverLimits,
 }

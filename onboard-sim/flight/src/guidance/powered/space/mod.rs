@@ -1,0 +1,225 @@
+//! The landing planned in space ([`nmpc::space`]).
+//!
+//! A tick solves for gimbal, fins and final time at once, from the plan of the tick before. Between ticks the plan says
+//! where the nose points and how far the fins are open.
+
+mod plan;
+mod pose;
+
+use alloc::vec::Vec;
+
+use nalgebra::Vector3;
+use nmpc::SolveStatus;
+use nmpc::space::{Outcome, SpaceProblem, SpaceWorkspace, Status};
+use serde::Deserialize;
+
+use plan::SpacePlan;
+
+use super::{
+    END_LEAN_MAX_RAD, HARD_M_S, LEAST_INTERVALS, MOST_INTERVALS, Plane, PoweredReport, PoweredSettings,
+    PoweredSituation,
+};
+use crate::computer::memory::remembers;
+use crate::control::aim::Aim;
+use crate::guidance::controller::ControlLevel;
+use crate::vehicle::dynamics::PlanarState;
+use crate::vehicle::rigid::RigidState;
+
+/// Settings of a landing that is planned in space.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpaceSettings {
+    /// Size of the lean of the cold guesses, degrees.
+    pub guess_lean_deg: f64,
+    /// Weight of the fins' distance from half open.
+    pub fin_weight: f64,
+}
+
+/// First change of the final time that is tried, s, the factor after one that was no better, and the smallest change.
+const FIRST_STEP_S: f64 = 0.1;
+const SHORTER: f64 = 0.3;
+const LEAST_STEP_S: f64 = 0.01;
+
+/// Half the span of the central difference of the Lagrangian, s.
+const DIFFERENCE_S: f64 = 1e-4;
+
+/// Plans landings in space, and flies one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SpaceGuidance {
+    workspace: SpaceWorkspace,
+    problem: Option<SpaceProblem>,
+    trial: SpacePlan,
+    found: SpacePlan,
+    warm: SpacePlan,
+    flown: Option<SpacePlan>,
+    /// The flown plan's motion in the plane of the report.
+    projected: Vec<PlanarState>,
+}
+
+// The workspace and the plans beside the flown one are written before they are read; the projection is only reported.
+remembers!(SpaceGuidance { flown } but { workspace, problem, trial, found, warm, projected });
+
+impl SpaceGuidance {
+    /// Time until the flown plan ends, s.
+    pub(super) fn left_s(&self, time_s: f64) -> Option<f64> {
+        self.flown.as_ref().map(|plan| plan.left_s(time_s))
+    }
+
+    /// Plans the landing from a state at a time, and keeps the plan if it is finite. `None` if the thrust never carries the
+    /// vehicle.
+    pub(super) fn plan(
+        &mut self,
+        time_s: f64,
+        plane: &Plane,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+        settings: &PoweredSettings,
+        space: &SpaceSettings,
+    ) -> Option<PoweredReport> {
+        let outcome = self.search(time_s, state, situation, settings, space)?;
+        let usable = self.found.is_finite();
+        let level = match () {
+            () if !usable => match self.left_s(time_s) {
+                Some(left_s) if left_s > 0.0 => ControlLevel::ShiftedPlan,
+                _ => ControlLevel::Stabiliser,
+            },
+            // Too low for any landing: upright brakes just as well.
+            () if self.found.end_m_s() < HARD_M_S => ControlLevel::Stabiliser,
+            () if outcome.status == Status::Converged && outcome.miss <= settings.landing_miss => {
+                ControlLevel::Converged
+            }
+            () => ControlLevel::BestFeasible,
+        };
+        if usable {
+            self.found.project(plane, situation.wind_m_s.dot(&plane.along), &mut self.projected);
+        }
+        let report = PoweredReport {
+            level,
+            status: status(outcome.status),
+            iterations: outcome.iterations,
+            kkt_stationarity: outcome.stationarity,
+            kkt_feasibility: outcome.feasibility,
+            cost: outcome.cost,
+            condition_miss: outcome.miss,
+            touchdown_in_s: self.found.length_s(),
+            touchdown: self.projected.last().copied().unwrap_or_default(),
+            largest_tilt_rad: self.found.largest_tilt_rad(),
+        };
+        if usable {
+            core::mem::swap(self.flown.get_or_insert_with(SpacePlan::default), &mut self.found);
+        }
+        Some(report)
+    }
+
+    /// Searches the path and the final time into `found`. The outcome has the iterations of all solves.
+    ///
+    /// By the envelope theorem the derivative of the Lagrangian by the final time says on which side a better one lies.
+    fn search(
+        &mut self,
+        time_s: f64,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+        settings: &PoweredSettings,
+        space: &SpaceSettings,
+    ) -> Option<Outcome> {
+        let carried_until_s =
+            situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
+        // Late in the burn the end waits only for the ground, not for the thrust to fall.
+        let to_ground_s = (state.position_m.z - situation.feet_below_cg_m).max(0.0) / 2.0;
+        let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
+        let latest_s = (carried_until_s + settings.latest_after_s - situation.burning_s)
+            .max(earliest_s + to_ground_s.min(0.4));
+        let mut final_time_s = self.left_s(time_s).unwrap_or(earliest_s).clamp(earliest_s, latest_s);
+        let intervals =
+            (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+
+        let pushes = self.problem.take().map_or_else(|| Vec::with_capacity(MOST_INTERVALS), |old| old.pushes);
+        let mut problem = SpaceProblem { pushes, ..pose::posed(situation, settings, space, state) };
+        let stretch = |problem: &mut SpaceProblem, to_s: f64| {
+            pose::stretch(problem, situation, settings, to_s, intervals);
+        };
+        stretch(&mut problem, final_time_s);
+        let is_warm = self
+            .flown
+            .as_ref()
+            .is_some_and(|flown| self.warm.take_last(flown, intervals, problem.end.settled_nodes));
+        let warm = is_warm.then(|| self.warm.start());
+        let mut best = self.workspace.solve(&problem, warm.as_ref());
+        self.found.read(&self.workspace, &problem, time_s);
+
+        let mut iterations = best.iterations;
+        let mut step_s = FIRST_STEP_S;
+        for _ in 1..settings.max_solves {
+            let mut lagrangian = |at_s: f64| {
+                stretch(&mut problem, at_s);
+                self.workspace.lagrangian(&problem, &self.found.start())
+            };
+            let slope = lagrangian(final_time_s + DIFFERENCE_S) - lagrangian(final_time_s - DIFFERENCE_S);
+            let to_s = if slope > 0.0 { final_time_s - step_s } else { final_time_s + step_s };
+            let to_s = to_s.clamp(earliest_s, latest_s);
+            if !slope.is_finite() || (to_s - final_time_s).abs() < LEAST_STEP_S {
+                break;
+            }
+            stretch(&mut problem, to_s);
+            let outcome = self.workspace.solve(&problem, Some(&self.found.start()));
+            iterations += outcome.iterations;
+            if outcome.price < best.price {
+                self.trial.read(&self.workspace, &problem, time_s);
+                core::mem::swap(&mut self.trial, &mut self.found);
+                (best, final_time_s) = (outcome, to_s);
+            } else {
+                step_s *= SHORTER;
+            }
+        }
+        self.problem = Some(problem);
+        Some(Outcome { iterations, ..best })
+    }
+
+    /// The flown plan's motion in the plane of the report, and the step between its states, s.
+    pub(super) fn projected(&self) -> Option<(&[PlanarState], f64)> {
+        self.flown.as_ref().map(|plan| (&self.projected[..], plan.step_s()))
+    }
+
+    /// Planned share of the fins' drag area at a time.
+    pub(super) fn fin_share(&self, time_s: f64) -> Option<f64> {
+        self.flown.as_ref()?.fin_share(time_s)
+    }
+
+    /// The wanted direction of the nose at a time; `None` without a plan and after its end. `push` makes a lean, as a
+    /// tangent, from a velocity to be lost.
+    pub(super) fn aim(
+        &self,
+        time_s: f64,
+        state: &RigidState,
+        settings: &PoweredSettings,
+        push: impl Fn(f64) -> f64,
+    ) -> Option<Aim> {
+        let plan = self.flown.as_ref()?;
+        let aim = plan.aim(time_s)?;
+        let left_s = plan.left_s(time_s);
+        if left_s < settings.quiet_s {
+            return Some(Aim::at(state.nose_in_world()));
+        }
+        if left_s >= settings.flown_out_s {
+            return Some(aim);
+        }
+        // A plan that is flown to its end needs a correction of the velocity.
+        let [x_m_s, y_m_s] = plan.level_m_s(time_s);
+        let lean = |astray_m_s: f64| push(astray_m_s).clamp(-END_LEAN_MAX_RAD, END_LEAN_MAX_RAD);
+        let nose = aim.nose_in_world
+            + Vector3::x() * lean(state.velocity_m_s.x - x_m_s)
+            + Vector3::y() * lean(state.velocity_m_s.y - y_m_s);
+        Some(Aim { nose_in_world: nose / nose.norm(), ..aim })
+    }
+}
+
+/// How a solve ended, in the words of the planar solver.
+fn status(status: Status) -> SolveStatus {
+    match status {
+        Status::Converged => SolveStatus::Converged,
+        Status::IterationLimit => SolveStatus::IterationLimit,
+        Status::Stalled => SolveStatus::Stalled,
+        Status::SubproblemFailed => SolveStatus::SubproblemFailed,
+        Status::NotFinite => SolveStatus::BadInput,
+    }
+}
