@@ -17,8 +17,10 @@
 //! with `e_p = dn/dp`, `e_r = dn/dr / cos p`: a slender axisymmetric body that does not roll. The gimbal's angles are
 //! small; their second order in the thrust is left out (0.3 % at 4.5 degrees).
 
+mod air;
 mod interval;
 mod model;
+mod nose;
 #[cfg(test)]
 mod tests;
 

@@ -154,8 +154,11 @@ fn the_rest_of_a_plan_is_optimal_and_a_disturbed_one_soon_is() {
     let cold = workspace.solve(&model, None);
     let limits: Vec<_> = workspace.limit_multipliers().collect();
     let all: Vec<f64> = workspace.condition_multipliers().collect();
-    let (states, inputs, costates) =
-        (workspace.states()[GONE..].to_vec(), workspace.inputs()[GONE..].to_vec(), workspace.costates()[GONE..].to_vec());
+    let (states, inputs, costates) = (
+        workspace.states()[GONE..].to_vec(),
+        workspace.inputs()[GONE..].to_vec(),
+        workspace.costates()[GONE..].to_vec(),
+    );
     let kept = model.pushes.len() - GONE;
     let mut conditions = Vec::new();
     super::last_multipliers(&all, model.end.settled_nodes, model.pushes.len(), kept, &mut conditions);
@@ -198,7 +201,14 @@ fn derivatives_are_those_of_differences() {
                 uu: [[0.0; INPUTS]; INPUTS],
             },
         };
-        interval::evaluated(&model, 3, state.try_into().unwrap(), input.try_into().unwrap(), &costate, &mut out);
+        interval::evaluated(
+            &model,
+            3,
+            state.try_into().unwrap(),
+            input.try_into().unwrap(),
+            &costate,
+            &mut out,
+        );
         interval::pulled(&mut out, &costate);
         out
     };

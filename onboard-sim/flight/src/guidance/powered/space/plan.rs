@@ -89,7 +89,13 @@ impl SpacePlan {
         self.limits.extend_from_slice(&from.limits[gone..]);
         self.conditions.clear();
         if settled_nodes == from.settled_nodes {
-            last_multipliers(&from.conditions, settled_nodes, from.inputs.len(), intervals, &mut self.conditions);
+            last_multipliers(
+                &from.conditions,
+                settled_nodes,
+                from.inputs.len(),
+                intervals,
+                &mut self.conditions,
+            );
         }
         true
     }
@@ -206,7 +212,8 @@ mod tests {
         const CHANGE_S: f64 = 1e-5;
         let plan = plan();
         for time_s in [2.0 + CHANGE_S, 2.03, 2.08] {
-            let [before, now, after] = [-1.0, 0.0, 1.0].map(|side| plan.aim(time_s + side * CHANGE_S).unwrap());
+            let [before, now, after] =
+                [-1.0, 0.0, 1.0].map(|side| plan.aim(time_s + side * CHANGE_S).unwrap());
             let rate = (after.nose_in_world - before.nose_in_world) / (2.0 * CHANGE_S);
             let change = (after.rate_in_world_rad_s - before.rate_in_world_rad_s) / (2.0 * CHANGE_S);
             let nose = now.nose_in_world;
