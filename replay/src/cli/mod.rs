@@ -15,6 +15,8 @@ mod tick;
 mod verify;
 
 use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
@@ -92,6 +94,8 @@ enum Question {
 pub(crate) enum Answer {
     /// There is an answer.
     Given,
+    /// Some of the logs could not be read.
+    NotAll,
     /// A bit-for-bit comparison. If `strict`, it must cover the whole flight.
     Verified { outcome: Verification, strict: bool },
     /// A comparison within tolerances.
@@ -103,6 +107,7 @@ impl Answer {
         match self {
             Self::Given | Self::Compared { within: true } => 0,
             Self::Compared { within: false } => EXIT_NO,
+            Self::NotAll => EXIT_NO_ANSWER,
             Self::Verified { outcome, strict } => match outcome {
                 Verification::Identical => 0,
                 Verification::IdenticalReadablePart if !strict => 0,
@@ -140,6 +145,20 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
     }
+}
+
+/// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second
+/// one ends the program.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::flag;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, i32::from(EXIT_NO_ANSWER), Arc::clone(&stop))
+            .and_then(|_| flag::register(signal, Arc::clone(&stop)))
+            .context("cannot wait for Ctrl-C")?;
+    }
+    Ok(stop)
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.

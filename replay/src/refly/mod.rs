@@ -34,7 +34,7 @@ use tick_log::TickLogError;
 use world::world::WorldError;
 
 use crate::info::VerdictFacts;
-use crate::log::{Recording, RecordingError};
+use crate::log::{FlightKind, Recording, RecordingError};
 use crate::settings::{Setting, SettingError};
 
 /// Key of the run fact that holds the plant's settings in the log of a re-flown flight.
@@ -174,6 +174,8 @@ pub struct ReflyReport {
     pub plant_settings: Vec<String>,
     /// The controller that flew.
     pub law: Law,
+    /// The seed of the plant's draw, if it is not the recorded one.
+    pub seed: Option<u64>,
     pub start: StartState,
     /// For a flight from apogee: how the frames before the start compare with the record.
     pub reached: Option<Reached>,
@@ -196,6 +198,20 @@ pub struct ReflyReport {
     pub commands_identical: usize,
     /// The largest difference of a gimbal command from the recorded command of the same tick, rad.
     pub gimbal_difference_max_rad: f64,
+}
+
+/// Whether a flight can be flown again at all.
+///
+/// # Errors
+/// The log lacks what is needed, or this build cannot use it.
+pub fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
+    match recording.kind() {
+        FlightKind::InSpace => apogee::can_be_flown(recording),
+        FlightKind::Planar => {
+            recording.replayable_ticks()?;
+            Ok(recording.profile().map(|_| ())?)
+        }
+    }
 }
 
 /// Flies a recorded flight again.
@@ -239,6 +255,7 @@ fn report(
         settings: options.settings.iter().map(ToString::to_string).collect(),
         plant_settings: options.plant_settings.iter().map(ToString::to_string).collect(),
         law: options.law,
+        seed: options.seed,
         start,
         reached: None,
         thrust_scale: 1.0,

@@ -29,6 +29,11 @@ use crate::settings::{Setting, mission_with, truth_with};
 /// Number and time of a record that is kept.
 type Kept = Vec<(f64, Record)>;
 
+/// Whether the log has all that its flight was made from.
+pub(super) fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
+    Recorded::of(recording).map(|_| ())
+}
+
 /// A recorded flight, flown again up to the moment of the start.
 #[derive(Debug)]
 pub(super) struct AtStart<'a> {
