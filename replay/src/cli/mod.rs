@@ -4,6 +4,7 @@ mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod gate;
 mod import;
 mod info;
 mod recover;
@@ -36,7 +37,8 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 /// Exit codes:
 ///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
-///      compare: more differs or is missing than is tolerated, or the verdicts differ
+///      compare: more differs or is missing than is tolerated, or the verdicts differ;
+///      gate: some flight got worse, lands no longer, diverged or is missing
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
@@ -75,6 +77,11 @@ enum Question {
     Sweep(sweep::Ask),
     /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
     Bisect(bisect::Ask),
+    /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
+    ///
+    /// One table (and one JUnit file) says which flights got better, worse, flipped between landed and not landed,
+    /// diverged or are missing. Exit code 0 if none got worse, 1 if some did, 2 without an answer.
+    Gate(gate::Ask),
     /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
@@ -129,6 +136,7 @@ impl Cli {
             Question::Tick(ask) => ask.run(),
             Question::Sweep(ask) => ask.run(),
             Question::Bisect(ask) => ask.run(),
+            Question::Gate(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),

@@ -18,6 +18,7 @@ mod foreign;
 mod from_apogee;
 mod from_estimate;
 mod from_power_up;
+mod gate;
 mod ground_log;
 mod limits;
 mod lost_frames;
