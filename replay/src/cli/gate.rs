@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 use replay::gate::{Baseline, Change, GateProgress, GateState, Judged, find, fly_all, judge};
 use replay::output::{Destination, NewFile, Overwrite};
-use replay::print::{GateReport, gate_cases, print_gate, print_json, print_junit};
+use replay::print::{GateReport, JunitCase, gate_cases, print_gate, print_json, print_junit};
 
 use super::{Answer, answer, say, stop_on_interrupt};
 
@@ -23,6 +23,9 @@ pub(super) struct Ask {
     /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed.
     #[arg(long)]
     accept: bool,
+    /// Let this build decide differently from the record, as long as no flight gets worse.
+    #[arg(long)]
+    may_diverge: bool,
     /// A margin that changed by no more than this is the same (1 is from the middle of the limits to their edge).
     #[arg(long, value_name = "MARGIN", default_value_t = 0.02)]
     tolerance: f64,
@@ -72,9 +75,9 @@ impl Ask {
             let known = |judged: &Judged| !flights.iter().any(|found| found.name == judged.name);
             judged.retain(|judged| judged.change != Change::Missing || known(judged));
         }
-        let passed = !interrupted && !judged.iter().any(|judged| judged.change.fails());
+        let passed = !interrupted && !judged.iter().any(|judged| judged.fails(self.may_diverge));
         if let Some(path) = &self.junit {
-            write_junit(path, &judged)?;
+            write_junit(path, &gate_cases(&judged, self.may_diverge))?;
         }
         let report = GateReport { passed, interrupted, flights: &judged };
         answer(|output| if self.json { print_json(&report, output) } else { print_gate(&report, output) })?;
@@ -87,10 +90,10 @@ impl Ask {
     }
 }
 
-fn write_junit(path: &Path, judged: &[Judged]) -> Result<()> {
+fn write_junit(path: &Path, cases: &[JunitCase]) -> Result<()> {
     let written = NewFile::create(Destination { path, overwrite: Overwrite::Always }, Path::new(""))
         .and_then(|mut file| {
-            print_junit("gate", gate_cases(judged), &mut file)?;
+            print_junit("gate", cases.to_vec(), &mut file)?;
             file.commit()
         });
     written.with_context(|| format!("{}: cannot be written", path.display()))

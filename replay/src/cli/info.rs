@@ -1,6 +1,6 @@
 //! `replay info`.
 
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -48,7 +48,9 @@ impl Ask {
                 print_info(info, output)
             }),
         })?;
-        for info in &described {
+        // On a terminal the description has said it already.
+        let said = !self.json && std::io::stdout().is_terminal();
+        for info in described.iter().filter(|_| !said) {
             warn_of_completeness(&info.file, &info.completeness);
         }
         Ok(if refused { Answer::NotAll } else { Answer::Given })

@@ -8,7 +8,7 @@ use flight::rules::phase::Phase;
 use replay::log::{Clock, ClockTime, Recording};
 use replay::output::{Destination, Overwrite};
 use replay::print::{print_json, print_refly};
-use replay::refly::{From, Law, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::refly::{FaultChanges, From, Law, ReflyOptions, StartAt, refly_flight, write_log};
 use replay::settings::Setting;
 
 use super::settings::SettingArguments;
@@ -57,6 +57,13 @@ pub(super) struct FlownHow {
     /// The controller that flies.
     #[arg(long, value_enum, default_value_t = Controller::AsRecorded)]
     controller: Controller,
+    /// Flights in space: another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
+    /// flown with it from its beginning.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<String>,
+    /// Flights in space: leave out a recorded fault, by its name or in full; `all` for every one.
+    #[arg(long, value_name = "FAULT")]
+    without_fault: Vec<String>,
     /// Seed of the plant's dispersions instead of the recorded one.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -102,6 +109,7 @@ impl FlownHow {
                 Controller::Oscillating => Law::Oscillating,
             },
             seed: self.seed,
+            faults: FaultChanges { with: self.faults.clone(), without: self.without_fault.clone() },
         })
     }
 }

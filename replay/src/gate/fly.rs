@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Checked, Flown, Found, Outcome, campaign};
 use crate::log::Recording;
-use crate::refly::{ReflyOptions, margin, refly};
+use crate::refly::{ReflyOptions, StartAt, margin, refly};
 use crate::verify::{Verification, verify};
 
 /// What this build makes of a flight. Whatever is wrong is part of the outcome.
@@ -38,8 +38,9 @@ fn log(path: &Path) -> Outcome {
         }
     };
     let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
-        // From its first frame on: the whole flight is this build's.
-        refly(&recording, &ReflyOptions::default())
+        // From its first frame on, the whole flight is this build's. A planar landing begins with its first tick.
+        let start = recording.frames.first().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
+        refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
     });
     let flown = match again {
         Ok(report) => report.reflown.map(|verdict| Flown {

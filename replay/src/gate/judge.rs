@@ -20,7 +20,7 @@ pub enum Change {
     NowLands,
     /// It does not land any more.
     NoLongerLands,
-    /// Its recorded decisions are not made any more.
+    /// Its recorded decisions are not made any more, and it has the same margin.
     Diverged,
     /// It can no longer be verified or flown again.
     Lost,
@@ -47,7 +47,7 @@ impl Change {
     }
 
     /// Whether it fails the gate.
-    pub fn fails(self) -> bool {
+    fn fails(self) -> bool {
         matches!(self, Self::Worse | Self::NoLongerLands | Self::Diverged | Self::Lost | Self::Missing)
     }
 }
@@ -57,10 +57,22 @@ impl Change {
 pub struct Judged {
     pub name: String,
     pub change: Change,
+    /// The recorded decisions were made again and are not any more, whatever the margin.
+    pub newly_diverged: bool,
     /// Accepted earlier.
     pub before: Option<Outcome>,
     /// Now.
     pub now: Option<Outcome>,
+}
+
+impl Judged {
+    /// Whether it fails the gate; `may_diverge`: another build may decide differently as long as nothing gets worse.
+    pub fn fails(&self, may_diverge: bool) -> bool {
+        match self.change {
+            Change::Diverged => !may_diverge,
+            change => change.fails() || (self.newly_diverged && !may_diverge),
+        }
+    }
 }
 
 /// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same.
@@ -68,16 +80,28 @@ pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, toleranc
     let of_now = outcomes.iter().map(|(name, now)| {
         let before = baseline.flights.get(name);
         let change = before.map_or(Change::New, |before| change(before, now, tolerance));
-        Judged { name: name.clone(), change, before: before.cloned(), now: Some(now.clone()) }
+        let newly_diverged = now.checked == Checked::Diverged
+            && before.is_some_and(|before| before.checked == Checked::Identical);
+        Judged { name: name.clone(), change, newly_diverged, before: before.cloned(), now: Some(now.clone()) }
     });
     let missing = baseline.flights.iter().filter(|(name, _)| !outcomes.contains_key(*name));
     let missing = missing.map(|(name, before)| Judged {
         name: name.clone(),
         change: Change::Missing,
+        newly_diverged: false,
         before: Some(before.clone()),
         now: None,
     });
-    of_now.chain(missing).collect()
+    let mut judged: Vec<Judged> = of_now.chain(missing).collect();
+    judged.sort_by(|a, b| in_order(&a.name).cmp(&in_order(&b.name)));
+    judged
+}
+
+/// Flight 10 of a campaign comes after flight 9.
+fn in_order(name: &str) -> (&str, u64) {
+    let numbered =
+        name.rsplit_once('#').and_then(|(campaign, number)| Some((campaign, number.parse().ok()?)));
+    numbered.unwrap_or((name, 0))
 }
 
 fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
@@ -87,8 +111,8 @@ fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
         (false, true) => return Change::NowLands,
         _ => {}
     }
-    if before.checked == Checked::Identical && now.checked != Checked::Identical {
-        return if now.checked == Checked::Diverged { Change::Diverged } else { Change::Lost };
+    if before.checked == Checked::Identical && now.checked == Checked::Unverified {
+        return Change::Lost;
     }
     let margin = |outcome: &Outcome| outcome.flown.as_ref().and_then(Flown::margin);
     match (margin(before), margin(now)) {
@@ -96,6 +120,7 @@ fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
         (None, Some(_)) => Change::Better,
         (Some(then), Some(now)) if now < then - tolerance => Change::Worse,
         (Some(then), Some(now)) if now > then + tolerance => Change::Better,
+        _ if before.checked == Checked::Identical && now.checked == Checked::Diverged => Change::Diverged,
         _ => Change::Same,
     }
 }
@@ -109,30 +134,43 @@ mod tests {
         Outcome { checked, flown: Some(flown), problem: None }
     }
 
-    fn judged(before: Outcome, now: Outcome) -> Change {
+    fn judged(before: Outcome, now: Outcome) -> Judged {
         let named = |outcome| BTreeMap::from([("a".to_owned(), outcome)]);
-        judge(&named(now), &Baseline::of(named(before)), 0.02)[0].change
+        judge(&named(now), &Baseline::of(named(before)), 0.02).remove(0)
     }
 
     #[test]
     fn every_change_has_its_name_and_the_bad_ones_fail() {
         use Checked::{Diverged, Identical, Unverified};
         let before = outcome(Identical, true, 0.5);
+        // Whether it fails, and whether it does if the decisions may differ.
         for (now, expected, fails) in [
-            (outcome(Identical, true, 0.51), Change::Same, false),
-            (outcome(Identical, true, 0.6), Change::Better, false),
-            (outcome(Identical, true, 0.4), Change::Worse, true),
-            (outcome(Diverged, true, 0.6), Change::Diverged, true),
-            (outcome(Unverified, true, 0.6), Change::Lost, true),
-            (outcome(Identical, false, -0.1), Change::NoLongerLands, true),
+            (outcome(Identical, true, 0.51), Change::Same, [false, false]),
+            (outcome(Identical, true, 0.6), Change::Better, [false, false]),
+            (outcome(Identical, true, 0.4), Change::Worse, [true, true]),
+            (outcome(Diverged, true, 0.51), Change::Diverged, [true, false]),
+            (outcome(Diverged, true, 0.6), Change::Better, [true, false]),
+            (outcome(Diverged, true, 0.4), Change::Worse, [true, true]),
+            (outcome(Unverified, true, 0.6), Change::Lost, [true, true]),
+            (outcome(Identical, false, -0.1), Change::NoLongerLands, [true, true]),
         ] {
-            let change = judged(before.clone(), now);
-            assert_eq!((change, change.fails()), (expected, fails));
+            let judged = judged(before.clone(), now);
+            assert_eq!((judged.change, [false, true].map(|may| judged.fails(may))), (expected, fails));
         }
         let crashed = outcome(Diverged, false, -2.0);
-        assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)), Change::NowLands);
+        assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)).change, Change::NowLands);
         // A divergence that was accepted is no news.
-        assert_eq!(judged(crashed.clone(), crashed), Change::Same);
+        let same = judged(crashed.clone(), crashed);
+        assert_eq!((same.change, same.fails(false)), (Change::Same, false));
+    }
+
+    #[test]
+    fn flights_of_a_campaign_are_listed_by_their_number() {
+        let flights =
+            ["a#10", "a#9", "a.mcap"].map(|name| (name.to_owned(), outcome(Checked::Identical, true, 0.5)));
+        let judged = judge(&BTreeMap::from(flights), &Baseline::default(), 0.0);
+        let names: Vec<&str> = judged.iter().map(|judged| judged.name.as_str()).collect();
+        assert_eq!(names, ["a#9", "a#10", "a.mcap"]);
     }
 
     #[test]

@@ -33,6 +33,13 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
             writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
         }
     }
+    for (what, faults) in
+        [("with the fault", &report.faults.with), ("without the fault", &report.faults.without)]
+    {
+        if !faults.is_empty() {
+            writeln!(output, "{what} {}, from the beginning of the flight", shown(&faults.join(" ")))?;
+        }
+    }
     if let Some(seed) = report.seed {
         writeln!(output, "plant drawn with seed {seed} instead of the recorded one")?;
     }

@@ -11,6 +11,9 @@
 //! and compared with the record frame by frame on the way. From there on the changed settings apply to world and flight
 //! computer.
 //!
+//! Faults may be added and taken away ("would it have landed without the GNSS outage?"): then the flight is flown from
+//! its beginning with the other faults, and the settings apply from the start, as always.
+//!
 //! Settings change both controller and plant. Settings "of the plant" change the plant only, timed ones the controller
 //! only. An abort under thrust is flown if the record had it at the start; in a flight from apogee, the crew's abort
 //! comes at its recorded frame. Only a flight from apogee has wind (`truth.wind_m_s`); the planar plant has none.
@@ -85,6 +88,23 @@ pub struct ReflyOptions {
     pub law: Law,
     /// Seed of the plant's dispersions instead of the recorded seed.
     pub seed: Option<u64>,
+    /// Other faults than the recorded ones.
+    pub faults: FaultChanges,
+}
+
+/// How the faults of a flight differ from the recorded ones.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FaultChanges {
+    /// Faults that happen as well, as on the command line of a simulated flight.
+    pub with: Vec<String>,
+    /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for every one.
+    pub without: Vec<String>,
+}
+
+impl FaultChanges {
+    fn is_none(&self) -> bool {
+        self.with.is_empty() && self.without.is_empty()
+    }
 }
 
 /// Why a flight cannot be flown again.
@@ -122,6 +142,13 @@ pub enum ReflyError {
         /// The file.
         name: String,
         /// What is missing or unknown.
+        reason: String,
+    },
+    /// A fault cannot be added or left out.
+    #[error("{name}: {reason}")]
+    Fault {
+        /// The file.
+        name: String,
         reason: String,
     },
     /// The request applies only to another kind of flight.
@@ -174,6 +201,8 @@ pub struct ReflyReport {
     pub plant_settings: Vec<String>,
     /// The controller that flew.
     pub law: Law,
+    /// The faults that differ from the recorded ones, from the beginning of the flight on.
+    pub faults: FaultChanges,
     /// The seed of the plant's draw, if it is not the recorded one.
     pub seed: Option<u64>,
     pub start: StartState,
@@ -255,6 +284,7 @@ fn report(
         settings: options.settings.iter().map(ToString::to_string).collect(),
         plant_settings: options.plant_settings.iter().map(ToString::to_string).collect(),
         law: options.law,
+        faults: options.faults.clone(),
         seed: options.seed,
         start,
         reached: None,

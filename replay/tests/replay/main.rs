@@ -25,6 +25,7 @@ mod lost_frames;
 mod lost_samples;
 mod obstacles;
 mod one_verdict;
+mod other_faults;
 mod overwriting;
 mod pages;
 mod pilot;
