@@ -7,8 +7,9 @@
 //! a verdict are rows of a separate table.
 
 mod columns;
+mod dialect;
 mod mavlink;
 mod rows;
 
-pub use columns::{Column, Kind, TableShape};
+pub use columns::{Column, Kind, Meaning, TableShape};
 pub use rows::{Cell, Row, TableReader};

@@ -12,18 +12,20 @@ pub(super) fn html(flight: &Flight) -> String {
         Teller::Telemetry => "From the telemetry of a ground station; the log has neither plant nor ticks.",
         Teller::Nobody => return paragraph("The log has no positions of the vehicle."),
     };
-    let mut pictures = vec![path(flight)];
+    // Without a landing, the pictures of the whole flight show all there is of its path.
+    let lands = flight.from_apogee.is_none() || !flight.plans.is_empty();
+    let mut pictures = Vec::new();
+    if lands {
+        pictures.push(path(flight));
+    }
     pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));
     pictures.extend(flight.gimbal.iter().map(|axis| input(flight, axis)));
     let mut words = who.to_owned();
     if let Some(in_space) = &flight.from_apogee {
-        put(
-            &mut words,
-            format_args!(
-                " Seen in {}; the plans were made in air that moves over the ground.",
-                in_space.plane
-            ),
-        );
+        put(&mut words, format_args!(" Seen in {}.", in_space.plane));
+        if lands {
+            words.push_str(" The plans were made in air that moves over the ground.");
+        }
     }
     paragraph(&words) + &charts(&pictures)
 }
