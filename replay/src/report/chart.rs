@@ -300,4 +300,28 @@ mod tests {
         assert!(path(110.0).svg().starts_with("<figure class=\"tall\"><svg viewBox=\"0 0 520 800\""));
         assert!(path(5.0).svg().starts_with("<figure class=\"full\"><svg viewBox=\"0 0 1040 520\""));
     }
+
+    fn with_line(points: Vec<(f64, f64)>) -> Chart {
+        Chart { lines: vec![Line { name: "", class: "a", points }], ..Chart::default() }
+    }
+
+    /// Two samples that are far apart do not become a ramp between them.
+    #[test]
+    fn samples_that_are_far_apart_are_not_joined() {
+        let mut points: Vec<(f64, f64)> = (0..20).map(|k| (f64::from(k), f64::from(k % 3))).collect();
+        points.extend((100..120).map(|k| (f64::from(k), f64::from(k % 2))));
+        let svg = with_line(points).svg();
+        let path = svg.split("class=\"l a\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+        assert_eq!(path.matches('M').count(), 2, "{path}");
+    }
+
+    #[test]
+    fn a_line_that_says_nothing_is_not_drawn_and_a_sign_has_its_room() {
+        assert_eq!(with_line((0..9).map(|k| (f64::from(k), 4.0)).collect()).svg(), "");
+        let svg = with_line((0..9).map(|k| (f64::from(k), -1e-7 * f64::from(k))).collect()).svg();
+        let label = svg.split("text-anchor=\"end\">-").next().unwrap();
+        let x: f64 = label.rsplit("<text x=\"").next().unwrap().split('"').next().unwrap().parse().unwrap();
+        let digits = svg.split("text-anchor=\"end\">-").nth(1).unwrap().split('<').next().unwrap().len() + 1;
+        assert!(x > LETTER * digits as f64 - 4.0, "{digits} letters end at {x}");
+    }
 }
