@@ -12,6 +12,7 @@
 //! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
 //! * [`sweep`](mod@sweep): flies many flights with many settings and ranks them; finds the smallest change of a setting
 //!   that changes the verdict.
+//! * [`gate`]: holds a directory of flights against a baseline.
 //! * [`tick`](mod@tick): solves one recorded tick again.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
@@ -23,6 +24,7 @@ pub mod compare;
 pub mod controller;
 pub mod evaluate;
 pub mod export;
+pub mod gate;
 pub mod import;
 pub mod info;
 pub mod log;

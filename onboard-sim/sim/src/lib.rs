@@ -10,11 +10,13 @@
 //! * [`sortie`]: the flight itself.
 //! * [`outside`]: the input from the crew and the ground in one frame.
 //! * [`limits`]: what counts as a landing.
+//! * [`ending`]: how the flight ended, in words.
 //! * [`outcome`]: how the flight ended, judged by the limits of the legs and by the landing paper's Table 2.
 //! * [`plane`]: one flight of the landing paper's planar vehicle.
 
 pub mod dispersion;
 pub mod draw;
+pub mod ending;
 pub mod fault;
 pub mod limits;
 pub mod outcome;

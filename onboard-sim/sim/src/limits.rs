@@ -41,7 +41,7 @@ impl Limits {
             q_rad_s: touchdown.rate_rad_s,
             ..placed(touchdown)
         };
-        (state, LandingVerdict::judge(&self.legs, &state))
+        (state, in_words_of_the_legs(LandingVerdict::judge(&self.legs, &state)))
     }
 
     /// Judges by the landing paper's Table 2: velocities along and across the axis, and the rotation rate across it.
@@ -55,6 +55,18 @@ impl Limits {
         };
         (state, LandingVerdict::judge(&self.table_2, &state))
     }
+}
+
+/// The verdict with the names of what the legs feel: speeds over the ground, and angles without direction.
+fn in_words_of_the_legs(mut verdict: LandingVerdict) -> LandingVerdict {
+    let names = ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"];
+    for (result, name) in verdict.results.iter_mut().zip(names) {
+        result.name = name;
+        if name == "tilt" {
+            result.value = result.value.abs();
+        }
+    }
+    verdict
 }
 
 /// Distance and tilt. The altitude is that of the foot that touches the ground, so it is zero.

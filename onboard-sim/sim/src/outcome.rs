@@ -4,6 +4,8 @@ use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use world::{RestOutcome, Touchdown};
 
+use crate::ending::{FlightEnding, UNDER_PARACHUTE};
+
 /// Why a flight did not land: the first thing that went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Failure {
@@ -35,7 +37,7 @@ impl Failure {
         match self {
             Self::NoIgnition => "no ignition",
             Self::NoLight => "no light",
-            Self::Parachute => "parachute",
+            Self::Parachute => UNDER_PARACHUTE,
             Self::Vertical => "vertical speed",
             Self::Lateral => "lateral speed",
             Self::Tilt => "tilt",
@@ -62,6 +64,18 @@ pub struct Outcome {
     pub legs: bool,
     /// Why it was not within the limits of the legs, or not upright.
     pub failure: Option<Failure>,
+}
+
+impl Outcome {
+    /// How it ended, for people; `aborted`: an abort was latched.
+    pub fn ending(&self, aborted: bool) -> FlightEnding<'static> {
+        FlightEnding {
+            aborted,
+            landed: self.legs,
+            table_2: Some(self.strict),
+            failure: self.failure.map(Failure::name),
+        }
+    }
 }
 
 /// How a flight ended before it is judged.

@@ -12,9 +12,10 @@ use onboard_sim::fly::{
     FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
     log_header,
 };
-use onboard_sim::vehicle::{Judged, RocketFlight, VehicleEvent};
+use onboard_sim::vehicle::{RocketFlight, VehicleEvent};
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
+use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
@@ -217,14 +218,20 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
 
 fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    if let Some(judged) = &summary.judged {
-        let by = if summary.judged_by_table_2.is_some() { ", by the limits of the legs" } else { "" };
-        writeln!(out, "touchdown at {:.3} s{by}:", judged.impact.time_s)?;
-        print_limits(&mut out, judged)?;
-    }
-    if let Some(judged) = &summary.judged_by_table_2 {
-        writeln!(out, "by the landing paper's Table 2:")?;
-        print_limits(&mut out, judged)?;
+    if let (Some(judged), Some(verdict)) = (&summary.judged, &summary.verdict) {
+        let boot_s = judged.impact.time_s;
+        writeln!(out, "touchdown at T+{:.3} s, {boot_s:.3} s since power-up", verdict.time_s)?;
+        let in_space = !verdict.table_2.is_empty();
+        writeln!(
+            out,
+            "by {}:",
+            if in_space { "the limits of the legs" } else { "the landing paper's Table 2" }
+        )?;
+        print_limits(&mut out, &verdict.limits)?;
+        if in_space {
+            writeln!(out, "by the landing paper's Table 2:")?;
+            print_limits(&mut out, &verdict.table_2)?;
+        }
     }
     if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
         writeln!(
@@ -239,22 +246,15 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     if let Some([median, p99, worst]) = summary.lateness.quantiles() {
         writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
     }
-    match &summary.outcome {
-        FlightEnd::Landed if summary.judged_by_table_2.is_some_and(|judged| !judged.landed) => {
-            writeln!(out, "LANDED within the limits of the legs, outside a limit of Table 2")?;
+    let ending = summary.verdict.as_ref().and_then(|verdict| verdict.ending.as_deref());
+    match (&summary.outcome, ending) {
+        (FlightEnd::Refused(reason), _) => writeln!(out, "REFUSED: {reason}")?,
+        (_, Some(ending)) => writeln!(out, "{ending}")?,
+        (FlightEnd::Aborted, None) => writeln!(out, "ABORTED in {}", summary.phase.name())?,
+        (FlightEnd::Stopped, None) => writeln!(out, "STOPPED in {}", summary.phase.name())?,
+        (FlightEnd::Landed | FlightEnd::OutsideLimits, None) => {
+            writeln!(out, "NOT LANDED: it did not come down")?;
         }
-        FlightEnd::Landed => writeln!(out, "LANDED inside every limit")?,
-        FlightEnd::OutsideLimits => writeln!(out, "NOT LANDED: outside a limit")?,
-        FlightEnd::Aborted => {
-            let came_down = match summary.judged.as_ref().map(|judged| judged.landed) {
-                Some(true) => "; it LANDED inside its limits",
-                Some(false) => "; NOT LANDED inside its limits",
-                None => "",
-            };
-            writeln!(out, "ABORTED in {}{came_down}", summary.phase.name())?;
-        }
-        FlightEnd::Refused(reason) => writeln!(out, "REFUSED: {reason}")?,
-        FlightEnd::Stopped => writeln!(out, "STOPPED in {}", summary.phase.name())?,
     }
     Ok(())
 }
@@ -264,17 +264,17 @@ fn round(limit: f64) -> f64 {
     (1e9 * limit).round() / 1e9
 }
 
-fn print_limits(out: &mut impl std::io::Write, judged: &Judged) -> std::io::Result<()> {
-    for limit in &judged.verdict.results {
+fn print_limits(out: &mut impl std::io::Write, limits: &[LimitResult]) -> std::io::Result<()> {
+    for limit in limits {
         let mark = if limit.passed { "ok  " } else { "FAIL" };
         writeln!(
             out,
-            "  {mark} {:<12} {:9.4} {:<5} (limit {} to {})",
+            "  {mark} {:<14} {:9.4} {:<5} (limit {} to {})",
             limit.name,
             limit.value,
             limit.unit,
-            round(limit.lowest),
-            round(limit.highest)
+            round(limit.minimum),
+            round(limit.maximum)
         )?;
     }
     Ok(())

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use flight::rules::phase::Phase;
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
+use protocol::log::v1::LandingVerdict;
 use protocol::transport::LinkAddress;
 use sim::recipe::RecipeError;
 use tokio::sync::watch;
@@ -190,8 +191,8 @@ pub struct FlightSummary {
     pub outcome: FlightEnd,
     /// Contact and its verdict, if there was one.
     pub judged: Option<Judged>,
-    /// The verdict by the landing paper's Table 2, if `judged` goes by the limits of the legs.
-    pub judged_by_table_2: Option<Judged>,
+    /// The verdict as it is in the log: every limit, and how the flight ended. Its time counts from the release.
+    pub verdict: Option<LandingVerdict>,
     /// Last phase.
     pub phase: Phase,
     /// Simulated time, s.
@@ -315,6 +316,9 @@ pub async fn fly_observed(
         }
     };
     links.close(vehicle.time_s());
+    if let Some(reason) = &own_start.refused {
+        note(options.recorder.as_ref(), vehicle.time_s(), &format!("REFUSED: {reason}"));
+    }
     let outcome = match (vehicle.judged().map(|judged| judged.landed), own_start.refused) {
         // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,
@@ -327,7 +331,7 @@ pub async fn fly_observed(
     Ok(FlightSummary {
         outcome,
         judged: vehicle.judged(),
-        judged_by_table_2: vehicle.judged_by_table_2(),
+        verdict: vehicle.verdict_record(),
         phase: vehicle.phase(),
         time_s: vehicle.time_s(),
         solve_times,

@@ -56,7 +56,10 @@ impl Vehicle {
         let Judged { impact, verdict, .. } = self.judged()?;
         match &self.flight {
             Flight::Space(space) => tick_log::sortie::verdict(&space.sortie),
-            Flight::Plane(_) => Some(tick_log::verdict_to_log(impact.time_s, &impact.state, &verdict)),
+            Flight::Plane(_) => Some(v1::LandingVerdict {
+                ending: Some(tick_log::ending_in_plane(&verdict, self.aborted()).to_string()),
+                ..tick_log::verdict_to_log(impact.time_s, &impact.state, &verdict)
+            }),
         }
     }
 }

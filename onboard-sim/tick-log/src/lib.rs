@@ -17,6 +17,7 @@ use flight::rules::phase::Phase;
 use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::dynamics::PlanarState;
 use protocol::log::v1;
+use sim::ending::FlightEnding;
 use sim::plane::PlanarFlight;
 
 /// Why a recorded tick cannot be given to this build's controller.
@@ -140,6 +141,24 @@ pub fn tick_to_log(
 
 /// A landing verdict as a record: the state at contact, and each limit with its result.
 pub fn verdict_to_log(time_s: f64, state: &PlanarState, verdict: &LandingVerdict) -> v1::LandingVerdict {
+    v1::LandingVerdict {
+        time_s,
+        state: state_to_log(state),
+        limits: limits_to_log(verdict),
+        landed: verdict.landed(),
+        table_2: Vec::new(),
+        ending: Some(ending_in_plane(verdict, false).to_string()),
+    }
+}
+
+/// How a planar landing ended: its limits are Table 2.
+pub fn ending_in_plane(verdict: &LandingVerdict, aborted: bool) -> FlightEnding<'static> {
+    let failure = verdict.failures().next().map(|limit| limit.name);
+    FlightEnding { aborted, landed: verdict.landed(), table_2: Some(verdict.landed()), failure }
+}
+
+/// Each limit with its result, as records.
+fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
     let limits = verdict.results.iter().map(|result| v1::LimitResult {
         name: result.name.to_owned(),
         value: result.value,
@@ -148,12 +167,7 @@ pub fn verdict_to_log(time_s: f64, state: &PlanarState, verdict: &LandingVerdict
         unit: result.unit.to_owned(),
         passed: result.passed,
     });
-    v1::LandingVerdict {
-        time_s,
-        state: state_to_log(state),
-        limits: limits.collect(),
-        landed: verdict.landed(),
-    }
+    limits.collect()
 }
 
 fn plan_to_log(plan: &Plan) -> v1::Plan {

@@ -13,6 +13,7 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::{Dispersion, DispersionError};
+use sim::limits::Limits;
 use sim::outcome::Failure;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -136,36 +137,32 @@ pub fn frame_and_phase(flight: &Sortie, phase: Phase) -> Vec<Record> {
     records
 }
 
-/// The verdict on a finished flight, by the limits of its legs; `None` if it did not come down. Any other failure (a
-/// parachute, tipping over) is an additional limit that allows nothing.
+/// The verdict on a finished flight, by the limits of its legs and by the landing paper's Table 2; `None` if it did not
+/// come down. Any other failure (a parachute, tipping over) is an additional limit that allows nothing.
 pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
-    let legs = &flight.mission().leg_limits;
-    let limit = |name: &str, value: f64, maximum: f64, lowest: f64, unit: &str| v1::LimitResult {
-        name: name.to_owned(),
-        value,
-        minimum: lowest * maximum,
-        maximum,
-        unit: unit.to_owned(),
-        passed: value.abs() <= maximum,
-    };
-    let (tilt_deg, rate_deg_s) = (touchdown.tilt_rad.to_degrees(), touchdown.rate_rad_s.to_degrees());
-    let mut limits = vec![
-        limit(Failure::Vertical.name(), touchdown.vertical_m_s, legs.vertical_m_s, -1.0, "m/s"),
-        limit(Failure::Lateral.name(), touchdown.lateral_m_s, legs.lateral_m_s, -1.0, "m/s"),
-        limit(Failure::Tilt.name(), tilt_deg, legs.tilt_deg, -1.0, "deg"),
-        limit(Failure::Rate.name(), rate_deg_s, legs.rate_deg_s, -1.0, "deg/s"),
-    ];
+    let both = Limits::of(flight.mission());
+    let mut limits = crate::limits_to_log(&both.by_legs(touchdown).1);
     let of_legs = [Failure::Vertical, Failure::Lateral, Failure::Tilt, Failure::Rate];
     if let Some(failure) = outcome.failure.filter(|failure| !of_legs.contains(failure)) {
-        limits.push(limit(failure.name(), 1.0, 0.0, 0.0, ""));
+        limits.push(v1::LimitResult {
+            name: failure.name().to_owned(),
+            value: 1.0,
+            minimum: 0.0,
+            maximum: 0.0,
+            unit: String::new(),
+            passed: false,
+        });
     }
+    let aborted = flight.computer().mode().interlocks.abort_latched;
     Some(v1::LandingVerdict {
         time_s: touchdown.time_s,
         state: crate::state_to_log(&in_world_plane(flight, touchdown)),
         limits,
         landed: outcome.legs,
+        table_2: crate::limits_to_log(&both.by_table_2(touchdown).1),
+        ending: Some(outcome.ending(aborted).to_string()),
     })
 }
 

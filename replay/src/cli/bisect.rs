@@ -10,7 +10,7 @@ use replay::refly::StartAt;
 use replay::sweep::{BisectOptions, bisect};
 
 use super::refly::FlownHow;
-use super::{Answer, answer, warn_of_what_is_missing};
+use super::{Answer, answer, stop_on_interrupt, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -55,7 +55,8 @@ impl Ask {
             steps: self.steps,
             refly: self.how.options(StartAt::Landing)?,
         };
-        let report = bisect(&recording, &options)?;
+        let stop = stop_on_interrupt()?;
+        let report = bisect(&recording, &options, &stop)?;
         answer(|output| if self.json { print_json(&report, output) } else { print_bisect(&report, output) })?;
         Ok(Answer::Given)
     }

@@ -4,6 +4,7 @@ mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod gate;
 mod import;
 mod info;
 mod recover;
@@ -15,6 +16,8 @@ mod tick;
 mod verify;
 
 use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
@@ -34,7 +37,8 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 /// Exit codes:
 ///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
-///      compare: more differs or is missing than is tolerated, or the verdicts differ
+///      compare: more differs or is missing than is tolerated, or the verdicts differ;
+///      gate: some flight got worse, lands no longer, diverged or is missing
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
@@ -73,6 +77,11 @@ enum Question {
     Sweep(sweep::Ask),
     /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
     Bisect(bisect::Ask),
+    /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
+    ///
+    /// One table (and one JUnit file) says which flights got better, worse, flipped between landed and not landed,
+    /// diverged or are missing. Exit code 0 if none got worse, 1 if some did, 2 without an answer.
+    Gate(gate::Ask),
     /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
@@ -92,6 +101,8 @@ enum Question {
 pub(crate) enum Answer {
     /// There is an answer.
     Given,
+    /// Some of the logs could not be read.
+    NotAll,
     /// A bit-for-bit comparison. If `strict`, it must cover the whole flight.
     Verified { outcome: Verification, strict: bool },
     /// A comparison within tolerances.
@@ -103,6 +114,7 @@ impl Answer {
         match self {
             Self::Given | Self::Compared { within: true } => 0,
             Self::Compared { within: false } => EXIT_NO,
+            Self::NotAll => EXIT_NO_ANSWER,
             Self::Verified { outcome, strict } => match outcome {
                 Verification::Identical => 0,
                 Verification::IdenticalReadablePart if !strict => 0,
@@ -124,6 +136,7 @@ impl Cli {
             Question::Tick(ask) => ask.run(),
             Question::Sweep(ask) => ask.run(),
             Question::Bisect(ask) => ask.run(),
+            Question::Gate(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
@@ -140,6 +153,20 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
     }
+}
+
+/// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second
+/// one ends the program.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::flag;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, i32::from(EXIT_NO_ANSWER), Arc::clone(&stop))
+            .and_then(|_| flag::register(signal, Arc::clone(&stop)))
+            .context("cannot wait for Ctrl-C")?;
+    }
+    Ok(stop)
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context as _, Result, anyhow};
 use clap::{Args, ValueEnum};
 use flight::rules::phase::Phase;
-use replay::log::Recording;
+use replay::log::{Clock, ClockTime, Recording};
 use replay::output::{Destination, Overwrite};
 use replay::print::{print_json, print_refly};
-use replay::refly::{From, Law, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::refly::{FaultChanges, From, Law, ReflyOptions, StartAt, refly_flight, write_log};
 use replay::settings::Setting;
 
 use super::settings::SettingArguments;
@@ -23,9 +23,10 @@ pub(super) struct Ask {
     /// Begin at this tick (for a flight from apogee: this frame) instead of the landing's first.
     #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase"])]
     tick: Option<u64>,
-    /// Begin at this vehicle time, s.
-    #[arg(long, value_name = "SECONDS", conflicts_with = "phase")]
-    at: Option<f64>,
+    /// Begin at this time in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8
+    /// (since power-up), log:19.7 (since the first record).
+    #[arg(long, value_name = "TIME", conflicts_with = "phase")]
+    at: Option<ClockTime>,
     /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; for a flight from apogee any phase.
     #[arg(long, value_name = "PHASE", value_parser = phase_named)]
     phase: Option<Phase>,
@@ -56,6 +57,13 @@ pub(super) struct FlownHow {
     /// The controller that flies.
     #[arg(long, value_enum, default_value_t = Controller::AsRecorded)]
     controller: Controller,
+    /// Flights in space: another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
+    /// flown with it from its beginning.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<String>,
+    /// Flights in space: leave out a recorded fault, by its name or in full; `all` for every one.
+    #[arg(long, value_name = "FAULT")]
+    without_fault: Vec<String>,
     /// Seed of the plant's dispersions instead of the recorded one.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -101,19 +109,20 @@ impl FlownHow {
                 Controller::Oscillating => Law::Oscillating,
             },
             seed: self.seed,
+            faults: FaultChanges { with: self.faults.clone(), without: self.without_fault.clone() },
         })
     }
 }
 
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
+        let recording = Recording::open(&self.file)?;
         let start = match (self.tick, self.at, self.phase) {
             (Some(tick), ..) => StartAt::Tick(tick),
-            (_, Some(time_s), _) => StartAt::Time(time_s),
+            (_, Some(time), _) => StartAt::Time(flight_time_s(&recording, time)?),
             (.., Some(phase)) => StartAt::Phase(phase),
             _ => StartAt::Landing,
         };
-        let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let options = self.how.options(start)?;
         let (report, flight) = refly_flight(&recording, &options)?;
@@ -124,6 +133,14 @@ impl Ask {
         answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
         Ok(Answer::Given)
     }
+}
+
+fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
+    let converted = recording.clocks.convert(time, Clock::Flight);
+    let name = &recording.name;
+    converted.map(|time| time.time_s).with_context(|| {
+        format!("--at {time}: {name} does not say when its T+0 was on that clock; give the time as T+SECONDS")
+    })
 }
 
 fn phase_named(given: &str) -> Result<Phase> {

@@ -8,11 +8,11 @@ use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 use replay::log::Recording;
 use replay::print::{print_json, print_sweep, print_sweep_csv};
-use replay::refly::StartAt;
+use replay::refly::{ReflyError, StartAt, can_be_flown};
 use replay::sweep::{Choice, Progress, State, Vary, grid, random, sweep};
 
 use super::refly::FlownHow;
-use super::{Answer, answer, warn_of_what_is_missing};
+use super::{Answer, answer, say, warn_of_what_is_missing};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -64,10 +64,17 @@ impl Ask {
         let options = self.how.options(StartAt::Landing)?;
         let mut flights = Vec::new();
         for file in &self.files {
-            let flight = Recording::open(file)?;
-            warn_of_what_is_missing(&flight);
-            flights.push(flight);
+            let opened = Recording::open(file).map_err(ReflyError::from);
+            match opened.and_then(|flight| can_be_flown(&flight).map(|()| flight)) {
+                Ok(flight) => {
+                    warn_of_what_is_missing(&flight);
+                    flights.push(flight);
+                }
+                Err(error) if self.files.len() == 1 => return Err(error.into()),
+                Err(error) => say(&format!("skipped: {:#}", anyhow::Error::from(error))),
+            }
         }
+        ensure!(!flights.is_empty(), "none of the {} logs can be flown again", self.files.len());
         let all_jobs = points.len() * flights.len();
         let mut state = match &self.state {
             None => State::in_memory(all_jobs),

@@ -63,8 +63,11 @@ impl Align {
         Ok(of(baseline)? - of(other)?)
     }
 
-    /// On ignition if both flights have one, else on time.
+    /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.
     pub fn best_for(baseline: &Flown, other: &Flown) -> Self {
+        if baseline.only_one_has_ticks(other) {
+            return Self::Time;
+        }
         let both = baseline.anchors.ignition_s.is_some() && other.anchors.ignition_s.is_some();
         if both { Self::Ignition } else { Self::Time }
     }

@@ -4,6 +4,9 @@
 //! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
 //! one flight has are counted separately, because interpolation would hide a lost record.
+//!
+//! The log of a ground station has no ticks. It is compared with the vehicle's own log by the MAVLink messages that
+//! both have, over the vehicle's time in them.
 
 mod align;
 mod difference;
@@ -83,17 +86,21 @@ pub fn compare(
     tolerances: &Tolerances,
 ) -> Result<Comparison, CompareError> {
     let shift_s = align.shift_s(baseline, other)?;
-    let names = |flown: &Flown| flown.signals.keys().cloned().collect::<Vec<String>>();
-    let (ours, theirs) = (names(baseline), names(other));
+    let over_the_air = baseline.only_one_has_ticks(other);
+    let (a, b) = if over_the_air {
+        (&baseline.over_the_air, &other.over_the_air)
+    } else {
+        (&baseline.signals, &other.signals)
+    };
+    let (ours, theirs): (Vec<String>, Vec<String>) =
+        (a.keys().cloned().collect(), b.keys().cloned().collect());
     tolerances.check_names(&ours.iter().chain(&theirs))?;
-    let missing: Vec<String> =
-        ours.iter().filter(|name| !other.signals.contains_key(*name)).cloned().collect();
-    let added: Vec<String> =
-        theirs.iter().filter(|name| !baseline.signals.contains_key(*name)).cloned().collect();
+    let missing: Vec<String> = ours.iter().filter(|name| !b.contains_key(*name)).cloned().collect();
+    let added: Vec<String> = theirs.iter().filter(|name| !a.contains_key(*name)).cloned().collect();
     let mut signals = Vec::new();
-    for (name, a) in &baseline.signals {
-        if let Some(b) = other.signals.get(name) {
-            signals.push(SignalDifference::of(name, a, b, shift_s, tolerances.of(name)));
+    for (name, ours) in a {
+        if let Some(theirs) = b.get(name) {
+            signals.push(SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name)));
         }
     }
     let mut failures = tolerances.record_failures([baseline, other]);

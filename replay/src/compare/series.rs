@@ -5,14 +5,21 @@ use std::path::Path;
 
 use super::Anchors;
 use crate::info::VerdictFacts;
-use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError};
+use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts};
 use crate::table::{Cell, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
 
+/// Begins the names of the tables of MAVLink messages.
+const MESSAGES: &str = "mavlink_";
+/// The vehicle's time in them, ms since power-up.
+const TIME_BOOT_MS: &str = "time_boot_ms";
+
 /// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
-const NO_SIGNALS: [&str; 10] = [
+const NO_SIGNALS: [&str; 12] = [
+    TIME_BOOT_MS,
+    "frame_sequence",
     "log_time_ns",
     "time_s",
     "input.time_s",
@@ -63,6 +70,10 @@ pub struct Flown {
     pub name: String,
     /// The signals, by name.
     pub signals: BTreeMap<String, Series>,
+    /// The numbers in MAVLink messages that carry the vehicle's time, over that time (since power-up).
+    pub over_the_air: BTreeMap<String, Series>,
+    /// The log has what the vehicle decided, not only what was heard of it.
+    pub has_ticks: bool,
     /// Events to align on.
     pub anchors: Anchors,
     /// The landing verdict.
@@ -76,22 +87,28 @@ pub struct Flown {
 }
 
 impl Flown {
+    /// Whether only one of two logs has what the vehicle decided: then they are compared by what went over the air.
+    pub(super) fn only_one_has_ticks(&self, other: &Self) -> bool {
+        self.has_ticks != other.has_ticks
+    }
+
     /// Reads a log file.
     ///
     /// # Errors
     /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut anchors = Anchors::default();
-        let mut verdict = None;
+        let mut verdicts = Verdicts::default();
+        let mut has_ticks = false;
         let mut log = FlightLog::open(path)?;
         let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
             flights.note(&stamped.entry);
-            match &stamped.entry {
-                Entry::Verdict(found) => verdict = Some(VerdictFacts::of(found)),
-                entry => anchors.note(entry),
-            }
+            verdicts.note(log.channel(stamped.channel_id), &stamped);
+            anchors.note(&stamped.entry);
+            has_ticks |= matches!(stamped.entry, Entry::Tick(_) | Entry::PilotTick(_));
         }
+        let verdict = verdicts.found().as_ref().map(VerdictFacts::found);
         let name = log.name().to_owned();
         if flights.flown() > 1 {
             return Err(RecordingError::SeveralFlights { name, flights: flights.flown() });
@@ -100,6 +117,7 @@ impl Flown {
         anchors.touchdown_s = verdict.as_ref().map(|verdict: &VerdictFacts| verdict.time_s);
 
         let mut signals: BTreeMap<String, Series> = BTreeMap::new();
+        let mut over_the_air: BTreeMap<String, Series> = BTreeMap::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
         let mut first_ns = None;
         let mut reader = TableReader::new();
@@ -110,7 +128,12 @@ impl Flown {
                 }
                 let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
                 let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
-                let time_s = time_of(shape, &row.cells).unwrap_or(since_s);
+                let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
+                    let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
+                    (&mut over_the_air, boot_s)
+                } else {
+                    (&mut signals, time_of(shape, &row.cells).unwrap_or(since_s))
+                };
                 for (column, cell) in shape.columns.iter().zip(&row.cells) {
                     let Some(value) = cell.number().filter(|_| !NO_SIGNALS.contains(&column.name.as_str()))
                     else {
@@ -135,7 +158,17 @@ impl Flown {
             })?;
         // Tables that mix kinds of rows, and texts, are not signals over time.
         signals.retain(|name, _| !name.starts_with("verdict") && !name.starts_with("events."));
-        Ok(Self { name, signals, anchors, verdict, damage, cut: flights.cut(), out_of_order })
+        Ok(Self {
+            name,
+            signals,
+            over_the_air,
+            has_ticks,
+            anchors,
+            verdict,
+            damage,
+            cut: flights.cut(),
+            out_of_order,
+        })
     }
 }
 
@@ -148,6 +181,12 @@ impl From<LogError> for Stopped {
     fn from(error: LogError) -> Self {
         Self::Log(error)
     }
+}
+
+/// The vehicle's time in a message, s since power-up.
+fn boot_time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
+    let place = shape.columns.iter().position(|column| column.name == TIME_BOOT_MS)?;
+    cells.get(place)?.number().map(|time_ms| time_ms / 1e3)
 }
 
 /// The vehicle time in the record, s.

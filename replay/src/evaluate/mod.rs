@@ -37,6 +37,15 @@ pub enum EvaluateError {
     /// A timed setting of the estimator, which is set up only once.
     #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
     TimedEstimator { setting: String },
+    /// A setting whose time comes after the last tick.
+    #[error("{setting}: takes effect after the end of {name}, whose last tick is at T+{last_s:.3} s")]
+    AfterTheEnd {
+        setting: String,
+        /// The file.
+        name: String,
+        /// Time of the last tick, s.
+        last_s: f64,
+    },
     /// A setting that the controller does not have.
     #[error(
         "{path} is not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
@@ -119,7 +128,16 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
         FlightKind::InSpace => frames(recording, settings),
         FlightKind::Planar => ticks(recording, settings),
     };
-    Ok(summarise(recording, settings, ticks?))
+    let ticks = ticks?;
+    let last_s = ticks.0.last().map_or(0.0, |tick| tick.time_s);
+    match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
+        Some(late) => Err(EvaluateError::AfterTheEnd {
+            setting: late.to_string(),
+            name: recording.name.clone(),
+            last_s,
+        }),
+        None => Ok(summarise(recording, settings, ticks)),
+    }
 }
 
 /// Evaluates the ticks of a planar landing.

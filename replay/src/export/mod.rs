@@ -6,6 +6,7 @@
 //! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
 mod csv;
+mod dictionary;
 mod parquet;
 mod tables;
 mod tlog;

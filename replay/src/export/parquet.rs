@@ -6,11 +6,13 @@ use std::sync::Arc;
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::Type;
 
 use super::ExportError;
+use super::dictionary::values;
 use crate::output::NewFile;
 use crate::table::{Cell, Column, Kind, Row, TableShape};
 
@@ -29,7 +31,10 @@ impl ParquetTable {
         let path = file.path().to_owned();
         let failed = |source| ExportError::Parquet { path: path.clone(), source };
         let schema = schema_of(shape).map_err(failed)?;
-        let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_key_value_metadata(Some(metadata_of(shape)))
+            .build();
         let writer =
             SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
         Ok(Self { path, columns: shape.columns.clone(), writer, held: Vec::new() })
@@ -106,6 +111,18 @@ fn write_column<'a, I: Iterator<Item = &'a Cell>>(
         }
     }
     Ok(())
+}
+
+/// The unit, the meaning and the words of each column: `COLUMN.unit`, `COLUMN.meaning`, `COLUMN.values`.
+fn metadata_of(shape: &TableShape) -> Vec<KeyValue> {
+    let mut metadata = Vec::new();
+    for Column { name, meaning, .. } in &shape.columns {
+        let facts =
+            [("unit", meaning.unit.clone()), ("meaning", meaning.words.clone()), ("values", values(meaning))];
+        let said = facts.into_iter().filter(|(_, text)| !text.is_empty());
+        metadata.extend(said.map(|(fact, text)| KeyValue::new(format!("{name}.{fact}"), text)));
+    }
+    metadata
 }
 
 fn schema_of(shape: &TableShape) -> Result<Type, ParquetError> {

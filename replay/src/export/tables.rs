@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::ExportError;
 use super::csv::CsvTable;
 use super::parquet::ParquetTable;
+use super::{ExportError, dictionary};
 use crate::log::FlightLog;
 use crate::output::{Destination, NewFile};
 use crate::table::{Row, TableReader, TableShape};
@@ -60,6 +60,16 @@ pub fn export_tables<'a, R: Read>(
     })?;
     let finished = open.into_values().map(|(file, table)| Ok((file, table.finish()?)));
     let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
+    let mut whole = whole;
+    if !whole.is_empty() {
+        let path = directory.path.join(dictionary::FILE);
+        let failed = |source| ExportError::Write { path: path.clone(), source };
+        let destination = Destination { path: &path, overwrite: directory.overwrite };
+        let file = NewFile::create(destination, &input).map_err(failed)?;
+        let shapes: Vec<&TableShape> = reader.shapes().iter().collect();
+        let (written, rows) = dictionary::write(file, &shapes)?;
+        whole.push((ExportedFile { path, rows, columns: dictionary::COLUMNS.len() }, written));
+    }
     let mut files = Vec::new();
     for (file, written) in whole {
         written.commit().map_err(|source| ExportError::Write { path: file.path.clone(), source })?;

@@ -1,24 +1,23 @@
 //! Builds telemetry records from the frames, as a ground station would know them.
 
-use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA};
+use protocol::dialect::MavMessage;
 use protocol::frame::Frame;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::text::Reassembler;
 use std::time::Duration;
 
+use crate::log::Heard;
+
 /// Shortest interval between telemetry records, s.
 const PERIOD_S: f64 = 0.1;
-
-/// A value of the verdict whose limit no message has given.
-const NOT_TOLD: f64 = f64::NAN;
 
 #[derive(Default)]
 pub(super) struct Fold {
     known: v1::Telemetry,
     changed: bool,
     written_at_s: Option<f64>,
-    limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
+    heard: Heard,
     judged: bool,
     texts: Reassembler,
 }
@@ -30,6 +29,7 @@ impl Fold {
             return Vec::new();
         };
         let mut records = Vec::new();
+        self.heard.take(&message);
         match &message {
             MavMessage::STATUSTEXT(chunk) => {
                 let now = Duration::from_secs_f64(time_s.max(0.0));
@@ -43,11 +43,9 @@ impl Fold {
                     Record::Event(Event { level, name: "vehicle".to_owned(), message: text.text })
                 }));
             }
-            MavMessage::TD_TOUCHDOWN_LIMITS(limits) => self.limits = Some(limits.clone()),
-            MavMessage::TD_LANDING_VERDICT(verdict) if !self.judged => {
+            MavMessage::TD_LANDING_VERDICT(_) if !self.judged => {
                 self.judged = true;
-                let record = verdict_record(verdict, self.limits.as_ref());
-                records.push(Record::LandingVerdict(Box::new(record)));
+                records.extend(self.heard.verdict().map(|verdict| Record::LandingVerdict(Box::new(verdict))));
             }
             message => self.changed |= self.note(message),
         }
@@ -103,66 +101,5 @@ impl Fold {
             _ => return false,
         }
         true
-    }
-}
-
-fn verdict_record(
-    verdict: &TD_LANDING_VERDICT_DATA,
-    limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>,
-) -> v1::LandingVerdict {
-    let broken = verdict.limits_violated.bits();
-    let told =
-        |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| limits.map_or(NOT_TOLD, |all| f64::from(limit(all)));
-    let degrees = |angle_rad: f64| angle_rad.to_degrees();
-    let upright_rad = f64::from(verdict.pitch_rad) - core::f64::consts::FRAC_PI_2;
-    // In the order of the verdict's bits.
-    let rows: [(&str, &str, f64, f64, f64); 6] = [
-        ("x", "m", f64::from(verdict.x_m), -told(|l| l.x_m), told(|l| l.x_m)),
-        (
-            "altitude",
-            "m",
-            f64::from(verdict.altitude_m),
-            told(|l| l.altitude_min_m),
-            told(|l| l.altitude_max_m),
-        ),
-        (
-            "pitch error",
-            "deg",
-            degrees(upright_rad),
-            -degrees(told(|l| l.pitch_error_rad)),
-            degrees(told(|l| l.pitch_error_rad)),
-        ),
-        ("u", "m/s", f64::from(verdict.u_m_s), -told(|l| l.u_m_s), told(|l| l.u_m_s)),
-        ("w", "m/s", f64::from(verdict.w_m_s), -told(|l| l.w_m_s), told(|l| l.w_m_s)),
-        (
-            "pitch rate",
-            "deg/s",
-            degrees(f64::from(verdict.q_rad_s)),
-            -degrees(told(|l| l.q_rad_s)),
-            degrees(told(|l| l.q_rad_s)),
-        ),
-    ];
-    let limit = |(place, (name, unit, value, minimum, maximum)): (usize, (&str, &str, f64, f64, f64))| {
-        v1::LimitResult {
-            name: name.to_owned(),
-            value,
-            minimum,
-            maximum,
-            unit: unit.to_owned(),
-            passed: broken & (1 << place) == 0,
-        }
-    };
-    v1::LandingVerdict {
-        time_s: f64::from(verdict.time_boot_ms) / 1e3,
-        state: v1::PlanarState {
-            x_m: f64::from(verdict.x_m),
-            z_m: f64::from(verdict.altitude_m),
-            theta_rad: f64::from(verdict.pitch_rad),
-            u_m_s: f64::from(verdict.u_m_s),
-            w_m_s: f64::from(verdict.w_m_s),
-            q_rad_s: f64::from(verdict.q_rad_s),
-        },
-        limits: rows.into_iter().enumerate().map(limit).collect(),
-        landed: verdict.landed != 0,
     }
 }

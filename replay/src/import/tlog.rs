@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use protocol::frame::{Frame, Framer};
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::tlog::{TlogFrame, TlogReader};
 use protocol::log::writer::{LogHeader, LogWriteError};
 use serde::Serialize;
 
 use super::fold::Fold;
-use crate::log::{NewLog, NewLogError};
+use crate::log::{NewLog, NewLogError, frame_of};
 use crate::output::Destination;
 
 /// System id of a ground station, by convention.
@@ -109,7 +108,7 @@ pub fn import_tlog<'a>(
     while let Some(TlogFrame { time_us, bytes }) = next {
         let since_us = time_us.saturating_sub(start_us);
         let time_ns = since_us.saturating_mul(1000);
-        let understood = understood(&bytes);
+        let understood = frame_of(&bytes);
         imported.frames += 1;
         imported.not_understood += u64::from(understood.is_none());
         let source = bytes.get(5).copied();
@@ -132,11 +131,4 @@ pub fn import_tlog<'a>(
     imported.garbage_bytes = frames.garbage_bytes();
     log.finish().map_err(failed)?;
     Ok(imported)
-}
-
-/// The message, if the checksum is right and the dialect has this message.
-fn understood(bytes: &[u8]) -> Option<Frame> {
-    let mut framer = Framer::new();
-    framer.push_datagram(bytes);
-    framer.next_frame()
 }

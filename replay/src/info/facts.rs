@@ -5,9 +5,13 @@ use std::collections::BTreeMap;
 use protocol::log::reader::Damage;
 use protocol::log::v1;
 use serde::Serialize;
+use sim::ending::FlightEnding;
 
 use super::{ChannelFacts, FrameFacts, PhaseTimeline, TickFacts};
-use crate::log::{AttachmentFacts, BuildComparison, Cut, Flights, Head, SummaryFacts};
+use crate::log::{
+    AttachmentFacts, BuildComparison, Clock, ClockTime, Clocks, Cut, Flights, Found, Head, SummaryFacts,
+};
+use crate::settings::explained;
 
 /// What is in a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -40,6 +44,10 @@ pub struct Info {
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
     pub verdict: Option<VerdictFacts>,
+    /// How the flight ended, in one sentence, if the log says so.
+    pub ending: Option<String>,
+    /// How the clocks of the log differ.
+    pub clocks: Clocks,
     /// Why the first unreadable record could not be read.
     pub unreadable: Option<String>,
     /// Whether anything is missing.
@@ -134,10 +142,13 @@ impl ProfileFacts {
             Ok(text) => vehicles::profile::from_toml(text, "profile.toml")
                 .map(|profile| (profile.name, profile.summary))
                 .or_else(|error| {
-                    // Try the other kind of profile; if it is neither, report the first error.
+                    // Try the other kind of profile; only a mission has an airframe.
                     vehicles::mission::from_toml(text, "profile.toml")
                         .map(|mission| (mission.name, mission.summary))
-                        .map_err(|_neither| error.to_string())
+                        .map_err(|as_mission| {
+                            let of_mission = text.contains("airframe");
+                            explained(&if of_mission { as_mission.to_string() } else { error.to_string() })
+                        })
                 }),
             Err(error) => Err(error.to_string()),
         };
@@ -218,14 +229,21 @@ impl Completeness {
     }
 }
 
-/// The landing verdict, as recorded.
+/// The landing verdict, as recorded or heard.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictFacts {
-    /// Whether the vehicle landed inside every limit.
+    /// Whether the vehicle landed within the limits that decide.
     pub landed: bool,
-    /// Vehicle time of contact, s.
+    /// How the flight ended, in one sentence.
+    pub ending: String,
+    /// Time of contact, s.
     pub time_s: f64,
+    /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
+    pub clock: Clock,
+    /// The limits that decide: those of the legs, or of a planar landing.
     pub limits: Vec<VerdictLimit>,
+    /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
+    pub table_2: Vec<VerdictLimit>,
 }
 
 /// A limit of the landing verdict.
@@ -247,16 +265,51 @@ pub struct VerdictLimit {
 impl VerdictFacts {
     /// A recorded verdict.
     pub fn of(verdict: &v1::LandingVerdict) -> Self {
-        let limits = verdict.limits.iter().map(|limit| VerdictLimit {
-            name: limit.name.clone(),
-            value: limit.value,
-            minimum: limit.minimum,
-            maximum: limit.maximum,
-            unit: limit.unit.clone(),
-            passed: limit.passed,
-        });
-        Self { landed: verdict.landed, time_s: verdict.time_s, limits: limits.collect() }
+        let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
+            let limits = limits.iter().map(|limit| VerdictLimit {
+                name: limit.name.clone(),
+                value: limit.value,
+                minimum: limit.minimum,
+                maximum: limit.maximum,
+                unit: limit.unit.clone(),
+                passed: limit.passed,
+            });
+            limits.collect()
+        };
+        Self {
+            landed: verdict.landed,
+            ending: verdict.ending.clone().unwrap_or_else(|| ending_of_earlier(verdict)),
+            time_s: verdict.time_s,
+            clock: Clock::Flight,
+            limits: facts(&verdict.limits),
+            table_2: facts(&verdict.table_2),
+        }
     }
+
+    /// The verdict that was found in a log.
+    pub(crate) fn found(found: &Found) -> Self {
+        let clock = if found.heard { Clock::Boot } else { Clock::Flight };
+        Self { clock, ..Self::of(&found.verdict) }
+    }
+
+    /// Its time of contact with its clock.
+    pub fn contact(&self) -> ClockTime {
+        ClockTime { clock: self.clock, time_s: self.time_s }
+    }
+}
+
+/// How a flight ended whose log, of an earlier release, does not say it.
+fn ending_of_earlier(verdict: &v1::LandingVerdict) -> String {
+    // The limits of a planar landing are Table 2; those of legs have other names.
+    let in_plane = verdict.limits.iter().any(|limit| limit.name == "u");
+    let broken = verdict.limits.iter().rev().find(|limit| !limit.passed);
+    FlightEnding {
+        aborted: false,
+        landed: verdict.landed,
+        table_2: in_plane.then_some(verdict.landed),
+        failure: broken.map(|limit| limit.name.as_str()),
+    }
+    .to_string()
 }
 
 fn seconds(ns: u64) -> f64 {

@@ -1,6 +1,7 @@
 //! Describes a log: its content, how complete it is, and what can be done with it.
 
 mod channels;
+mod ending;
 mod facts;
 mod frames;
 mod phases;
@@ -20,10 +21,10 @@ use std::io::Read;
 use std::path::Path;
 
 use protocol::log::record::SCHEMA_VERSION;
-use protocol::log::v1;
 
-use crate::log::{Entry, FlightLog, Flights, LogError, SummaryFacts, summary_of};
+use crate::log::{Clocks, Entry, FlightLog, Flights, LogError, SummaryFacts, Verdicts, summary_of};
 use channels::ChannelCounter;
+use ending::EndingTracker;
 use frames::FrameCounter;
 use phases::PhaseTracker;
 use ticks::TickCounter;
@@ -55,6 +56,12 @@ pub fn info_of<R: Read>(
             Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
         });
         seen.flights.note(&stamped.entry);
+        let channel = log.channel(stamped.channel_id);
+        let first_ns = *seen.first_ns.get_or_insert(stamped.log_time_ns);
+        let since_s = stamped.log_time_ns.saturating_sub(first_ns) as f64 / 1e9;
+        seen.clocks.note(channel, &stamped, since_s);
+        seen.verdicts.note(channel, &stamped);
+        seen.ending.note(&stamped.entry);
         seen.take(stamped.entry, stamped.sequence);
     }
     Ok(seen.into_info(log, summary))
@@ -69,7 +76,10 @@ struct Seen {
     ticks: TickCounter,
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
-    verdict: Option<v1::LandingVerdict>,
+    first_ns: Option<u64>,
+    clocks: Clocks,
+    verdicts: Verdicts,
+    ending: EndingTracker,
     frames: FrameCounter,
     unreadable: Option<String>,
 }
@@ -87,7 +97,6 @@ impl Seen {
                     self.telemetry_phases.note(telemetry.time_s, phase);
                 }
             }
-            Entry::Verdict(verdict) => self.verdict = Some(*verdict),
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
@@ -99,6 +108,7 @@ impl Seen {
             }
             Entry::ComputerStart(_)
             | Entry::ComputerFrame(_)
+            | Entry::Verdict(_)
             | Entry::World(_)
             | Entry::RawFrame
             | Entry::Operator
@@ -116,6 +126,7 @@ impl Seen {
         let channels = self.channels.into_facts(log.channels());
         let completeness = Completeness::new(log.damage(), span.as_ref(), ticks.as_ref(), &channels, summary);
         let completeness = completeness.with_flights(&self.flights);
+        let verdict = self.verdicts.found().as_ref().map(VerdictFacts::found);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
         Info {
@@ -139,7 +150,9 @@ impl Seen {
                 .into_iter()
                 .filter_map(|(source, tracker)| tracker.into_timeline(source))
                 .collect(),
-            verdict: self.verdict.as_ref().map(VerdictFacts::of),
+            ending: self.ending.words(verdict.as_ref()),
+            verdict,
+            clocks: self.clocks,
             unreadable: self.unreadable,
             completeness,
             attachments: head.attachments.clone(),

@@ -3,11 +3,13 @@
 //! Records are streamed, so memory does not grow with the log. Damage ends the stream and can then be queried
 //! ([`FlightLog::damage`]); every record before the damage has been returned.
 
+mod clocks;
 mod entry;
 mod error;
 mod flights;
 mod frame_order;
 mod head;
+mod heard;
 mod new_log;
 mod recording;
 mod schema;
@@ -15,11 +17,13 @@ mod summary;
 mod tick_order;
 mod tick_ranges;
 
+pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
 pub use flights::{Cut, FlightKind, Flights, LoggedFlight};
 pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
+pub(crate) use heard::{Found, Heard, Verdicts, frame_of};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
 pub(crate) use schema::{computer_descriptor, pilot_descriptor, tick_descriptor};

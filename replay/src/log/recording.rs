@@ -9,7 +9,9 @@ use flight::vehicle::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::{Cut, Entry, FlightKind, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
+use super::heard::Verdicts;
+use super::{Clocks, Cut, Entry, FlightKind, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
+use crate::settings::explained;
 
 /// Most records of one kind: five hours of ticks at 10 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -113,8 +115,12 @@ pub struct Recording {
     pub telemetry: Vec<v1::Telemetry>,
     /// Events, with log time in seconds after the first record.
     pub events: Vec<(f64, EventRecord)>,
-    /// The last landing verdict.
+    /// The landing verdict, recorded or heard.
     pub verdict: Option<v1::LandingVerdict>,
+    /// A ground station heard the verdict: its time counts from power-up.
+    pub verdict_heard: bool,
+    /// How the clocks of the log differ.
+    pub clocks: Clocks,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
@@ -140,10 +146,14 @@ impl Recording {
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
         let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
         let mut flights = Flights::default();
+        let mut verdicts = Verdicts::default();
         let (mut first_ns, mut frame_order, mut frames_lost) = (None, FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
             let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
             flights.note(&stamped.entry);
+            let channel = log.channel(stamped.channel_id);
+            recording.clocks.note(channel, &stamped, since_ns as f64 / 1e9);
+            verdicts.note(channel, &stamped);
             match stamped.entry {
                 Entry::Tick(mut tick) => {
                     tick.output.plan.states = Vec::new();
@@ -155,7 +165,6 @@ impl Recording {
                 Entry::Truth(truth) => recording.truth.push(*truth),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
                 Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
-                Entry::Verdict(verdict) => recording.verdict = Some(*verdict),
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
@@ -171,6 +180,7 @@ impl Recording {
                 }
                 Entry::ComputerStart(_)
                 | Entry::ComputerFrame(_)
+                | Entry::Verdict(_)
                 | Entry::PilotStart(_)
                 | Entry::RawFrame
                 | Entry::Operator
@@ -182,6 +192,10 @@ impl Recording {
             return Err(RecordingError::SeveralFlights { name: recording.name, flights: flights.flown() });
         }
         recording.cut = flights.cut();
+        if let Some(found) = verdicts.found() {
+            recording.verdict_heard = found.heard;
+            recording.verdict = Some(found.verdict);
+        }
         recording.head = log.head().clone();
         recording.damage = log.damage().map(ToString::to_string);
         recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
@@ -206,6 +220,16 @@ impl Recording {
             Some((kind, _)) => Err(RecordingError::TooLong { name: self.name.clone(), kind }),
             None => Ok(()),
         }
+    }
+
+    /// Time of contact on the clock of its ticks, or of its telemetry, s.
+    pub fn contact_s(&self) -> Option<f64> {
+        let contact_s = self.verdict.as_ref()?.time_s;
+        if !self.verdict_heard {
+            return Some(contact_s);
+        }
+        let Clocks { boot_zero_s, telemetry_zero_s, .. } = self.clocks;
+        Some(contact_s + boot_zero_s.unwrap_or(0.0) - telemetry_zero_s.unwrap_or(0.0))
     }
 
     /// Which vehicle flew: its ticks are of this kind.
@@ -290,7 +314,7 @@ impl Recording {
         let text = self.profile_toml()?;
         vehicles::profile::from_toml(text, "profile.toml").map_err(|error| RecordingError::ProfileUnusable {
             name: self.name.clone(),
-            reason: error.to_string(),
+            reason: explained(&error.to_string()),
         })
     }
 

@@ -7,9 +7,7 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use super::{counted, shown};
-use crate::info::{
-    ChannelFacts, FrameFacts, Info, Named, PhaseTimeline, SolveTimes, TickFacts, VerdictFacts,
-};
+use crate::info::{ChannelFacts, FrameFacts, Info, Named, PhaseSource, PhaseTimeline, SolveTimes, TickFacts};
 
 /// Writes a description of a log as text.
 ///
@@ -42,9 +40,7 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     if let Some(timeline) = info.phases.first() {
         print_phases(timeline, output)?;
     }
-    if let Some(verdict) = &info.verdict {
-        print_verdict(verdict, output)?;
-    }
+    print_verdict(info, output)?;
     if let Some(ticks) = &info.ticks {
         print_ticks(ticks, output)?;
     }
@@ -126,8 +122,15 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
 
 fn print_phases(timeline: &PhaseTimeline, output: &mut impl Write) -> io::Result<()> {
     for (index, span) in timeline.spans.iter().enumerate() {
-        let from =
-            if index == 0 { format!("   (from the {})", timeline.source.name()) } else { String::new() };
+        let clock = match timeline.source {
+            PhaseSource::Vehicle => "T+",
+            PhaseSource::Telemetry => "the station's clock",
+        };
+        let from = if index == 0 {
+            format!("   ({clock}, from the {})", timeline.source.name())
+        } else {
+            String::new()
+        };
         let name = if index == 0 { "phases" } else { "" };
         row(output, name, &format!("{:>9.3} to {:>9.3} s  {}{from}", span.from_s, span.until_s, span.phase))?;
     }
@@ -137,20 +140,32 @@ fn print_phases(timeline: &PhaseTimeline, output: &mut impl Write) -> io::Result
     Ok(())
 }
 
-fn print_verdict(verdict: &VerdictFacts, output: &mut impl Write) -> io::Result<()> {
-    let landed = if verdict.landed { "LANDED" } else { "NOT LANDED" };
-    row(output, "verdict", &format!("{landed} at {:.3} s", verdict.time_s))?;
-    for limit in &verdict.limits {
-        let passed = if limit.passed { "inside" } else { "OUTSIDE" };
-        let text = format!(
-            "{:<12} {:>9.4} {:<6} {passed} {} to {}",
-            shown(&limit.name),
-            limit.value,
-            shown(&limit.unit),
-            rounded(limit.minimum),
-            rounded(limit.maximum)
-        );
-        row(output, "", &text)?;
+fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    if let Some(ending) = &info.ending {
+        row(output, "verdict", &shown(ending))?;
+    }
+    let Some(verdict) = &info.verdict else {
+        return Ok(());
+    };
+    let contact = info.clocks.words(verdict.contact());
+    row(output, "", &format!("touchdown at {contact}"))?;
+    let by = if verdict.table_2.is_empty() { "" } else { "by the limits of the legs:" };
+    for (title, limits) in [(by, &verdict.limits), ("by the landing paper's Table 2:", &verdict.table_2)] {
+        if !title.is_empty() && !limits.is_empty() {
+            row(output, "", title)?;
+        }
+        for limit in limits {
+            let passed = if limit.passed { "inside" } else { "OUTSIDE" };
+            let text = format!(
+                "{:<14} {:>9.4} {:<6} {passed} {} to {}",
+                shown(&limit.name),
+                limit.value,
+                shown(&limit.unit),
+                rounded(limit.minimum),
+                rounded(limit.maximum)
+            );
+            row(output, "", &text)?;
+        }
     }
     Ok(())
 }

@@ -4,6 +4,7 @@
 
 mod compare;
 mod evaluate;
+mod gate;
 mod info;
 mod junit;
 mod recover;
@@ -15,6 +16,7 @@ mod verify;
 
 pub use compare::{compare_cases, print_compare};
 pub use evaluate::{print_evaluate, print_evaluate_csv};
+pub use gate::{GateReport, gate_cases, print_gate};
 pub use info::print_info;
 pub use junit::{JunitCase, JunitOutcome, print_junit};
 pub use recover::print_recovery;

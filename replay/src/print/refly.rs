@@ -16,7 +16,7 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     let start = &report.start;
     writeln!(
         output,
-        "from tick {} ({:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
+        "from tick {} (T+{:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
         start.tick,
         start.time_s,
         start.phase,
@@ -32,6 +32,16 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
         if !settings.is_empty() {
             writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
         }
+    }
+    for (what, faults) in
+        [("with the fault", &report.faults.with), ("without the fault", &report.faults.without)]
+    {
+        if !faults.is_empty() {
+            writeln!(output, "{what} {}, from the beginning of the flight", shown(&faults.join(" ")))?;
+        }
+    }
+    if let Some(seed) = report.seed {
+        writeln!(output, "plant drawn with seed {seed} instead of the recorded one")?;
     }
     if let Some(Reached { frames, identical, first_different }) = report.reached {
         writeln!(

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::{counted, shown};
-use crate::sweep::{BisectReport, FlightOutcome, Flip, PointOutcome, SweepReport};
+use crate::sweep::{BisectReport, FlightOutcome, Flip, PointOutcome, RefusedValue, SweepReport};
 
 /// Writes the best points of a sweep as text.
 ///
@@ -74,6 +74,14 @@ pub fn print_bisect(report: &BisectReport, output: &mut impl Write) -> io::Resul
     writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
     if !report.reproduced {
         not_reproduced(&report.file, output)?;
+    }
+    if report.interrupted {
+        let flown = counted(report.flown as u64, "flight");
+        writeln!(output, "INTERRUPTED after {flown}: this is what was found until then")?;
+    }
+    if let Some(RefusedValue { value, reason }) = report.refused.first() {
+        let count = counted(report.refused.len() as u64, "value");
+        writeln!(output, "{count} cannot be flown and left out; the first is {value}: {}", shown(reason))?;
     }
     writeln!(
         output,

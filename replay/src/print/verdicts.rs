@@ -13,8 +13,8 @@ pub(super) struct LimitRow<'a> {
 pub(super) fn words(verdict: Option<&VerdictFacts>, none: &str) -> String {
     match verdict {
         None => none.to_owned(),
-        Some(verdict) if verdict.landed => format!("LANDED at {:.3} s", verdict.time_s),
-        Some(verdict) => format!("NOT LANDED at {:.3} s", verdict.time_s),
+        Some(verdict) if verdict.landed => format!("LANDED at {}", verdict.contact()),
+        Some(verdict) => format!("NOT LANDED at {}", verdict.contact()),
     }
 }
 

@@ -11,6 +11,9 @@
 //! and compared with the record frame by frame on the way. From there on the changed settings apply to world and flight
 //! computer.
 //!
+//! Faults may be added and taken away ("would it have landed without the GNSS outage?"): then the flight is flown from
+//! its beginning with the other faults, and the settings apply from the start, as always.
+//!
 //! Settings change both controller and plant. Settings "of the plant" change the plant only, timed ones the controller
 //! only. An abort under thrust is flown if the record had it at the start; in a flight from apogee, the crew's abort
 //! comes at its recorded frame. Only a flight from apogee has wind (`truth.wind_m_s`); the planar plant has none.
@@ -34,7 +37,7 @@ use tick_log::TickLogError;
 use world::world::WorldError;
 
 use crate::info::VerdictFacts;
-use crate::log::{Recording, RecordingError};
+use crate::log::{FlightKind, Recording, RecordingError};
 use crate::settings::{Setting, SettingError};
 
 /// Key of the run fact that holds the plant's settings in the log of a re-flown flight.
@@ -85,6 +88,23 @@ pub struct ReflyOptions {
     pub law: Law,
     /// Seed of the plant's dispersions instead of the recorded seed.
     pub seed: Option<u64>,
+    /// Other faults than the recorded ones.
+    pub faults: FaultChanges,
+}
+
+/// How the faults of a flight differ from the recorded ones.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FaultChanges {
+    /// Faults that happen as well, as on the command line of a simulated flight.
+    pub with: Vec<String>,
+    /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for every one.
+    pub without: Vec<String>,
+}
+
+impl FaultChanges {
+    fn is_none(&self) -> bool {
+        self.with.is_empty() && self.without.is_empty()
+    }
 }
 
 /// Why a flight cannot be flown again.
@@ -122,6 +142,13 @@ pub enum ReflyError {
         /// The file.
         name: String,
         /// What is missing or unknown.
+        reason: String,
+    },
+    /// A fault cannot be added or left out.
+    #[error("{name}: {reason}")]
+    Fault {
+        /// The file.
+        name: String,
         reason: String,
     },
     /// The request applies only to another kind of flight.
@@ -174,6 +201,10 @@ pub struct ReflyReport {
     pub plant_settings: Vec<String>,
     /// The controller that flew.
     pub law: Law,
+    /// The faults that differ from the recorded ones, from the beginning of the flight on.
+    pub faults: FaultChanges,
+    /// The seed of the plant's draw, if it is not the recorded one.
+    pub seed: Option<u64>,
     pub start: StartState,
     /// For a flight from apogee: how the frames before the start compare with the record.
     pub reached: Option<Reached>,
@@ -196,6 +227,20 @@ pub struct ReflyReport {
     pub commands_identical: usize,
     /// The largest difference of a gimbal command from the recorded command of the same tick, rad.
     pub gimbal_difference_max_rad: f64,
+}
+
+/// Whether a flight can be flown again at all.
+///
+/// # Errors
+/// The log lacks what is needed, or this build cannot use it.
+pub fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
+    match recording.kind() {
+        FlightKind::InSpace => apogee::can_be_flown(recording),
+        FlightKind::Planar => {
+            recording.replayable_ticks()?;
+            Ok(recording.profile().map(|_| ())?)
+        }
+    }
 }
 
 /// Flies a recorded flight again.
@@ -239,6 +284,8 @@ fn report(
         settings: options.settings.iter().map(ToString::to_string).collect(),
         plant_settings: options.plant_settings.iter().map(ToString::to_string).collect(),
         law: options.law,
+        faults: options.faults.clone(),
+        seed: options.seed,
         start,
         reached: None,
         thrust_scale: 1.0,

@@ -27,6 +27,14 @@ pub(super) fn fly(
             is: "a planar landing",
         });
     }
+    if let Some(fault) = options.faults.with.iter().chain(&options.faults.without).next() {
+        return Err(ReflyError::OtherKind {
+            name: recording.name.clone(),
+            what: format!("fault {fault}"),
+            of: "a flight from apogee",
+            is: "a planar landing",
+        });
+    }
     let ticks = recording.replayable_ticks()?;
     recording.profile()?;
     let toml = recording.profile_toml()?;

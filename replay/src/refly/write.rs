@@ -76,6 +76,8 @@ fn header(
     run.retain(|_, fact| !fact.is_empty());
     if let Some(seed) = options.seed {
         run.insert("seed".to_owned(), seed.to_string());
+        let before = recording.head.run.get("seed").map_or("not recorded", String::as_str);
+        run.insert("reflown_instead_of_seed".to_owned(), before.to_owned());
     }
     let lasting: Vec<Setting> =
         options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();

@@ -14,10 +14,13 @@ use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use protocol::log::{flight_v1, v1};
-use tick_log::pilot::state_from_log;
+use tick_log::pilot::{state_from_log, vector_from_log};
 use tick_log::state_to_log;
 
-use super::track::{AHEAD_S, Flight, GimbalAxis, InSpace, PLANS_DRAWN, PlanSample, Vehicle, track_of};
+use super::track::{
+    AHEAD_S, EstimateError, Flight, GimbalAxis, InSpace, PLANS_DRAWN, PlanSample, Vehicle, above_ground,
+    phase_of, track_of,
+};
 use crate::controller::{LoggedPilot, NewPlans, Replayed as _};
 use crate::log::Recording;
 
@@ -59,7 +62,28 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         .map(|pair| 0.5 * (pair[0].thrust_n + pair[1].thrust_n) * (pair[1].time_s - pair[0].time_s))
         .sum();
     let burnt_out = recording.world.last().is_some_and(|last| last.thrust_n <= 0.0);
+    let in_air = |time_s: f64| recording.verdict.as_ref().is_none_or(|verdict| time_s <= verdict.time_s);
     let from_apogee = InSpace {
+        plane: plane_in_words(pilot.plane()),
+        across_m: recording
+            .world
+            .iter()
+            .map(|sample| (sample.time_s, place(sample).dot(&plane.across)))
+            .collect(),
+        errors: thoughts
+            .iter()
+            .filter(|thought| in_air(thought.time_s))
+            .filter_map(|thought| error(thought.estimate.as_ref()?, thought.time_s, &recording.world))
+            .collect(),
+        // On the way up nothing estimates the wind.
+        wind_m_s: thoughts
+            .iter()
+            .filter(|thought| phase_of(thought.phase).is_some_and(|phase| !phase.before_apogee()))
+            .filter_map(|thought| {
+                let wind = thought.estimate.as_ref()?.wind_m_s;
+                Some((thought.time_s, [wind.x, -wind.y]))
+            })
+            .collect(),
         inferred_scales: pilot
             .motor()
             .ignition_s()
@@ -87,9 +111,40 @@ pub(super) fn flight(mut recording: Recording) -> Flight {
         teller,
         track,
         ignition_s,
-        touchdown_s: recording.verdict.as_ref().map(|verdict| verdict.time_s),
+        touchdown_s: recording.contact_s(),
         recording,
     }
+}
+
+fn place(sample: &flight_v1::TruthSample) -> Vector3<f64> {
+    vector_from_log(&sample.state.position_m)
+}
+
+/// The plane's direction; a flight without a landing has none, and is seen from the west.
+fn plane_in_words(plane: Option<&Plane>) -> String {
+    // East is against y.
+    match plane {
+        None => "the plane of north and up, because no landing was planned".to_owned(),
+        Some(plane) => {
+            let deg = libm::atan2(-plane.along.y, plane.along.x).to_degrees();
+            format!("the vertical plane of the landing, {:.0} deg from north to east", deg.rem_euclid(360.0))
+        }
+    }
+}
+
+/// Estimate less truth at the moment of an estimate; `None` without a record of the world then.
+fn error(estimate: &Estimate, time_s: f64, world: &[flight_v1::TruthSample]) -> Option<EstimateError> {
+    let place = world.partition_point(|sample| sample.time_s < time_s - SAME_MOMENT_S);
+    let sample = world.get(place).filter(|sample| (sample.time_s - time_s).abs() < SAME_MOMENT_S)?;
+    let truth = state_from_log(&sample.state);
+    // East is against y.
+    let to_ground = |vector: Vector3<f64>| [vector.x, -vector.y, vector.z];
+    let cosine = estimate.state.nose_in_world().dot(&truth.nose_in_world());
+    Some(EstimateError {
+        position_m: to_ground(estimate.state.position_m - truth.position_m),
+        velocity_m_s: to_ground(estimate.state.velocity_m_s - truth.velocity_m_s),
+        nose_rad: libm::acos(cosine.clamp(-1.0, 1.0)),
+    })
 }
 
 /// Runs the flight computer again and returns its estimate and plan at every tenth frame; `None` if the log lacks
@@ -223,7 +278,11 @@ fn plans(thoughts: &[Thought], plane: &Plane) -> Vec<PlanSample> {
         Some(PlanSample {
             time_s: thought.time_s,
             ahead: AHEAD_S.map(|ahead_s| between(&states, ahead_s / step_s)),
-            path: if drawn { states.iter().map(|state| (state[0], state[1])).collect() } else { Vec::new() },
+            path: if drawn {
+                above_ground(states.iter().map(|state| (state[0], state[1])))
+            } else {
+                Vec::new()
+            },
         })
     };
     made.iter().enumerate().filter_map(sample).collect()

@@ -14,6 +14,13 @@ const BOTTOM: f64 = 36.0;
 /// Most points drawn for one line; more points than pixels cannot be seen.
 const POINTS_MAX: usize = 1200;
 
+/// Width of a digit, pixels.
+const LETTER: f64 = 6.6;
+/// Samples that are this many times the usual gap apart are not joined.
+const FAR_GAPS: f64 = 5.0;
+/// A line whose values differ by less than this share says nothing.
+const NOTHING: f64 = 1e-9;
+
 /// A line of a chart.
 pub(super) struct Line {
     /// Its name in the legend; empty for none.
@@ -31,8 +38,12 @@ pub(super) struct Chart {
     pub(super) lines: Vec<Line>,
     /// Horizontal limits.
     pub(super) limits: Vec<f64>,
+    /// Places with their labels.
+    pub(super) places: Vec<(f64, f64, &'static str)>,
     /// Vertical marks and their labels.
     pub(super) marks: Vec<(f64, &'static str)>,
+    /// Whether the x axis is no time: a path may turn back on it.
+    pub(super) own_x: bool,
     /// Whether both axes have the same scale.
     pub(super) equal_scales: bool,
     /// Whether the chart takes the whole width of the page.
@@ -46,6 +57,9 @@ impl Chart {
             let all = self.lines.iter().flat_map(|line| line.points.iter());
             all.filter(|(x, y)| x.is_finite() && y.is_finite())
         };
+        if !self.equal_scales && self.says_nothing() {
+            return String::new();
+        }
         let Some((x_from, x_to)) = extent(finite().map(|point| point.0)) else {
             return String::new();
         };
@@ -54,15 +68,15 @@ impl Chart {
             return String::new();
         };
         // A path in equal scales that is taller than wide gets a tall picture.
-        let tall = self.equal_scales && y_to - y_from > x_to - x_from;
+        let tall = self.equal_scales && self.full && y_to - y_from > x_to - x_from;
         let width = if self.full && !tall { 2.0 * WIDTH } else { WIDTH };
         let height = match (self.equal_scales, tall) {
             (_, true) => TALL,
             (true, false) => 2.0 * HEIGHT,
             (false, false) => HEIGHT,
         };
-        let mut x = Axis { from: x_from, to: x_to, at: (LEFT, width - RIGHT) };
         let mut y = padded(Axis { from: y_from, to: y_to, at: (height - BOTTOM, TOP) });
+        let mut x = Axis { from: x_from, to: x_to, at: (room_for_labels(&y), width - RIGHT) };
         if self.equal_scales {
             x = padded(x);
             equalise(&mut x, &mut y);
@@ -70,11 +84,12 @@ impl Chart {
         let class = match (tall, self.full) {
             (true, _) => " class=\"tall\"",
             (false, true) => " class=\"full\"",
+            (false, false) if self.equal_scales => " class=\"square\"",
             (false, false) => "",
         };
         let mut svg = format!(
             "<figure{class}><svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{0}\">\n\
-             <text class=\"title\" x=\"{LEFT}\" y=\"16\">{0}</text>\n",
+             <text class=\"title\" x=\"8\" y=\"16\">{0}</text>\n",
             escaped(&self.title)
         );
         self.draw_axes(x, y, &mut svg);
@@ -82,6 +97,17 @@ impl Chart {
         self.draw_legend(width, &mut svg);
         svg.push_str("</svg></figure>\n");
         svg
+    }
+
+    /// Whether no line has two different values.
+    fn says_nothing(&self) -> bool {
+        let varies = |line: &Line| {
+            let finite = line.points.iter().map(|point| point.1).filter(|value| value.is_finite());
+            let (least, most) =
+                finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
+            most - least > NOTHING * most.abs().max(least.abs())
+        };
+        !self.lines.iter().any(varies)
     }
 
     fn draw_axes(&self, x: Axis, y: Axis, svg: &mut String) {
@@ -118,6 +144,23 @@ impl Chart {
             let at = y.place(*limit);
             put(svg, format_args!("<path class=\"limit\" d=\"M{left} {at:.1}H{right}\"/>\n"));
         }
+        for (place, (px, py, word)) in self.places.iter().enumerate() {
+            let (at, up) = (x.place(*px), y.place(*py));
+            let (anchor, shift) = if at > 0.7 * right { ("end", -7.0) } else { ("start", 7.0) };
+            // Labels of neighbouring places stand below and above them, and none on the axis.
+            let below = place % 2 == 0 && up < bottom - 16.0;
+            let lower = if below { 13.0 } else { -5.0 };
+            put(
+                svg,
+                format_args!(
+                    "<circle class=\"place\" cx=\"{at:.1}\" cy=\"{up:.1}\" r=\"3.5\"/><text class=\"label\" x=\"{:.1}\" \
+                 y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>\n",
+                    at + shift,
+                    up + lower,
+                    escaped(word)
+                ),
+            );
+        }
         for (value, word) in self.marks.iter().filter(|(value, _)| (x.from..=x.to).contains(value)) {
             let at = x.place(*value);
             let (anchor, shift) = if at > 0.8 * right { ("end", -3.0) } else { ("start", 3.0) };
@@ -137,7 +180,7 @@ impl Chart {
             format_args!(
                 "<path class=\"frame\" d=\"M{left} {top}V{bottom}H{right}\"/>\
              <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\
-             <text x=\"{left}\" y=\"32\">{}</text>\n",
+             <text x=\"8\" y=\"32\">{}</text>\n",
                 right,
                 bottom + 30.0,
                 escaped(self.x_label),
@@ -149,15 +192,27 @@ impl Chart {
     fn draw_lines(&self, x: Axis, y: Axis, svg: &mut String) {
         for line in &self.lines {
             let mut path = String::new();
-            let mut pen_down = false;
+            // Nothing is known between samples that are much further apart than usual.
+            let far = if self.equal_scales || self.own_x {
+                f64::INFINITY
+            } else {
+                usual_gap(&line.points) * FAR_GAPS
+            };
+            let mut last: Option<f64> = None;
             for (px, py) in thinned(&line.points) {
                 if !(px.is_finite() && py.is_finite()) {
-                    pen_down = false;
+                    last = None;
                     continue;
                 }
-                let step = if pen_down { 'L' } else { 'M' };
-                put(&mut path, format_args!("{step}{:.1} {:.1}", x.place(px), y.place(py)));
-                pen_down = true;
+                let joined = last.is_some_and(|last| px - last <= far);
+                let (at, up) = (x.place(px), y.place(py));
+                if joined {
+                    put(&mut path, format_args!("L{at:.1} {up:.1}"));
+                } else {
+                    // A line of no length, which its round ends show as a dot.
+                    put(&mut path, format_args!("M{at:.1} {up:.1}h0"));
+                }
+                last = Some(px);
             }
             let class = if line.class == "thin" { "thin".to_owned() } else { format!("l {}", line.class) };
             put(svg, format_args!("<path class=\"{class}\" d=\"{path}\"/>\n"));
@@ -180,6 +235,23 @@ impl Chart {
             at -= 10.0;
         }
     }
+}
+
+/// The median of the distances between neighbouring points along x.
+fn usual_gap(points: &[(f64, f64)]) -> f64 {
+    let mut gaps: Vec<f64> = points.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    gaps.retain(|gap| gap.is_finite());
+    gaps.sort_by(f64::total_cmp);
+    // Thinned points are further apart.
+    let thinning = points.len().div_ceil(POINTS_MAX).max(1) as f64;
+    gaps.get(gaps.len() / 2).map_or(f64::INFINITY, |gap| gap * thinning)
+}
+
+/// Room at the left for the widest label of an axis, pixels.
+fn room_for_labels(y: &Axis) -> f64 {
+    let (ticks, decimals) = y.ticks();
+    let widest = ticks.iter().map(|value| number(*value, decimals).len()).max().unwrap_or(0);
+    LEFT.max(12.0 + LETTER * widest as f64)
 }
 
 /// At most [`POINTS_MAX`] points, including the highest and lowest of every stretch.
@@ -227,5 +299,29 @@ mod tests {
         };
         assert!(path(110.0).svg().starts_with("<figure class=\"tall\"><svg viewBox=\"0 0 520 800\""));
         assert!(path(5.0).svg().starts_with("<figure class=\"full\"><svg viewBox=\"0 0 1040 520\""));
+    }
+
+    fn with_line(points: Vec<(f64, f64)>) -> Chart {
+        Chart { lines: vec![Line { name: "", class: "a", points }], ..Chart::default() }
+    }
+
+    /// Two samples that are far apart do not become a ramp between them.
+    #[test]
+    fn samples_that_are_far_apart_are_not_joined() {
+        let mut points: Vec<(f64, f64)> = (0..20).map(|k| (f64::from(k), f64::from(k % 3))).collect();
+        points.extend((100..120).map(|k| (f64::from(k), f64::from(k % 2))));
+        let svg = with_line(points).svg();
+        let path = svg.split("class=\"l a\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+        assert_eq!(path.matches('M').count(), 2, "{path}");
+    }
+
+    #[test]
+    fn a_line_that_says_nothing_is_not_drawn_and_a_sign_has_its_room() {
+        assert_eq!(with_line((0..9).map(|k| (f64::from(k), 4.0)).collect()).svg(), "");
+        let svg = with_line((0..9).map(|k| (f64::from(k), -1e-7 * f64::from(k))).collect()).svg();
+        let label = svg.split("text-anchor=\"end\">-").next().unwrap();
+        let x: f64 = label.rsplit("<text x=\"").next().unwrap().split('"').next().unwrap().parse().unwrap();
+        let digits = svg.split("text-anchor=\"end\">-").nth(1).unwrap().split('<').next().unwrap().len() + 1;
+        assert!(x > LETTER * digits as f64 - 4.0, "{digits} letters end at {x}");
     }
 }

@@ -43,6 +43,11 @@ pub(super) fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
     html
 }
 
+/// A table of limits: on a narrow screen its pictures are left out.
+pub(super) fn table_of_limits(heads: &[&str], rows: &[Vec<String>]) -> String {
+    table(heads, rows).replacen("class=\"wide\"", "class=\"wide limits\"", 1)
+}
+
 /// A paragraph of text.
 pub(super) fn paragraph(text: &str) -> String {
     format!("<p>{}</p>\n", escaped(text))

@@ -29,6 +29,7 @@ td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); gap: 12px; }
 figure { margin: 0; overflow-x: auto; background: var(--card); border-radius: 6px; padding: 8px; }
 figure.full { grid-column: 1 / -1; } figure.full svg { min-width: 640px; } figure.tall { grid-row: span 3; }
+figure.square { grid-row: span 2; }
 svg { display: block; width: 100%; height: auto; }
 svg text { fill: var(--muted); font: 11px system-ui, sans-serif; }
 svg .title { fill: var(--fg); font-size: 13px; font-weight: 600; }
@@ -36,13 +37,16 @@ svg .grid { stroke: var(--grid); stroke-width: 1; }
 svg .frame { stroke: var(--line); fill: none; }
 svg .limit { stroke: var(--bad); stroke-width: 1; stroke-dasharray: 5 4; }
 svg .mark { stroke: var(--muted); stroke-width: 1; stroke-dasharray: 2 3; }
-svg .l { fill: none; stroke-width: 1.8; stroke-linejoin: round; }
+svg .l { fill: none; stroke-width: 1.8; stroke-linejoin: round; stroke-linecap: round; }
+svg .place { fill: var(--fg); } svg .label { fill: var(--fg); }
 svg .a { stroke: var(--a); } svg .b { stroke: var(--b); stroke-dasharray: 7 3; } svg .c { stroke: var(--c); }
 svg .d { stroke: var(--d); stroke-dasharray: 2 2; } svg .thin { stroke: var(--muted); stroke-width: 0.7; fill: none; }
 svg .fa { fill: var(--a); } svg .fb { fill: var(--b); } svg .fc { fill: var(--c); } svg .fd { fill: var(--d); }
 svg .bar { fill: var(--a); } svg .barbad { fill: var(--bad); } svg .room { fill: var(--grid); }
-@media (max-width: 980px) { figure.tall { grid-row: auto; } }
-@media (max-width: 640px) { td { white-space: normal; } td.n { white-space: nowrap; } th, td { padding-right: 8px; } }
+@media (max-width: 980px) { figure.tall, figure.square { grid-row: auto; } }
+@media (max-width: 640px) { .limits th:nth-child(6), .limits td:nth-child(6) { display: none; }
+  main { padding: 16px 10px 48px; } .verdict { font-size: 21px; } th, td { font-size: 14px; }
+  figure.full svg { min-width: 0; } td { white-space: normal; } td.n { white-space: nowrap; } th, td { padding-right: 8px; } }
 @media print { main { max-width: none; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 ";
 

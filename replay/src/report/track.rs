@@ -11,6 +11,9 @@ use crate::log::{Entry, FlightLog, LogError, Recording};
 /// Prediction times at which predictions are compared with the flight, s.
 pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
 
+/// A plan that ends this far below the ground ends on it, m.
+const GROUND_M: f64 = 0.05;
+
 pub(super) const PLANS_DRAWN: usize = 8;
 
 /// The state of the flight at one time.
@@ -88,6 +91,25 @@ pub(super) struct InSpace {
     pub(super) inferred_scales: Option<(f64, f64)>,
     /// True impulse divided by the certified impulse.
     pub(super) true_impulse_scale: Option<f64>,
+    /// The plane of the landing in words, as in `124 deg from north`.
+    pub(super) plane: String,
+    /// Direction across it: the vehicle's place along this direction, m, over vehicle time, s.
+    pub(super) across_m: Vec<(f64, f64)>,
+    /// Estimate less truth, from the release to contact.
+    pub(super) errors: Vec<EstimateError>,
+    /// The estimated wind at each planning frame: vehicle time, s, then towards north and east, m/s.
+    pub(super) wind_m_s: Vec<(f64, [f64; 2])>,
+}
+
+/// Estimate less truth at one time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct EstimateError {
+    /// North, east, up.
+    pub(super) position_m: [f64; 3],
+    /// North, east, up.
+    pub(super) velocity_m_s: [f64; 3],
+    /// Angle between the estimated and the true direction of the nose.
+    pub(super) nose_rad: f64,
 }
 
 /// A recorded flight and what the report derives from it.
@@ -137,7 +159,7 @@ impl Flight {
             from_apogee: None,
             gimbal: vec![gimbal_of(&recording)],
             inferred_n,
-            touchdown_s: recording.verdict.as_ref().map(|verdict| verdict.time_s),
+            touchdown_s: recording.contact_s(),
             ignition_s,
             plans,
             teller,
@@ -168,6 +190,11 @@ impl Flight {
         let ignition = self.ignition_s.map(|at_s| (self.axis_s(at_s), "ignition"));
         let touchdown = self.touchdown_s.map(|at_s| (self.axis_s(at_s), "touchdown"));
         ignition.into_iter().chain(touchdown).collect()
+    }
+
+    /// Whether the vehicle is still in the air at a time.
+    pub(super) fn is_before_contact(&self, time_s: f64) -> bool {
+        self.touchdown_s.is_none_or(|touchdown_s| time_s <= touchdown_s)
     }
 
     /// The state at a time, between samples; `None` outside.
@@ -271,6 +298,11 @@ pub(super) fn plans_of(path: &Path) -> Result<Vec<PlanSample>, LogError> {
     Ok(plans)
 }
 
+/// A planned path up to the ground: a plan that does not land ends below it.
+pub(super) fn above_ground(path: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    path.take_while(|(_, up_m)| *up_m >= -GROUND_M).collect()
+}
+
 fn plan_sample(tick: &v1::ControllerTick) -> PlanSample {
     let plan = &tick.output.plan;
     let node_at = |ahead_s: f64| {
@@ -282,6 +314,6 @@ fn plan_sample(tick: &v1::ControllerTick) -> PlanSample {
     PlanSample {
         time_s: tick.input.time_s,
         ahead: AHEAD_S.map(node_at),
-        path: plan.states.iter().map(|state| (state.x_m, state.z_m)).collect(),
+        path: above_ground(plan.states.iter().map(|state| (state.x_m, state.z_m))),
     }
 }

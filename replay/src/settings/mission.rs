@@ -10,6 +10,7 @@ use flight::vehicle::mission::Mission;
 use world::Truth;
 
 use super::names::Names;
+use super::other_release::explained;
 use super::{Setting, SettingError, insert, listed, parsed_table, set, text_of, value_in};
 
 /// The section of the airframe.
@@ -52,7 +53,7 @@ pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission,
     vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
         let reason = error.to_string();
         match settings {
-            [] => SettingError::Toml { origin: "profile.toml".to_owned(), reason },
+            [] => SettingError::Toml { origin: "profile.toml".to_owned(), reason: explained(&reason) },
             _ => SettingError::Mission { settings: listed(settings), reason },
         }
     })

@@ -6,12 +6,14 @@
 
 mod mission;
 mod names;
+mod other_release;
 mod schedule;
 
 pub use mission::{
     is_whole_in_mission, known_mission_paths, mission_toml_with, mission_value_of, mission_with, truth_with,
 };
 pub use names::{is_whole, known_paths};
+pub(crate) use other_release::explained;
 pub use schedule::Schedule;
 
 use std::fmt;

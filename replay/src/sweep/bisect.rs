@@ -1,5 +1,7 @@
 //! Finds the smallest change of one setting that turns landed into not landed, or back.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use serde::Serialize;
 
 use super::FlightOutcome;
@@ -67,6 +69,13 @@ pub struct Flip {
     pub outcome: FlightOutcome,
 }
 
+/// A value of the setting that cannot be flown.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RefusedValue {
+    pub value: f64,
+    pub reason: String,
+}
+
 /// The result of a bisection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BisectReport {
@@ -90,6 +99,10 @@ pub struct BisectReport {
     pub above: Option<Flip>,
     /// The size of the steps below and above. A change that reverts within one step is not seen.
     pub steps: (f64, f64),
+    /// The values that cannot be flown, and why.
+    pub refused: Vec<RefusedValue>,
+    /// The search was stopped; the rest of the report is what it had found until then.
+    pub interrupted: bool,
     /// Number of flights flown.
     pub flown: usize,
 }
@@ -102,11 +115,16 @@ impl BisectReport {
     }
 }
 
-/// Looks for the smallest change of one setting that changes the verdict.
+/// Looks for the smallest change of one setting that changes the verdict, until `stop` is set. A value that cannot be
+/// flown is passed over, except the one to begin with.
 ///
 /// # Errors
 /// See [`BisectError`].
-pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectReport, BisectError> {
+pub fn bisect(
+    flight: &Recording,
+    options: &BisectOptions,
+    stop: &AtomicBool,
+) -> Result<BisectReport, BisectError> {
     let path = &options.path;
     let prepared = Prepared::new(flight, &options.refly)?;
     let is_whole = prepared.is_whole(path)?;
@@ -119,10 +137,10 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
     if !(from..=to).contains(&value) {
         return Err(BisectError::Outside { path: path.clone(), value, from, to });
     }
-    let mut search = Search { flight: prepared, options, is_whole, flown: 0 };
+    let mut search = Search { flight: prepared, options, is_whole, stop, flown: 0, refused: Vec::new() };
     let outcome = search.fly(value)?;
-    let below = search.first_flip(value, from, outcome)?;
-    let above = search.first_flip(value, to, outcome)?;
+    let below = search.first_flip(value, from, outcome);
+    let above = search.first_flip(value, to, outcome);
     let finest = if is_whole { 1.0 } else { 0.0 };
     let step = |end: f64| f64::max((end - value).abs() / f64::from(options.steps.max(1)), finest);
     Ok(BisectReport {
@@ -137,6 +155,8 @@ pub fn bisect(flight: &Recording, options: &BisectOptions) -> Result<BisectRepor
         above,
         steps: (step(from), step(to)),
         flown: search.flown,
+        refused: search.refused,
+        interrupted: stop.load(Ordering::Relaxed),
     })
 }
 
@@ -144,7 +164,9 @@ struct Search<'a> {
     flight: Prepared<'a>,
     options: &'a BisectOptions,
     is_whole: bool,
+    stop: &'a AtomicBool,
     flown: usize,
+    refused: Vec<RefusedValue>,
 }
 
 impl Search<'_> {
@@ -171,13 +193,19 @@ impl Search<'_> {
         value + if self.is_whole { libm::trunc(by) } else { by }
     }
 
+    /// The outcome at a value; `None` if it cannot be flown, which is noted.
+    fn tried(&mut self, value: f64) -> Option<FlightOutcome> {
+        self.fly(value)
+            .map_err(|error| self.refused.push(RefusedValue { value, reason: error.to_string() }))
+            .ok()
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
     /// Steps from `value` towards `end` until the verdict changes, then halves the last step.
-    fn first_flip(
-        &mut self,
-        value: f64,
-        end: f64,
-        outcome: FlightOutcome,
-    ) -> Result<Option<Flip>, BisectError> {
+    fn first_flip(&mut self, value: f64, end: f64, outcome: FlightOutcome) -> Option<Flip> {
         let steps = self.options.steps.max(1);
         let mut same_at = value;
         for step in 1..=steps {
@@ -185,7 +213,10 @@ impl Search<'_> {
             if tried.to_bits() == same_at.to_bits() {
                 continue;
             }
-            let found = self.fly(tried)?;
+            if self.is_stopped() {
+                return None;
+            }
+            let Some(found) = self.tried(tried) else { continue };
             if found.landed == outcome.landed {
                 same_at = tried;
                 continue;
@@ -193,18 +224,19 @@ impl Search<'_> {
             let (mut other_at, mut other) = (tried, found);
             for _ in 0..HALVINGS {
                 let middle = self.onward(same_at, 0.5 * (other_at - same_at));
-                if middle.to_bits() == same_at.to_bits() || middle.to_bits() == other_at.to_bits() {
+                let narrow = middle.to_bits() == same_at.to_bits() || middle.to_bits() == other_at.to_bits();
+                if narrow || self.is_stopped() {
                     break;
                 }
-                let there = self.fly(middle)?;
+                let Some(there) = self.tried(middle) else { break };
                 if there.landed == outcome.landed {
                     same_at = middle;
                 } else {
                     (other_at, other) = (middle, there);
                 }
             }
-            return Ok(Some(Flip { same_at, other_at, change: other_at - value, outcome: other }));
+            return Some(Flip { same_at, other_at, change: other_at - value, outcome: other });
         }
-        Ok(None)
+        None
     }
 }

@@ -9,7 +9,7 @@ mod run;
 mod state;
 mod vary;
 
-pub use bisect::{BisectError, BisectOptions, BisectReport, Flip, bisect};
+pub use bisect::{BisectError, BisectOptions, BisectReport, Flip, RefusedValue, bisect};
 pub use run::{Progress, sweep};
 pub use state::{State, StateError};
 pub use vary::{Choice, Vary, VaryError, grid, random};

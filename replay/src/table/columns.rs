@@ -4,12 +4,30 @@ use prost_reflect::{
     DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor, ReflectMessage as _, Value,
 };
 
+use super::dialect::words_of;
+
 /// A list up to this length has one column for each element; a longer one, such as a plan's nodes, has none.
 const LIST_MAX: usize = 8;
 
-/// Unit suffixes of field names, the longest first.
-const UNITS: [&str; 12] =
-    ["_rad_s2", "_rad_s", "_m_s2", "_m_s", "_kg_m2", "_bytes", "_rad", "_deg", "_kg", "_m", "_n", "_s"];
+/// Unit suffixes of field names and their units, the longest first.
+const UNITS: [(&str, &str); 13] = [
+    ("_rad_s2", "rad/s2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s2"),
+    ("_m_s", "m/s"),
+    ("_kg_m2", "kg m2"),
+    ("_bytes", "bytes"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_kg", "kg"),
+    ("_ms", "ms"),
+    ("_m", "m"),
+    ("_n", "N"),
+    ("_s", "s"),
+];
+
+/// The components of vectors and quaternions.
+const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
 
 /// The type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +45,52 @@ pub struct Column {
     /// Its name, with its unit.
     pub name: String,
     pub kind: Kind,
+    pub meaning: Meaning,
+}
+
+/// What the numbers of a column mean, from the schema or the dialect.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Meaning {
+    /// As in `m/s`; empty without one.
+    pub unit: String,
+    /// In words; empty if neither schema nor dialect says more than the name.
+    pub words: String,
+    /// The enum of the dialect that has words for the numbers.
+    pub(super) values_of: Option<String>,
+}
+
+impl Meaning {
+    /// The words for the numbers of the column, if it is an enum.
+    pub fn values(&self) -> &'static [(i64, String)] {
+        self.values_of.as_deref().map_or(&[], words_of)
+    }
+
+    /// The meaning of a field of a record, from the names and the comments in its schema; `path` has the fields from the
+    /// outside in. The components of a vector have the unit of the vector, and a field without a comment has that of the
+    /// field around it.
+    fn of(path: &[FieldDescriptor]) -> Self {
+        let unit_of = |field: &FieldDescriptor| {
+            UNITS.into_iter().find(|(suffix, _)| field.name().ends_with(suffix)).map(|(_, unit)| unit)
+        };
+        let mut inside_out = path.iter().rev().skip_while(|field| COMPONENTS.contains(&field.name()));
+        let unit = inside_out.next().and_then(unit_of).unwrap_or_default();
+        let mut comments = path.iter().rev().map(comment_on);
+        let words = comments.find(|words| !words.is_empty()).unwrap_or_default();
+        // "As in the dialect's TD_PHASE."
+        let of_field = path.last().map(comment_on).unwrap_or_default();
+        let mut all = of_field.split(|c: char| !(c.is_ascii_uppercase() || c == '_'));
+        let values_of = all.find(|word| word.starts_with("TD_") && !words_of(word).is_empty());
+        Self { unit: unit.to_owned(), values_of: values_of.map(str::to_owned), words }
+    }
+}
+
+/// The comment before a field in its schema, in one line.
+fn comment_on(field: &FieldDescriptor) -> String {
+    let file = field.parent_file();
+    let info = file.file_descriptor_proto().source_code_info.as_ref();
+    let found = info.and_then(|info| info.location.iter().find(|location| location.path == field.path()));
+    let comment = found.and_then(|location| location.leading_comments.as_deref()).unwrap_or_default();
+    comment.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The name and the columns of a table.
@@ -47,12 +111,21 @@ pub(super) struct Place {
 
 impl TableShape {
     pub(super) fn new(name: &str, columns: &[(&str, Kind)]) -> Self {
-        let time = [("log_time_ns", Kind::Integer)];
-        let columns = time.iter().chain(columns);
-        Self {
-            name: name.to_owned(),
-            columns: columns.map(|(name, kind)| Column { name: (*name).to_owned(), kind: *kind }).collect(),
-        }
+        let time = Column {
+            name: "log_time_ns".to_owned(),
+            kind: Kind::Integer,
+            meaning: Meaning {
+                unit: "ns".to_owned(),
+                words: "Unix time of the record.".to_owned(),
+                values_of: None,
+            },
+        };
+        let others = columns.iter().map(|(name, kind)| Column {
+            name: (*name).to_owned(),
+            kind: *kind,
+            meaning: Meaning::default(),
+        });
+        Self { name: name.to_owned(), columns: std::iter::once(time).chain(others).collect() }
     }
 
     /// The table of a kind of record, and the paths of its columns' values, without the time. Lists are assumed to be
@@ -96,11 +169,13 @@ fn walk(
             (_, Some(kind), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
                 for element in 0..items.len() {
                     let place = Place { fields: above.clone(), element: Some(element) };
-                    take(Column { name: element_name(&name, element), kind }, place);
+                    let meaning = Meaning::of(above);
+                    take(Column { name: element_name(&name, element), kind, meaning }, place);
                 }
             }
             (_, Some(kind), _) if !field.is_list() => {
-                take(Column { name, kind }, Place { fields: above.clone(), element: None });
+                let meaning = Meaning::of(above);
+                take(Column { name, kind, meaning }, Place { fields: above.clone(), element: None });
             }
             _ => {}
         }
@@ -110,7 +185,8 @@ fn walk(
 
 /// The second element of `fin_command_rad` is `fin_command_2_rad`: the unit stays at the end.
 fn element_name(name: &str, element: usize) -> String {
-    let unit = UNITS.into_iter().find(|unit| name.ends_with(unit)).unwrap_or_default();
+    let unit = UNITS.into_iter().map(|(suffix, _)| suffix).find(|suffix| name.ends_with(suffix));
+    let unit = unit.unwrap_or_default();
     format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
 }
 

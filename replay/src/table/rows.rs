@@ -5,12 +5,14 @@ use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::io::Read;
 
 use prost_reflect::{DescriptorPool, DynamicMessage, FieldDescriptor, MessageDescriptor, Value};
+use protocol::identity::Address;
 use protocol::log::reader::LogChannel;
-use protocol::log::record::{TOPIC_EVENTS, TOPIC_VERDICT};
+use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
 use protocol::log::v1;
 
 use super::columns::{Kind, Place, TableShape, table_name};
-use crate::log::{Entry, FlightLog, LogError, StampedEntry};
+use super::mavlink;
+use crate::log::{Entry, FlightLog, LogError, StampedEntry, frame_of};
 
 /// A value of a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +51,8 @@ pub struct TableReader {
     shapes: Vec<TableShape>,
     /// By channel; `None` for records that are not ours.
     channels: BTreeMap<u16, Option<Known>>,
+    /// The tables of MAVLink messages.
+    messages: BTreeMap<(Address, u32), usize>,
     limits: Option<usize>,
     events: Option<usize>,
 }
@@ -104,7 +108,7 @@ impl TableReader {
                 ];
                 vec![Row { table, cells }]
             }
-            Entry::RawFrame => Vec::new(),
+            Entry::RawFrame => self.message(log, stamped, time).into_iter().collect(),
             Entry::Verdict(verdict) => {
                 let mut rows = self.limits_of(verdict, &time);
                 rows.extend(self.record(log, stamped, time));
@@ -112,6 +116,25 @@ impl TableReader {
             }
             _ => self.record(log, stamped, time).into_iter().collect(),
         }
+    }
+
+    /// The message in a raw frame; `None` if the dialect does not have it.
+    fn message<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
+        let channel = log.channel(stamped.channel_id)?;
+        let frame = frame_of(&stamped.data)?;
+        let key = (frame.source(), frame.message_id());
+        let table = if let Some(table) = self.messages.get(&key) {
+            *table
+        } else {
+            self.shapes.push(mavlink::shape_of(&frame)?);
+            let table = self.shapes.len() - 1;
+            self.messages.insert(key, table);
+            table
+        };
+        let fact = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
+        let direction = if channel.topic == TOPIC_RAW_RX { "rx" } else { "tx" };
+        let cells = mavlink::cells_of(&frame, [fact("endpoint"), direction, fact("link")]);
+        Some(Row { table, cells: std::iter::once(time).chain(cells).collect() })
     }
 
     /// A record of one of our packages, with the schema in the log.
@@ -142,6 +165,7 @@ impl TableReader {
 
     fn limits_of(&mut self, verdict: &v1::LandingVerdict, time: &Cell) -> Vec<Row> {
         let columns = [
+            ("standard", Kind::Text),
             ("limit", Kind::Text),
             ("unit", Kind::Text),
             ("value", Kind::Float),
@@ -151,9 +175,11 @@ impl TableReader {
         ];
         let name = format!("{}_limits", table_name(TOPIC_VERDICT));
         let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns);
-        let row = |limit: &v1::LimitResult| {
+        let of_legs = if verdict.table_2.is_empty() { "table 2" } else { "legs" };
+        let row = |(standard, limit): (&str, &v1::LimitResult)| {
             let cells = vec![
                 time.clone(),
+                Cell::Text(standard.to_owned()),
                 Cell::Text(limit.name.clone()),
                 Cell::Text(limit.unit.clone()),
                 Cell::Float(limit.value),
@@ -163,7 +189,8 @@ impl TableReader {
             ];
             Row { table, cells }
         };
-        verdict.limits.iter().map(row).collect()
+        let decide = verdict.limits.iter().map(|limit| (of_legs, limit));
+        decide.chain(verdict.table_2.iter().map(|limit| ("table 2", limit))).map(row).collect()
     }
 }
 

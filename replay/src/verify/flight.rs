@@ -9,6 +9,7 @@ use super::report::{FileFacts, Obstacle, VerifyReport};
 use super::verifier::Verifier;
 use crate::controller::{LoggedComputer, LoggedController, LoggedPilot};
 use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, Ordered, StampedEntry, TickOrder};
+use crate::settings::explained;
 
 /// One flight being verified.
 pub(super) struct FlightVerifier {
@@ -196,7 +197,7 @@ fn controller_of<R: Read>(
     Ok(text_of(log, whole_head)?.and_then(|text| {
         let unreadable = |reason: String| Obstacle::ProfileUnreadable { reason };
         let profile = vehicles::profile::from_toml(&text, "profile.toml")
-            .map_err(|error| unreadable(error.to_string()))?;
+            .map_err(|error| unreadable(explained(&error.to_string())))?;
         LoggedController::recorded(&profile, &text, &log.head().run)
             .map_err(|error| unreadable(error.to_string()))
     }))

@@ -1,6 +1,7 @@
 //! Tests logs that this build would not produce: every command says so, so that nobody blames the settings for it.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicBool;
 
 use replay::evaluate::evaluate;
 use replay::log::Recording;
@@ -80,7 +81,7 @@ fn a_bisection_says_when_the_flight_is_not_reproduced() {
         refly: ReflyOptions::default(),
     };
     for (flight, is_own) in [(NOMINAL.recording(), true), (forged(), false)] {
-        let report = bisect(&flight, &options).unwrap();
+        let report = bisect(&flight, &options, &AtomicBool::new(false)).unwrap();
         assert_eq!(report.reproduced, is_own);
         let text = words(|output| print_bisect(&report, output));
         assert_eq!(text.contains("does not fly it as recorded"), !is_own, "{text}");
@@ -91,6 +92,6 @@ fn a_bisection_says_when_the_flight_is_not_reproduced() {
     for place in [99, whole.frames.len() - 300] {
         let mut flight = whole.clone();
         flight.frames[place].output.gimbal_rad[0] += 0.01;
-        assert!(!bisect(&flight, &options).unwrap().reproduced, "{place}");
+        assert!(!bisect(&flight, &options, &AtomicBool::new(false)).unwrap().reproduced, "{place}");
     }
 }

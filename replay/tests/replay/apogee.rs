@@ -1,6 +1,7 @@
 //! Tests every what-if question on a whole flight from apogee, as logged by a campaign.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicBool;
 
 use flight::rules::phase::Phase;
 use proptest::prelude::*;
@@ -262,11 +263,11 @@ fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
         steps: 4,
         refly: ReflyOptions::default(),
     };
-    let report = bisect(&recording, &options).unwrap();
+    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
     let drawn = refly(&recording, &ReflyOptions::default()).unwrap().thrust_scale;
     assert_eq!((report.value.to_bits(), report.outcome.landed), (drawn.to_bits(), true));
     let misnamed = BisectOptions { path: "truth.impulse_scales".to_owned(), ..options.clone() };
-    let refusal = bisect(&recording, &misnamed).unwrap_err().to_string();
+    let refusal = bisect(&recording, &misnamed, &AtomicBool::new(false)).unwrap_err().to_string();
     assert!(refusal.contains("did you mean `truth.impulse_scale`?"), "{refusal}");
     let flip = report.below.unwrap();
     let prepared = Prepared::new(&recording, &ReflyOptions::default()).unwrap();

@@ -24,12 +24,16 @@ pub(crate) static LANDED: LazyLock<Logged> = LazyLock::new(|| fly(&[]));
 /// The same flight with faults.
 pub(crate) fn fly(faults: &[&str]) -> Logged {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-    let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap() };
+    fly_recipe(&Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap() })
+}
+
+/// Flight 3 of another recipe.
+pub(crate) fn fly_recipe(recipe: &Recipe) -> Logged {
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("apogee.mcap");
-    let mut tally = Tally::new(&recipe, NUMBER).unwrap();
+    let mut tally = Tally::new(recipe, NUMBER).unwrap();
     let file = std::fs::File::create(&log).unwrap();
-    let mut writer = LogWriter::new(file, &sortie::campaign_header(&recipe, NUMBER)).unwrap();
+    let mut writer = LogWriter::new(file, &sortie::campaign_header(recipe, NUMBER)).unwrap();
     writer.write(&sortie::start(tally.flight()), 0).unwrap();
     let mut phase = tally.flight().computer().mode().phase;
     loop {

@@ -1,10 +1,11 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
+use flight::vehicle::profile::StartPoint;
 use quick_xml::events::Event as Xml;
 use replay::report::report;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
-use crate::from_apogee::LANDED;
+use crate::from_apogee::{self, LANDED};
 use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
 
 /// Every tag is closed, and the page refers to nothing outside itself.
@@ -39,7 +40,8 @@ fn the_report_says_the_verdict_first_and_then_why() {
         let page = report(&flight.log).unwrap().html;
         check(&page);
         let order = [
-            "LANDED at",
+            "LANDED inside every limit",
+            "Touchdown at T+",
             "ignition delay",
             "thrust fell through weight",
             "Path in the pitch plane",
@@ -67,13 +69,19 @@ fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
     let page = report(&LANDED.log).unwrap().html;
     check(&page);
     let order = [
-        "LANDED at",
+        "LANDED ",
+        "by the limits of the legs",
         "vertical speed",
+        "by the landing paper's Table 2",
         "ignition delay",
         "thrust fell through weight",
-        "Path in the pitch plane",
+        "<h2>Events</h2>",
+        "Seen from above: ground track",
+        "Path of the landing in its plane",
         "Gimbal pitch, deg",
         "Gimbal yaw, deg",
+        "Wind towards north, m/s",
+        "Roll rate, deg/s",
         "Tracking error by phase",
         "gimbal yaw at its stop of 7.0 deg",
         "Newton iterations of each plan",
@@ -124,5 +132,56 @@ fn telemetry_alone_makes_a_page() {
     replay::import::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
-    assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED at"));
+    assert!(
+        page.contains("From the telemetry of a ground station") && page.contains("LANDED inside every limit")
+    );
+}
+
+/// The mission's own words for a start on its pad.
+fn from_the_pad() -> from_apogee::Logged {
+    let mut recipe = sim::recipe::Recipe::built_in("mk2", "field").unwrap();
+    let toml = sim::recipe::toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
+    recipe.mission = vehicles::mission::from_toml(&toml, "mk2").unwrap();
+    recipe.mission_toml = toml;
+    from_apogee::fly_recipe(&recipe)
+}
+
+/// From the pad: the path shows the ascent with its moments, and stays above the ground.
+#[test]
+fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
+    let page = report(&from_the_pad().log).unwrap().html;
+    check(&page);
+    let whole = page.split("<h2>The whole flight</h2>").nth(1).unwrap();
+    let whole = whole.split("<h2>").next().unwrap();
+    let moments = ["lift-off", "burn-out", "separation", "apogee", "ignition", "contact"];
+    let places: Vec<usize> =
+        moments.iter().map(|moment| whole.find(&format!("<td>{moment}</td>")).unwrap()).collect();
+    assert!(places.is_sorted(), "{places:?}");
+    for part in ["ascent", "descent", "burn", "Seen from the west", "Seen from the south", "Seen from above"]
+    {
+        assert!(whole.contains(part), "{part}");
+    }
+    assert_eq!(whole.matches("<svg").count(), 3);
+    assert_eq!(whole.matches("class=\"place\"").count(), 3 * moments.len());
+}
+
+/// The estimate is compared with the truth in every direction, up to contact and not after it.
+#[test]
+fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
+    let recording = replay::log::Recording::open(&LANDED.log).unwrap();
+    let page = report(&LANDED.log).unwrap().html;
+    let section = page.split("<h2>Estimator error</h2>").nth(1).unwrap();
+    for row in
+        ["position north, m", "position east, m", "position, distance, m", "direction of the nose, deg"]
+    {
+        assert!(section.contains(row), "{row}");
+    }
+    assert!(!section.contains("e0<") && !section.contains("e-"), "no exponents");
+    let contact_s = recording.contact_s().unwrap();
+    let counted = recording
+        .frames
+        .iter()
+        .filter(|tick| tick.input.frame.is_multiple_of(10) && tick.input.time_s <= contact_s)
+        .count();
+    assert!(section.contains(&format!("At {counted} planning frames")), "{counted}");
 }

@@ -37,6 +37,13 @@ pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
     simulate("paper-calibrated", 1, &[link])
 });
 
+/// A rocket from apogee with telemetry to no receiver.
+pub(crate) static MK2_WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
+    let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
+    simulate("mk2", 1, &[link])
+});
+
 impl Simulated {
     pub(crate) fn recording(&self) -> Recording {
         Recording::open(&self.log).unwrap()

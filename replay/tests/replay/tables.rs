@@ -236,3 +236,53 @@ proptest! {
         }
     }
 }
+
+/// The dictionary has every column of every table; units, meanings and words are also in the Parquet files.
+#[test]
+fn every_column_is_in_the_dictionary_and_parquet_knows_units_and_words() {
+    let directory = export(&WITH_FRAMES, TableFormat::Parquet, "dictionary");
+    let text = read_text(&directory.join("dictionary.csv"));
+    let mut columns = 0;
+    for entry in std::fs::read_dir(&directory).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.extension().is_none_or(|ending| ending != "parquet") {
+            continue;
+        }
+        let reader = SerializedFileReader::new(std::fs::File::open(&entry).unwrap()).unwrap();
+        let table = entry.file_stem().unwrap().to_string_lossy().into_owned();
+        for column in reader.metadata().file_metadata().schema_descr().columns() {
+            columns += 1;
+            assert!(text.contains(&format!("\n{table},{},", column.path().parts()[0])), "{table} {column:?}");
+        }
+    }
+    assert_eq!(text.lines().count(), columns + 1);
+    for row in [
+        "controller_tick,input.time_s,number,s,,\n",
+        "mavlink_1_1_td_flight_status,time_boot_ms,whole number,ms,Time since boot.,\n",
+    ] {
+        assert!(text.contains(row), "{row}");
+    }
+    let file = std::fs::File::open(directory.join("controller_tick.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let facts = reader.metadata().file_metadata().key_value_metadata().unwrap();
+    let fact =
+        |key: &str| facts.iter().find(|fact| fact.key == key).and_then(|fact| fact.value.clone()).unwrap();
+    assert_eq!(fact("output.gimbal_command_rad.unit"), "rad");
+    assert_eq!(fact("input.phase.meaning"), "Index of the flight phase, as in the dialect's TD_PHASE.");
+    assert!(fact("input.phase.values").contains("9 TD_PHASE_POWERED"));
+}
+
+/// The components of a vector have the vector's unit and meaning.
+#[test]
+fn a_component_of_a_vector_has_the_unit_of_the_vector() {
+    let directory = crate::from_apogee::LANDED.beside("vectors");
+    let mut log = FlightLog::open(&crate::from_apogee::LANDED.log).unwrap();
+    export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    let text = read_text(&directory.join("dictionary.csv"));
+    for row in [
+        "vehicle_truth3d,state.velocity_m_s.x,number,m/s,In the world.,\n",
+        "vehicle_truth3d,wind_m_s.z,number,m/s,,\n",
+        "vehicle_truth3d,state.world_from_body.w,number,,Rotation from body to world axes.,\n",
+    ] {
+        assert!(text.contains(row), "{row}");
+    }
+}

@@ -1,6 +1,7 @@
 //! Tests other settings on recorded flights: open loop, closed loop, single ticks, sweeps.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicBool;
 
 use flight::rules::phase::Phase;
 use replay::evaluate::{EvaluateError, evaluate};
@@ -231,7 +232,7 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
         steps: 16,
         refly: ReflyOptions::default(),
     };
-    let report = bisect(&recording, &options).unwrap();
+    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
     assert!(report.outcome.landed);
     let flip = report.smallest().unwrap();
     assert!(flip.change < 0.0 && (flip.same_at - flip.other_at).abs() < 1e-12, "{flip:?}");
@@ -241,10 +242,15 @@ fn a_bisection_brackets_the_change_of_the_verdict() {
     };
     assert!(landed(flip.same_at) && !landed(flip.other_at));
     let outside = BisectOptions { value: Some(2.0), ..options.clone() };
-    assert!(bisect(&recording, &outside).unwrap_err().to_string().contains("does not lie between"));
+    assert!(
+        bisect(&recording, &outside, &AtomicBool::new(false))
+            .unwrap_err()
+            .to_string()
+            .contains("does not lie between")
+    );
     let refused = |path: &str| {
         let options = BisectOptions { value: None, path: path.to_owned(), ..options.clone() };
-        bisect(&recording, &options).unwrap_err().to_string()
+        bisect(&recording, &options, &AtomicBool::new(false)).unwrap_err().to_string()
     };
     // A key that the profile leaves out, and an unknown key.
     assert!(refused("gimbal.rate_limit_deg_s").contains("--value"));

@@ -1,6 +1,7 @@
 //! Tests settings that take whole numbers, in a sweep and in a bisection.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicBool;
 
 use replay::refly::ReflyOptions;
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
@@ -44,7 +45,7 @@ fn a_bisection_ends_between_neighbouring_whole_numbers() {
         steps: 4,
         refly: ReflyOptions::default(),
     };
-    let report = bisect(&recording, &options).unwrap();
+    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
     let flip = report.smallest().unwrap();
     assert_eq!((flip.same_at - flip.other_at).abs().to_bits(), 1.0_f64.to_bits(), "{flip:?}");
     let landed = |steps: f64| {

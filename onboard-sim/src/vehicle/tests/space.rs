@@ -59,7 +59,7 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
         assert!(said(&events, "no ascent is flown") && said(&events, "limits of the legs kept"));
         assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict { .. })));
         let recorded = rocket.verdict_record().unwrap();
-        assert_eq!((recorded.landed, recorded.limits.len()), (true, 4));
+        assert_eq!((recorded.landed, recorded.limits.len()), (true, 6));
     }
 }
 

@@ -29,6 +29,11 @@ use crate::settings::{Setting, mission_with, truth_with};
 /// Number and time of a record that is kept.
 type Kept = Vec<(f64, Record)>;
 
+/// Whether the log has all that its flight was made from.
+pub(super) fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
+    Recorded::of(recording).map(|_| ())
+}
+
 /// A recorded flight, flown again up to the moment of the start.
 #[derive(Debug)]
 pub(super) struct AtStart<'a> {
@@ -49,7 +54,7 @@ impl<'a> AtStart<'a> {
     /// Flies up to the start.
     pub(super) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.recorded_frames()?;
-        let Recorded { dispersion, number, mut rerun } = Recorded::of(recording)?;
+        let Recorded { dispersion, number, mut rerun, .. } = Recorded::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
@@ -172,7 +177,7 @@ impl<'a> AtStart<'a> {
         &self,
         options: &ReflyOptions,
     ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-        let Recorded { mut rerun, .. } = Recorded::of(self.recording)?;
+        let Recorded { mut rerun, faults, .. } = Recorded::with_faults(self.recording, &options.faults)?;
         let flight_v1::PilotStart { believed, gyro_bias_rad_s, .. } = pilot_start(&rerun.flight);
         let start = flight_v1::PilotStart { believed, gyro_bias_rad_s, ..*self.pilot_start };
         let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
@@ -182,7 +187,8 @@ impl<'a> AtStart<'a> {
             phase = rerun.flight.computer().mode().phase;
         }
         let (report, verdict) = self.fly(options, Some(&mut records))?;
-        let run = self.run_facts(options)?;
+        let mut run = self.run_facts(options)?;
+        run.insert("faults".to_owned(), faults);
         Ok((report, ReflownFlight { records, run, verdict, ..ReflownFlight::default() }))
     }
 
@@ -234,6 +240,19 @@ impl<'a> AtStart<'a> {
         }
     }
 
+    /// The flight at the start. With other faults it is flown there anew, and may have come another way.
+    fn with_other_faults(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
+        if options.faults.is_none() {
+            return Ok(self.rerun.clone());
+        }
+        let Recorded { mut rerun, .. } = Recorded::with_faults(self.recording, &options.faults)?;
+        while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {}
+        if options.from == From::Estimate {
+            put_where_it_believes(self.recording, &mut rerun, self.first_frame)?;
+        }
+        Ok(rerun)
+    }
+
     /// The flight at the start, with the changes that apply from there.
     fn changed(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
         refuse_timed(&options.plant_settings)?;
@@ -244,7 +263,7 @@ impl<'a> AtStart<'a> {
             return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
         }
         refuse_misplaced(options)?;
-        let mut rerun = self.rerun.clone();
+        let mut rerun = self.with_other_faults(options)?;
         let in_flight = self.in_flight(options)?;
         rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
 

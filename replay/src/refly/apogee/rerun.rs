@@ -12,8 +12,11 @@ use tick_log::sortie as sortie_log;
 
 use crate::controller::LoggedPilot;
 use crate::log::Recording;
-use crate::refly::ReflyError;
+use crate::refly::{FaultChanges, ReflyError};
 use crate::settings::Schedule;
+
+/// Stands for every recorded fault.
+const EVERY_FAULT: &str = "all";
 
 /// A flight in progress, with its faults and timed changes still to come.
 #[derive(Debug, Clone)]
@@ -29,6 +32,8 @@ pub(super) struct Recorded {
     pub(super) dispersion: Dispersion,
     pub(super) number: u64,
     pub(super) rerun: Rerun,
+    /// The faults that it is flown with, as text.
+    pub(super) faults: String,
 }
 
 impl Recorded {
@@ -37,6 +42,14 @@ impl Recorded {
     /// # Errors
     /// The log lacks a part of it, or this build does not know it.
     pub(super) fn of(recording: &Recording) -> Result<Self, ReflyError> {
+        Self::with_faults(recording, &FaultChanges::default())
+    }
+
+    /// The recipe of a recorded flight, with other faults.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of); or a fault to leave out is not there, or a fault to add is unknown.
+    pub(super) fn with_faults(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
         let (pilot_start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
         let run = &recording.head.run;
@@ -53,10 +66,11 @@ impl Recorded {
         let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
         let controller = sortie_log::controller_of(run).ok_or_else(unknown)?;
         let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
-        let faults: Vec<TimedFault> = faults
+        let recorded: Vec<TimedFault> = faults
             .map(str::parse)
             .collect::<Result<_, _>>()
             .map_err(|error: FaultError| lacking(error.to_string()))?;
+        let faults = changed(recording, &recorded, changes)?;
         let mission = LoggedPilot::schedule(recording.profile_toml()?, pilot_start, &[])?.base().clone();
         let recipe = Recipe {
             mission,
@@ -74,11 +88,12 @@ impl Recorded {
             None => flight,
         };
         // An abort that no fault caused came from the crew.
-        let by_fault = recipe.faults.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
+        let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);
         let aborts = crews.map(|tick| tick.input.frame).collect();
         let rerun = Rerun { flight, schedule: None, aborts };
-        Ok(Self { dispersion, number, rerun })
+        let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+        Ok(Self { dispersion, number, rerun, faults })
     }
 }
 
@@ -101,4 +116,33 @@ impl Rerun {
     pub(super) fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
         self.flight.computer().piloted().filter(|_| !self.flight.computer_is_dead())
     }
+}
+
+/// The recorded faults with the changes.
+fn changed(
+    recording: &Recording,
+    recorded: &[TimedFault],
+    changes: &FaultChanges,
+) -> Result<Vec<TimedFault>, ReflyError> {
+    let refused = |reason: String| ReflyError::Fault { name: recording.name.clone(), reason };
+    let mut faults = recorded.to_vec();
+    for without in &changes.without {
+        // `gnss-out` means every one of that name, `gnss-out@5` just that one.
+        let meant = |fault: &TimedFault| {
+            let given = fault.to_string();
+            let name = given.split([':', '@']).next().unwrap_or_default();
+            without == EVERY_FAULT || *without == given || without == name
+        };
+        let before = faults.len();
+        faults.retain(|fault| !meant(fault));
+        if faults.len() == before {
+            let listed: Vec<String> = recorded.iter().map(ToString::to_string).collect();
+            let listed = if listed.is_empty() { "no faults".to_owned() } else { listed.join(" ") };
+            return Err(refused(format!("no fault `{without}` to leave out; it was flown with {listed}")));
+        }
+    }
+    for with in &changes.with {
+        faults.push(with.parse().map_err(|error: FaultError| refused(error.to_string()))?);
+    }
+    Ok(faults)
 }

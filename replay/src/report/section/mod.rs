@@ -1,9 +1,12 @@
 //! The sections of a report, in the order they are read.
 
 mod completeness;
+mod descent;
 mod estimator;
+mod events;
 mod link;
 mod motion;
+mod path;
 mod phases;
 mod prediction;
 mod saturation;
@@ -24,10 +27,20 @@ pub(super) struct Section {
 /// Every section.
 pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
     let section = |title, html| Section { title, html };
-    vec![
+    let in_space = flight.from_apogee.is_some();
+    let mut all = vec![
         section("", verdict::html(flight, info)),
         section("Phases", phases::html(flight, info)),
-        section("Path, states and input", motion::html(flight)),
+        section("Events", events::html(flight)),
+    ];
+    if in_space {
+        all.push(section("The whole flight", path::html(flight)));
+    }
+    all.push(section("Path, states and input", motion::html(flight)));
+    if in_space {
+        all.push(section("Wind, fins, roll and sensors", descent::html(flight)));
+    }
+    all.extend([
         section("Tracking error by phase", tracking::html(flight)),
         section("Gimbal and fin saturation", saturation::html(flight)),
         section("Solver", solver::html(flight, info)),
@@ -36,7 +49,8 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         section("Estimator error", estimator::html(flight)),
         section("Link", link::html(flight, info)),
         section("Log", completeness::html(info)),
-    ]
+    ]);
+    all
 }
 
 /// Root mean square and largest magnitude of some numbers; `None` without any.

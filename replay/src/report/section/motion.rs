@@ -2,7 +2,7 @@
 
 use super::{COMPONENTS, DEGREES};
 use crate::report::chart::{Chart, Line};
-use crate::report::html::{charts, paragraph};
+use crate::report::html::{charts, paragraph, put};
 use crate::report::track::{Flight, GimbalAxis, Teller};
 
 pub(super) fn html(flight: &Flight) -> String {
@@ -12,18 +12,27 @@ pub(super) fn html(flight: &Flight) -> String {
         Teller::Telemetry => "From the telemetry of a ground station; the log has neither plant nor ticks.",
         Teller::Nobody => return paragraph("The log has no positions of the vehicle."),
     };
-    let mut pictures = vec![path(flight)];
+    // Without a landing, the pictures of the whole flight show all there is of its path.
+    let lands = flight.from_apogee.is_none() || !flight.plans.is_empty();
+    let mut pictures = Vec::new();
+    if lands {
+        pictures.push(path(flight));
+    }
     pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));
     pictures.extend(flight.gimbal.iter().map(|axis| input(flight, axis)));
     let mut words = who.to_owned();
-    if flight.from_apogee.is_some() {
-        words += " Seen in the vertical plane of the landing; the plans were made in air that moves over the ground.";
+    if let Some(in_space) = &flight.from_apogee {
+        put(&mut words, format_args!(" Seen in {}.", in_space.plane));
+        if lands {
+            words.push_str(" The plans were made in air that moves over the ground.");
+        }
     }
     paragraph(&words) + &charts(&pictures)
 }
 
 fn path(flight: &Flight) -> String {
     let shown = flight.track.iter().filter(|sample| flight.is_shown(sample.time_s));
+    let shown = shown.filter(|sample| flight.is_before_contact(sample.time_s));
     let flown = shown.map(|sample| (sample.state[0], sample.state[1])).collect();
     let mut lines: Vec<Line> = flight
         .plans
@@ -38,7 +47,10 @@ fn path(flight: &Flight) -> String {
         .collect();
     lines.push(Line { name: "flown", class: "a", points: flown });
     Chart {
-        title: "Path in the pitch plane".to_owned(),
+        title: match &flight.from_apogee {
+            None => "Path in the pitch plane".to_owned(),
+            Some(_) => "Path of the landing in its plane".to_owned(),
+        },
         x_label: "x, m",
         y_label: "altitude, m",
         lines,

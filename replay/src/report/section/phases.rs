@@ -12,12 +12,9 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
     };
     let mut html = strip(flight, &timeline.spans);
     html.push_str(&times(flight, &timeline.spans));
-    let mut rows: Vec<Vec<String>> = moments(flight)
-        .into_iter()
-        .map(|(what, value)| {
-            vec![escaped(what), value.map_or_else(|| "not in the log".to_owned(), |s| format!("{s:.3} s"))]
-        })
-        .collect();
+    let known = moments(flight).into_iter().filter_map(|(what, time_s)| Some((what, time_s?)));
+    let mut rows: Vec<Vec<String>> =
+        known.map(|(what, time_s)| vec![escaped(what), format!("{time_s:.3} s")]).collect();
     if let (Some(through_s), Some(touchdown_s)) = (thrust_through_weight_s(flight), flight.touchdown_s) {
         let words = if through_s <= touchdown_s { "before" } else { "after" };
         rows.push(vec![
@@ -25,8 +22,10 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
             format!("{:.3} s {words} touchdown", (touchdown_s - through_s).abs()),
         ]);
     }
-    html.push_str(&table(&["moment", "#"], &rows));
-    html
+    if rows.is_empty() {
+        return html + &paragraph("The log has no ignition of the landing motor.");
+    }
+    html + &table(&["moment", "#"], &rows)
 }
 
 /// The phases as a strip, with their times.
@@ -94,7 +93,7 @@ fn moments(flight: &Flight) -> Vec<(&'static str, Option<f64>)> {
     let confirmed_s = confirmed.map(|sample| sample.time_s).zip(flight.ignition_s).map(|(a, b)| a - b);
     let burn_s = flight.touchdown_s.zip(flight.ignition_s).map(|(a, b)| a - b);
     vec![
-        ("ignition command, vehicle time", flight.ignition_s),
+        ("ignition command, T+", flight.ignition_s),
         ("ignition delay: command to half of nominal thrust", delay_s),
         ("command to thrust confirmed on board", confirmed_s),
         ("command to touchdown", burn_s),

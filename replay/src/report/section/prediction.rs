@@ -55,5 +55,9 @@ pub(super) fn html(flight: &Flight) -> String {
     } else {
         "A plan ends with its horizon; a vehicle that comes down earlier ends its burn on the ground."
     };
-    paragraph(words) + &charts(&pictures)
+    let contact = flight.from_apogee.as_ref().zip(flight.touchdown_s).and_then(|(in_space, contact_s)| {
+        let before = in_space.across_m.iter().rfind(|(time_s, _)| *time_s <= contact_s)?;
+        Some(paragraph(&format!("Contact was {:.3} m across the plane of the plans.", before.1.abs())))
+    });
+    paragraph(words) + &contact.unwrap_or_default() + &charts(&pictures)
 }

@@ -67,6 +67,37 @@ pub(super) fn html(flight: &Flight) -> String {
         ..Chart::default()
     };
     paragraph("Actual state minus the state planned at each tick, root mean square / largest.")
+        + &across(flight)
         + &table(&all, &rows)
         + &charts(&[chart.svg()])
+}
+
+/// A plan lies in a plane; what the vehicle moved across it is no part of the table.
+fn across(flight: &Flight) -> String {
+    let Some(in_space) = &flight.from_apogee else {
+        return String::new();
+    };
+    let at = |time_s: f64| {
+        let place = in_space.across_m.partition_point(|(sample_s, _)| *sample_s < time_s - 1e-4);
+        in_space.across_m.get(place).map(|(_, across_m)| *across_m)
+    };
+    let moved = AHEAD_S.map(|ahead_s| {
+        let plans = flight.plans.iter().filter(|plan| flight.is_before_contact(plan.time_s + ahead_s));
+        rms_and_max(plans.filter_map(|plan| Some(at(plan.time_s + ahead_s)? - at(plan.time_s)?)))
+    });
+    let words: Vec<String> = AHEAD_S
+        .iter()
+        .zip(moved)
+        .filter_map(|(ahead_s, moved)| {
+            let (rms, max) = moved?;
+            Some(format!("{rms:.3} / {max:.3} m in {ahead_s} s"))
+        })
+        .collect();
+    if words.is_empty() {
+        return String::new();
+    }
+    paragraph(&format!(
+        "The plans lie in one plane. Across it, where nothing is planned, the vehicle moved {}.",
+        words.join(" and ")
+    ))
 }

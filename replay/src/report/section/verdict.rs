@@ -1,40 +1,49 @@
 //! The verdict, each value against its limit.
 
 use crate::info::{Info, VerdictLimit};
-use crate::report::html::{escaped, paragraph, table};
+use crate::report::html::{escaped, paragraph, table_of_limits};
 use crate::report::track::Flight;
 
 pub(super) fn html(_: &Flight, info: &Info) -> String {
     let Some(verdict) = &info.verdict else {
-        return "<p class=\"verdict\">No verdict in this log</p>\n".to_owned()
+        let ending = info.ending.as_deref().unwrap_or("No verdict in this log");
+        return format!("<p class=\"verdict\">{}</p>\n", escaped(ending))
             + &paragraph(
                 "The vehicle did not touch down while it was recorded, or its verdict was not recorded.",
             );
     };
-    let broken: Vec<&str> =
-        verdict.limits.iter().filter(|limit| !limit.passed).map(|limit| limit.name.as_str()).collect();
-    let (class, words) = if verdict.landed {
-        ("good", format!("LANDED at {:.3} s, inside every limit", verdict.time_s))
+    let class = if verdict.landed { "good" } else { "bad" };
+    let contact = info.clocks.words(verdict.contact());
+    let mut html = format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&verdict.ending))
+        + &paragraph(&format!("Touchdown at {contact}."));
+    if verdict.table_2.is_empty() {
+        html += &limits("touchdown", &verdict.limits);
     } else {
-        ("bad", format!("NOT LANDED at {:.3} s: outside in {}", verdict.time_s, broken.join(", ")))
+        html += &limits("by the limits of the legs", &verdict.limits);
+        html += &limits("by the landing paper's Table 2", &verdict.table_2);
+    }
+    html
+}
+
+fn limits(title: &str, limits: &[VerdictLimit]) -> String {
+    let row = |limit: &VerdictLimit| {
+        let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
+        vec![
+            escaped(&limit.name),
+            format!("{:.3}", limit.value + 0.0),
+            format!("{} to {}", short(limit.minimum), short(limit.maximum)),
+            escaped(&limit.unit),
+            format!("<span class=\"{class}\">{word}</span>"),
+            bar(limit),
+        ]
     };
-    let rows: Vec<Vec<String>> = verdict
-        .limits
-        .iter()
-        .map(|limit| {
-            let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
-            vec![
-                escaped(&limit.name),
-                format!("{:.4}", limit.value),
-                escaped(&limit.unit),
-                format!("{:.4} to {:.4}", limit.minimum, limit.maximum),
-                format!("<span class=\"{class}\">{word}</span>"),
-                bar(limit),
-            ]
-        })
-        .collect();
-    format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&words))
-        + &table(&["touchdown", "#value", "unit", "limit", "", "share of the limit"], &rows)
+    let rows: Vec<Vec<String>> = limits.iter().map(row).collect();
+    table_of_limits(&[title, "#value", "#limit", "unit", "", "share of the limit"], &rows)
+}
+
+/// Rounds away the error of converting degrees to radians and back.
+fn short(limit: f64) -> String {
+    format!("{}", (1e6 * limit).round() / 1e6 + 0.0)
 }
 
 /// Where the value lies in its range, the grey strip; a value outside is drawn at the end of the strip.

@@ -1,0 +1,111 @@
+//! `replay gate`.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+use anyhow::{Context as _, Result, ensure};
+use clap::Args;
+use replay::gate::{Baseline, Change, GateProgress, GateState, Judged, find, fly_all, judge};
+use replay::output::{Destination, NewFile, Overwrite};
+use replay::print::{GateReport, JunitCase, gate_cases, print_gate, print_json, print_junit};
+
+use super::{Answer, answer, say, stop_on_interrupt};
+
+#[derive(Debug, Args)]
+pub(super) struct Ask {
+    /// The directory: logs (*.mcap) and campaigns, in subdirectories, too.
+    directory: PathBuf,
+    /// The outcomes that were accepted, a JSON file.
+    #[arg(long, value_name = "FILE")]
+    baseline: PathBuf,
+    /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed.
+    #[arg(long)]
+    accept: bool,
+    /// Let this build decide differently from the record, as long as no flight gets worse.
+    #[arg(long)]
+    may_diverge: bool,
+    /// A margin that changed by no more than this is the same (1 is from the middle of the limits to their edge).
+    #[arg(long, value_name = "MARGIN", default_value_t = 0.02)]
+    tolerance: f64,
+    /// Flights flown at the same time; the answer does not depend on it [default: all processors].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Keep every finished flight in this file, and continue from it if it exists.
+    #[arg(long, value_name = "FILE")]
+    state: Option<PathBuf>,
+    /// Write JUnit XML to this file, beside the table; an earlier one is replaced.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Answer in JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Ask {
+    pub(super) fn run(self) -> Result<Answer> {
+        ensure!(
+            self.tolerance >= 0.0 && self.tolerance.is_finite(),
+            "--tolerance {}: must be 0 or more",
+            self.tolerance
+        );
+        let baseline = match Baseline::read(&self.baseline) {
+            Ok(baseline) => baseline,
+            // The first baseline.
+            Err(_) if self.accept && !self.baseline.exists() => Baseline::default(),
+            Err(error) => return Err(error.into()),
+        };
+        let flights = find(&self.directory)?;
+        let mut state = match &self.state {
+            None => GateState::in_memory(),
+            Some(path) => {
+                GateState::open(path).with_context(|| format!("{}: cannot be used", path.display()))?
+            }
+        };
+        let jobs =
+            self.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+        let stop = stop_on_interrupt()?;
+        let outcomes = fly_all(&flights, jobs, &mut state, &stop, &mut show)
+            .context("the state file cannot be written")?;
+        let interrupted = stop.load(Ordering::Relaxed) && outcomes.len() < flights.len();
+        let mut judged = judge(&outcomes, &baseline, self.tolerance);
+        if interrupted {
+            // What was not reached is not missing.
+            let known = |judged: &Judged| !flights.iter().any(|found| found.name == judged.name);
+            judged.retain(|judged| judged.change != Change::Missing || known(judged));
+        }
+        let passed = !interrupted && !judged.iter().any(|judged| judged.fails(self.may_diverge));
+        if let Some(path) = &self.junit {
+            write_junit(path, &gate_cases(&judged, self.may_diverge))?;
+        }
+        let report = GateReport { passed, interrupted, flights: &judged };
+        answer(|output| if self.json { print_json(&report, output) } else { print_gate(&report, output) })?;
+        if self.accept && !interrupted {
+            Baseline::of(outcomes).write(&self.baseline)?;
+            say(&format!("accepted: {}", self.baseline.display()));
+            return Ok(Answer::Given);
+        }
+        Ok(if interrupted { Answer::NotAll } else { Answer::Compared { within: passed } })
+    }
+}
+
+fn write_junit(path: &Path, cases: &[JunitCase]) -> Result<()> {
+    let written = NewFile::create(Destination { path, overwrite: Overwrite::Always }, Path::new(""))
+        .and_then(|mut file| {
+            print_junit("gate", cases.to_vec(), &mut file)?;
+            file.commit()
+        });
+    written.with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Shows progress about twenty times on a terminal, elsewhere only at the end.
+fn show(GateProgress { done, flights }: GateProgress) {
+    let mut output = std::io::stderr();
+    let ended = done == flights;
+    if ended || (output.is_terminal() && done.is_multiple_of((flights / 20).max(1))) {
+        let end = if ended { "\n" } else { "" };
+        // Progress goes to standard error, which may be closed.
+        let _ = write!(output, "\rreplay: {done} of {flights} flights{end}");
+    }
+}

@@ -1,0 +1,71 @@
+//! Verifies a flight and flies it again.
+
+use std::path::Path;
+
+use super::{Checked, Flown, Found, Outcome, campaign};
+use crate::log::Recording;
+use crate::refly::{ReflyOptions, StartAt, margin, refly};
+use crate::verify::{Verification, verify};
+
+/// What this build makes of a flight. Whatever is wrong is part of the outcome.
+pub(super) fn fly(found: &Found) -> Outcome {
+    match found.number {
+        None => log(&found.path),
+        Some(number) => campaign::fly(&found.path, number).unwrap_or_else(|error| Outcome {
+            checked: Checked::Unverified,
+            flown: None,
+            problem: Some(words(error)),
+        }),
+    }
+}
+
+fn log(path: &Path) -> Outcome {
+    let (checked, mut problem) = match verify(path) {
+        Err(error) => (Checked::Unverified, Some(words(error))),
+        Ok(reports) => {
+            let all = |wanted: Verification| reports.iter().all(|report| report.outcome == wanted);
+            let obstacle = reports.iter().find_map(|report| {
+                report.obstacle.as_ref().map(ToString::to_string).or_else(|| report.damage.clone())
+            });
+            match () {
+                () if reports.iter().any(|report| report.outcome == Verification::Diverged) => {
+                    let first = reports.iter().find_map(|report| report.first_divergence.as_ref());
+                    (Checked::Diverged, first.map(|first| format!("first different at tick {}", first.tick)))
+                }
+                () if all(Verification::Identical) => (Checked::Identical, None),
+                () => (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned()))),
+            }
+        }
+    };
+    let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
+        // From its first frame on, the whole flight is this build's. A planar landing begins with its first tick.
+        let start = recording.frames.first().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
+        refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
+    });
+    let flown = match again {
+        Ok(report) => report.reflown.map(|verdict| Flown {
+            landed: verdict.landed,
+            margin: Some(format!("{:?}", margin(&verdict))),
+            ending: verdict.ending,
+        }),
+        Err(error) => {
+            problem.get_or_insert(words(error));
+            None
+        }
+    };
+    Outcome { checked, flown, problem }
+}
+
+/// An error and its causes.
+fn words(error: impl std::error::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(deeper) = cause {
+        let more = deeper.to_string();
+        if !words.contains(&more) {
+            words = format!("{words}: {more}");
+        }
+        cause = deeper.source();
+    }
+    words
+}

@@ -1,0 +1,184 @@
+//! Says what became of each flight since the baseline.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{Baseline, Checked, Flown, Outcome};
+
+/// What became of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Change {
+    /// Within the tolerance of the margin.
+    Same,
+    /// It has more margin.
+    Better,
+    /// It landed neither then nor before, or has less margin.
+    Worse,
+    /// It lands now and did not before.
+    NowLands,
+    /// It does not land any more.
+    NoLongerLands,
+    /// Its recorded decisions are not made any more, and it has the same margin.
+    Diverged,
+    /// It can no longer be verified or flown again.
+    Lost,
+    /// The baseline does not have it.
+    New,
+    /// The baseline has it, and the directory does not.
+    Missing,
+}
+
+impl Change {
+    /// The word in the table.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Same => "same",
+            Self::Better => "better",
+            Self::Worse => "WORSE",
+            Self::NowLands => "FLIPPED: lands now",
+            Self::NoLongerLands => "FLIPPED: lands no longer",
+            Self::Diverged => "DIVERGED",
+            Self::Lost => "LOST",
+            Self::New => "new",
+            Self::Missing => "MISSING",
+        }
+    }
+
+    /// Whether it fails the gate.
+    fn fails(self) -> bool {
+        matches!(self, Self::Worse | Self::NoLongerLands | Self::Diverged | Self::Lost | Self::Missing)
+    }
+}
+
+/// A flight and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    pub name: String,
+    pub change: Change,
+    /// The recorded decisions were made again and are not any more, whatever the margin.
+    pub newly_diverged: bool,
+    /// Accepted earlier.
+    pub before: Option<Outcome>,
+    /// Now.
+    pub now: Option<Outcome>,
+}
+
+impl Judged {
+    /// Whether it fails the gate; `may_diverge`: another build may decide differently as long as nothing gets worse.
+    pub fn fails(&self, may_diverge: bool) -> bool {
+        match self.change {
+            Change::Diverged => !may_diverge,
+            change => change.fails() || (self.newly_diverged && !may_diverge),
+        }
+    }
+}
+
+/// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same.
+pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
+    let of_now = outcomes.iter().map(|(name, now)| {
+        let before = baseline.flights.get(name);
+        let change = before.map_or(Change::New, |before| change(before, now, tolerance));
+        let newly_diverged = now.checked == Checked::Diverged
+            && before.is_some_and(|before| before.checked == Checked::Identical);
+        Judged { name: name.clone(), change, newly_diverged, before: before.cloned(), now: Some(now.clone()) }
+    });
+    let missing = baseline.flights.iter().filter(|(name, _)| !outcomes.contains_key(*name));
+    let missing = missing.map(|(name, before)| Judged {
+        name: name.clone(),
+        change: Change::Missing,
+        newly_diverged: false,
+        before: Some(before.clone()),
+        now: None,
+    });
+    let mut judged: Vec<Judged> = of_now.chain(missing).collect();
+    judged.sort_by(|a, b| in_order(&a.name).cmp(&in_order(&b.name)));
+    judged
+}
+
+/// Flight 10 of a campaign comes after flight 9.
+fn in_order(name: &str) -> (&str, u64) {
+    let numbered =
+        name.rsplit_once('#').and_then(|(campaign, number)| Some((campaign, number.parse().ok()?)));
+    numbered.unwrap_or((name, 0))
+}
+
+fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
+    let landed = |outcome: &Outcome| outcome.flown.as_ref().is_some_and(|flown| flown.landed);
+    match (landed(before), landed(now)) {
+        (true, false) => return Change::NoLongerLands,
+        (false, true) => return Change::NowLands,
+        _ => {}
+    }
+    if before.checked == Checked::Identical && now.checked == Checked::Unverified {
+        return Change::Lost;
+    }
+    let margin = |outcome: &Outcome| outcome.flown.as_ref().and_then(Flown::margin);
+    match (margin(before), margin(now)) {
+        (Some(_), None) => Change::Lost,
+        (None, Some(_)) => Change::Better,
+        (Some(then), Some(now)) if now < then - tolerance => Change::Worse,
+        (Some(then), Some(now)) if now > then + tolerance => Change::Better,
+        _ if before.checked == Checked::Identical && now.checked == Checked::Diverged => Change::Diverged,
+        _ => Change::Same,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(checked: Checked, landed: bool, margin: f64) -> Outcome {
+        let flown = Flown { landed, ending: String::new(), margin: Some(format!("{margin:?}")) };
+        Outcome { checked, flown: Some(flown), problem: None }
+    }
+
+    fn judged(before: Outcome, now: Outcome) -> Judged {
+        let named = |outcome| BTreeMap::from([("a".to_owned(), outcome)]);
+        judge(&named(now), &Baseline::of(named(before)), 0.02).remove(0)
+    }
+
+    #[test]
+    fn every_change_has_its_name_and_the_bad_ones_fail() {
+        use Checked::{Diverged, Identical, Unverified};
+        let before = outcome(Identical, true, 0.5);
+        // Whether it fails, and whether it does if the decisions may differ.
+        for (now, expected, fails) in [
+            (outcome(Identical, true, 0.51), Change::Same, [false, false]),
+            (outcome(Identical, true, 0.6), Change::Better, [false, false]),
+            (outcome(Identical, true, 0.4), Change::Worse, [true, true]),
+            (outcome(Diverged, true, 0.51), Change::Diverged, [true, false]),
+            (outcome(Diverged, true, 0.6), Change::Better, [true, false]),
+            (outcome(Diverged, true, 0.4), Change::Worse, [true, true]),
+            (outcome(Unverified, true, 0.6), Change::Lost, [true, true]),
+            (outcome(Identical, false, -0.1), Change::NoLongerLands, [true, true]),
+        ] {
+            let judged = judged(before.clone(), now);
+            assert_eq!((judged.change, [false, true].map(|may| judged.fails(may))), (expected, fails));
+        }
+        let crashed = outcome(Diverged, false, -2.0);
+        assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)).change, Change::NowLands);
+        // A divergence that was accepted is no news.
+        let same = judged(crashed.clone(), crashed);
+        assert_eq!((same.change, same.fails(false)), (Change::Same, false));
+    }
+
+    #[test]
+    fn flights_of_a_campaign_are_listed_by_their_number() {
+        let flights =
+            ["a#10", "a#9", "a.mcap"].map(|name| (name.to_owned(), outcome(Checked::Identical, true, 0.5)));
+        let judged = judge(&BTreeMap::from(flights), &Baseline::default(), 0.0);
+        let names: Vec<&str> = judged.iter().map(|judged| judged.name.as_str()).collect();
+        assert_eq!(names, ["a#9", "a#10", "a.mcap"]);
+    }
+
+    #[test]
+    fn a_flight_that_only_one_of_them_has_is_named() {
+        let flights =
+            |name: &str| BTreeMap::from([(name.to_owned(), outcome(Checked::Identical, true, 0.5))]);
+        let judged = judge(&flights("a"), &Baseline::of(flights("b")), 0.0);
+        let changes: Vec<_> = judged.iter().map(|judged| (judged.name.as_str(), judged.change)).collect();
+        assert_eq!(changes, [("a", Change::New), ("b", Change::Missing)]);
+    }
+}

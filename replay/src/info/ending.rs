@@ -1,0 +1,75 @@
+//! How a flight ended, from all that its log says.
+
+use flight::rules::phase::Phase;
+
+use super::VerdictFacts;
+use crate::log::Entry;
+
+/// Begins the event of a start that was refused.
+const REFUSED: &str = "REFUSED: ";
+/// The number of an abort among the requests of a frame.
+const ASKED_ABORT: u32 = 4;
+/// The answer of a frame that accepts a request.
+const ACCEPTED: u32 = 0;
+/// The bit of a latched abort among the interlocks of telemetry.
+const ABORT_LATCHED: u32 = 8;
+
+/// Follows what decides how a flight ended.
+#[derive(Debug, Default)]
+pub(super) struct EndingTracker {
+    aborted: bool,
+    refused: Option<String>,
+    last_phase: Option<u32>,
+}
+
+impl EndingTracker {
+    pub(super) fn note(&mut self, entry: &Entry) {
+        let phase = match entry {
+            Entry::ComputerFrame(frame) => {
+                let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
+                self.aborted |=
+                    answered.any(|(request, answer)| request.asked == ASKED_ABORT && *answer == ACCEPTED);
+                frame.output.phase
+            }
+            Entry::PilotTick(tick) => {
+                self.aborted |= tick.input.abort;
+                tick.output.phase
+            }
+            Entry::Tick(tick) => tick.input.phase,
+            Entry::Truth(truth) => truth.phase,
+            Entry::Telemetry(telemetry) => {
+                self.aborted |= telemetry.interlocks.is_some_and(|bits| bits & ABORT_LATCHED != 0);
+                let Some(phase) = telemetry.phase else { return };
+                phase
+            }
+            Entry::Event(event) => {
+                if let Some(reason) = event.message.strip_prefix(REFUSED) {
+                    self.refused = Some(reason.to_owned());
+                }
+                return;
+            }
+            _ => return,
+        };
+        self.last_phase = Some(phase);
+    }
+
+    /// The sentence; `None` for a log that ends in flight without saying anything.
+    pub(super) fn words(&self, verdict: Option<&VerdictFacts>) -> Option<String> {
+        if let Some(verdict) = verdict {
+            return Some(verdict.ending.clone());
+        }
+        let phase = self.last_phase.and_then(|phase| u8::try_from(phase).ok()).and_then(Phase::from_index);
+        let name = phase.map_or("an unknown phase", Phase::name);
+        if let Some(reason) = &self.refused {
+            return Some(format!("REFUSED: {reason}"));
+        }
+        if self.aborted {
+            return Some(format!("ABORTED in {name}"));
+        }
+        match phase {
+            Some(Phase::Chute) => Some("under the parachute when the log ends; no verdict".to_owned()),
+            Some(phase) if phase.on_pad() => Some(format!("NOT FLOWN: the log ends in {name}")),
+            _ => None,
+        }
+    }
+}

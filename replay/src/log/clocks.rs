@@ -1,0 +1,160 @@
+//! The clocks of a log and how they differ.
+//!
+//! `T+` counts from the release of the vehicle (the end of its countdown), `boot` from the power-up of its computer, and
+//! `log` from the first record. The flight computer's frames and the simulated truth count in T+.
+
+use std::fmt;
+use std::str::FromStr;
+
+use protocol::log::reader::LogChannel;
+use serde::Serialize;
+
+use super::heard::{frame_of, heard_by_ground};
+use super::{Entry, StampedEntry};
+
+/// A clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clock {
+    /// Since the release.
+    Flight,
+    /// Since power-up.
+    Boot,
+    /// Since the first record of the log.
+    Log,
+}
+
+/// When the clocks of a log were at zero, s after its first record.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Clocks {
+    /// T+0.
+    pub flight_zero_s: Option<f64>,
+    /// Power-up.
+    pub boot_zero_s: Option<f64>,
+    /// What a ground station calls 0 in its telemetry records.
+    pub telemetry_zero_s: Option<f64>,
+}
+
+/// A time on one of the clocks, as in `T+12.9`, `boot:19.8` or `log:19.7`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockTime {
+    pub clock: Clock,
+    pub time_s: f64,
+}
+
+/// Why a text is no time.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7")]
+pub struct ClockTimeError {
+    given: String,
+}
+
+impl FromStr for ClockTime {
+    type Err = ClockTimeError;
+
+    fn from_str(given: &str) -> Result<Self, ClockTimeError> {
+        let prefixes = [("T+", Clock::Flight), ("boot:", Clock::Boot), ("log:", Clock::Log)];
+        let named = prefixes.iter().find_map(|(prefix, clock)| Some((*clock, given.strip_prefix(prefix)?)));
+        let (clock, number) = named.unwrap_or((Clock::Flight, given));
+        match number.trim().parse::<f64>() {
+            Ok(time_s) if time_s.is_finite() => Ok(Self { clock, time_s }),
+            _ => Err(ClockTimeError { given: given.to_owned() }),
+        }
+    }
+}
+
+impl fmt::Display for ClockTime {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.clock {
+            Clock::Flight => write!(out, "T+{:.3} s", self.time_s),
+            Clock::Boot => write!(out, "boot {:.3} s", self.time_s),
+            Clock::Log => write!(out, "log {:.3} s", self.time_s),
+        }
+    }
+}
+
+impl Clocks {
+    /// Notes a record, `since_s` after the first one.
+    pub(crate) fn note(&mut self, channel: Option<&LogChannel>, stamped: &StampedEntry, since_s: f64) {
+        match &stamped.entry {
+            Entry::ComputerFrame(frame) => {
+                self.boot_zero_s.get_or_insert(since_s - frame.input.time_s);
+            }
+            Entry::PilotTick(tick) => {
+                self.flight_zero_s.get_or_insert(since_s - tick.input.time_s);
+            }
+            // The planar vehicle has one clock.
+            Entry::Tick(tick) => {
+                self.flight_zero_s.get_or_insert(since_s - tick.input.time_s);
+                self.boot_zero_s.get_or_insert(since_s - tick.input.time_s);
+            }
+            Entry::Telemetry(telemetry) => {
+                self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);
+            }
+            Entry::RawFrame if self.flight_zero_s.is_none() && heard_by_ground(channel) => {
+                if let Some(boot_s) = boot_time_s(&stamped.data) {
+                    // The message that was delayed least says best when the vehicle was powered up.
+                    let zero_s = since_s - boot_s;
+                    self.boot_zero_s = Some(self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s)));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A time on another clock; `None` if the log does not connect the two.
+    pub fn convert(&self, time: ClockTime, clock: Clock) -> Option<ClockTime> {
+        if time.clock == clock {
+            return Some(time);
+        }
+        let zero_s = |clock: Clock| match clock {
+            Clock::Flight => self.flight_zero_s,
+            Clock::Boot => self.boot_zero_s,
+            Clock::Log => Some(0.0),
+        };
+        let log_s = time.time_s + zero_s(time.clock)?;
+        Some(ClockTime { clock, time_s: log_s - zero_s(clock)? })
+    }
+
+    /// A time and what it is on the other clocks, for people.
+    pub fn words(&self, time: ClockTime) -> String {
+        let others =
+            [Clock::Flight, Clock::Boot, Clock::Log].into_iter().filter(|clock| *clock != time.clock);
+        let others: Vec<String> =
+            others.filter_map(|clock| self.convert(time, clock)).map(|time| time.to_string()).collect();
+        if others.is_empty() { time.to_string() } else { format!("{time} ({})", others.join(", ")) }
+    }
+}
+
+/// The time since power-up in a message of the vehicle, s, for the messages that are sent most often.
+fn boot_time_s(bytes: &[u8]) -> Option<f64> {
+    use protocol::dialect::MavMessage as M;
+    let time_ms = match frame_of(bytes)?.decode().ok()? {
+        M::TD_FLIGHT_STATUS(data) => data.time_boot_ms,
+        M::LOCAL_POSITION_NED(data) => data.time_boot_ms,
+        M::ATTITUDE_QUATERNION(data) => data.time_boot_ms,
+        _ => return None,
+    };
+    Some(f64::from(time_ms) / 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_read_with_its_clock_and_converted() {
+        let clocks = Clocks { flight_zero_s: Some(6.9), boot_zero_s: Some(-0.1), telemetry_zero_s: None };
+        for (given, flight_s) in [("T+12", 12.0), ("12", 12.0), ("boot:19", 12.0), ("log:18.9", 12.0)] {
+            let time: ClockTime = given.parse().unwrap();
+            let found = clocks.convert(time, Clock::Flight).unwrap();
+            assert!((found.time_s - flight_s).abs() < 1e-9, "{given}: {found}");
+        }
+        for wrong in ["T-1s", "boot 3", "utc:3", "", "log:inf"] {
+            assert!(wrong.parse::<ClockTime>().is_err(), "{wrong}");
+        }
+        let time = ClockTime { clock: Clock::Flight, time_s: 12.0 };
+        assert_eq!(clocks.words(time), "T+12.000 s (boot 19.000 s, log 18.900 s)");
+        assert_eq!(Clocks::default().words(time), "T+12.000 s");
+    }
+}

@@ -1,0 +1,164 @@
+//! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
+
+use protocol::dialect::{
+    MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase,
+};
+use protocol::frame::{Frame, Framer};
+use protocol::log::reader::LogChannel;
+use protocol::log::record::TOPIC_RAW_RX;
+use protocol::log::v1;
+use sim::ending::{FlightEnding, UNDER_PARACHUTE};
+
+use super::{Entry, StampedEntry};
+
+/// A value of the verdict whose limit no message has given.
+const NOT_TOLD: f64 = f64::NAN;
+/// Limits up to these are the landing paper's Table 2: m/s along and across the axis.
+const TABLE_2_M_S: [f64; 2] = [0.4, 0.1];
+const ROUNDING: f64 = 1e-6;
+
+/// The verdict as the vehicle told it over the air.
+#[derive(Debug, Default)]
+pub(crate) struct Heard {
+    limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
+    verdict: Option<TD_LANDING_VERDICT_DATA>,
+    aborted: bool,
+    under_parachute: bool,
+}
+
+/// Collects the verdict while a log is read.
+#[derive(Debug, Default)]
+pub(crate) struct Verdicts {
+    recorded: Option<v1::LandingVerdict>,
+    heard: Heard,
+    has_ticks: bool,
+}
+
+/// A verdict of a log.
+pub(crate) struct Found {
+    pub(crate) verdict: v1::LandingVerdict,
+    /// Its time counts from power-up, because it was heard by a ground station.
+    pub(crate) heard: bool,
+}
+
+impl Heard {
+    /// Takes a message of the vehicle.
+    pub(crate) fn take(&mut self, message: &MavMessage) {
+        match message {
+            MavMessage::TD_TOUCHDOWN_LIMITS(limits) => self.limits = Some(limits.clone()),
+            MavMessage::TD_LANDING_VERDICT(verdict) => {
+                self.verdict.get_or_insert_with(|| verdict.clone());
+            }
+            MavMessage::TD_FLIGHT_STATUS(status) => {
+                self.aborted |= status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
+                self.under_parachute |= status.phase == TdPhase::TD_PHASE_CHUTE;
+            }
+            _ => {}
+        }
+    }
+
+    /// The verdict as a record; its time counts from power-up.
+    pub(crate) fn verdict(&self) -> Option<v1::LandingVerdict> {
+        let verdict = self.verdict.as_ref()?;
+        let limits = self.limits.as_ref();
+        let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
+            limits.map_or(NOT_TOLD, |all| f64::from(limit(all)))
+        };
+        let [u_m_s, w_m_s] = [told(|l| l.u_m_s), told(|l| l.w_m_s)];
+        let is_table_2 = u_m_s <= TABLE_2_M_S[0] + ROUNDING && w_m_s <= TABLE_2_M_S[1] + ROUNDING;
+        let names = if is_table_2 {
+            ["x", "altitude", "pitch error", "u", "w", "pitch rate"]
+        } else {
+            ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"]
+        };
+        let upright_deg = (f64::from(verdict.pitch_rad) - core::f64::consts::FRAC_PI_2).to_degrees();
+        let turning_deg_s = f64::from(verdict.q_rad_s).to_degrees();
+        let (tilt_deg, rate_deg_s) =
+            (told(|l| l.pitch_error_rad).to_degrees(), told(|l| l.q_rad_s).to_degrees());
+        // In the order of the verdict's bits.
+        let rows: [(&str, f64, f64, f64); 6] = [
+            ("m", f64::from(verdict.x_m), -told(|l| l.x_m), told(|l| l.x_m)),
+            ("m", f64::from(verdict.altitude_m), told(|l| l.altitude_min_m), told(|l| l.altitude_max_m)),
+            ("deg", if is_table_2 { upright_deg } else { upright_deg.abs() }, -tilt_deg, tilt_deg),
+            ("m/s", f64::from(verdict.u_m_s), -u_m_s, u_m_s),
+            ("m/s", f64::from(verdict.w_m_s), -w_m_s, w_m_s),
+            ("deg/s", turning_deg_s, -rate_deg_s, rate_deg_s),
+        ];
+        let limit =
+            |(place, (unit, value, minimum, maximum)): (usize, (&str, f64, f64, f64))| v1::LimitResult {
+                name: names[place].to_owned(),
+                value,
+                minimum,
+                maximum,
+                unit: unit.to_owned(),
+                passed: verdict.limits_violated.bits() & (1 << place) == 0,
+            };
+        let limits: Vec<v1::LimitResult> = rows.into_iter().enumerate().map(limit).collect();
+        let broken = limits.iter().find(|limit| !limit.passed).map(|limit| limit.name.as_str());
+        let landed = verdict.landed != 0;
+        let ending = FlightEnding {
+            aborted: self.aborted,
+            landed,
+            table_2: is_table_2.then_some(landed),
+            failure: if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken },
+        };
+        Some(v1::LandingVerdict {
+            time_s: f64::from(verdict.time_boot_ms) / 1e3,
+            state: v1::PlanarState {
+                x_m: f64::from(verdict.x_m),
+                z_m: f64::from(verdict.altitude_m),
+                theta_rad: f64::from(verdict.pitch_rad),
+                u_m_s: f64::from(verdict.u_m_s),
+                w_m_s: f64::from(verdict.w_m_s),
+                q_rad_s: f64::from(verdict.q_rad_s),
+            },
+            ending: Some(ending.to_string()),
+            limits,
+            landed,
+            table_2: Vec::new(),
+        })
+    }
+}
+
+impl Verdicts {
+    /// Notes a record and the channel it came on.
+    pub(crate) fn note(&mut self, channel: Option<&LogChannel>, stamped: &StampedEntry) {
+        match &stamped.entry {
+            Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
+            Entry::Tick(_) | Entry::PilotTick(_) => self.has_ticks = true,
+            Entry::RawFrame if !self.has_ticks && heard_by_ground(channel) => {
+                if let Some(message) = message_of(&stamped.data) {
+                    self.heard.take(&message);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The vehicle's own verdict; without its ticks, the one that was heard.
+    pub(crate) fn found(&self) -> Option<Found> {
+        let heard = || self.heard.verdict().map(|verdict| Found { verdict, heard: true });
+        let recorded = || self.recorded.clone().map(|verdict| Found { verdict, heard: false });
+        if self.has_ticks { recorded() } else { heard().or_else(recorded) }
+    }
+}
+
+/// Whether a ground station received the frames of a channel.
+pub(crate) fn heard_by_ground(channel: Option<&LogChannel>) -> bool {
+    channel.is_some_and(|channel| {
+        channel.topic == TOPIC_RAW_RX
+            && channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "ground")
+    })
+}
+
+/// The message of a raw frame, if the dialect has it.
+pub(crate) fn message_of(bytes: &[u8]) -> Option<MavMessage> {
+    frame_of(bytes)?.decode().ok()
+}
+
+/// A raw frame, if its checksum is right and the dialect has its message.
+pub(crate) fn frame_of(bytes: &[u8]) -> Option<Frame> {
+    let mut framer = Framer::new();
+    framer.push_datagram(bytes);
+    framer.next_frame()
+}

@@ -1,0 +1,235 @@
+//! The messages and enums of the MAVLink dialect, from its XML.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use protocol::dialect::XML_FILES;
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use super::columns::{Kind, Meaning};
+use super::rows::Cell;
+
+/// The dialect.
+static DIALECT: LazyLock<Dialect> = LazyLock::new(|| {
+    let mut dialect = Dialect::default();
+    for xml in XML_FILES {
+        parse(xml, &mut dialect);
+    }
+    dialect
+});
+
+/// What the XML says.
+#[derive(Debug, Default)]
+struct Dialect {
+    messages: BTreeMap<u32, Message>,
+    /// The words for the numbers of each enum.
+    enums: BTreeMap<String, Vec<(i64, String)>>,
+}
+
+/// A message of the dialect.
+pub(super) fn message(id: u32) -> Option<&'static Message> {
+    DIALECT.messages.get(&id)
+}
+
+/// The words for the numbers of an enum; empty if the dialect has none of that name.
+pub(super) fn words_of(name: &str) -> &'static [(i64, String)] {
+    DIALECT.enums.get(name).map_or(&[], Vec::as_slice)
+}
+
+/// A message and its fields in the order of the XML.
+#[derive(Debug, Default)]
+pub(super) struct Message {
+    pub(super) name: String,
+    pub(super) fields: Vec<Field>,
+}
+
+#[derive(Debug)]
+pub(super) struct Field {
+    pub(super) name: String,
+    pub(super) wire: Wire,
+    /// Number of elements; `None` for a single value.
+    pub(super) count: Option<usize>,
+    extension: bool,
+    /// Place of its first byte in the payload.
+    pub(super) at: usize,
+    pub(super) meaning: Meaning,
+}
+
+/// A type on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wire {
+    Unsigned(usize),
+    Signed(usize),
+    Float,
+    Double,
+    Char,
+}
+
+impl Wire {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "uint8_t" | "uint8_t_mavlink_version" => Self::Unsigned(1),
+            "uint16_t" => Self::Unsigned(2),
+            "uint32_t" => Self::Unsigned(4),
+            "uint64_t" => Self::Unsigned(8),
+            "int8_t" => Self::Signed(1),
+            "int16_t" => Self::Signed(2),
+            "int32_t" => Self::Signed(4),
+            "int64_t" => Self::Signed(8),
+            "float" => Self::Float,
+            "double" => Self::Double,
+            "char" => Self::Char,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Unsigned(size) | Self::Signed(size) => size,
+            Self::Float => 4,
+            Self::Double => 8,
+            Self::Char => 1,
+        }
+    }
+
+    pub(super) fn kind(self) -> Kind {
+        match self {
+            Self::Unsigned(_) | Self::Signed(_) => Kind::Integer,
+            Self::Float | Self::Double => Kind::Float,
+            Self::Char => Kind::Text,
+        }
+    }
+
+    /// The value in these bytes, the least significant first; whole numbers of 64 bits wrap around.
+    pub(super) fn value(self, bytes: &[u8]) -> Cell {
+        let mut wide = [0; 8];
+        wide.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+        let whole = u64::from_le_bytes(wide);
+        match self {
+            Self::Unsigned(_) => Cell::Integer(whole.cast_signed()),
+            Self::Signed(size) => {
+                let unused = 64 - 8 * size;
+                Cell::Integer((whole << unused).cast_signed() >> unused)
+            }
+            Self::Float => Cell::Float(f64::from(f32::from_bits(whole as u32))),
+            Self::Double => Cell::Float(f64::from_bits(whole)),
+            Self::Char => {
+                let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+                Cell::Text(String::from_utf8_lossy(&bytes[..end]).into_owned())
+            }
+        }
+    }
+}
+
+/// Adds the messages and enums of a file.
+fn parse(xml: &str, dialect: &mut Dialect) {
+    let mut reader = Reader::from_str(xml);
+    let (mut id, mut message, mut extensions) = (None, Message::default(), false);
+    let (mut words_of, mut in_field) = (None::<String>, false);
+    loop {
+        match reader.read_event() {
+            Ok(Event::Start(start)) if start.name().as_ref() == b"message" => {
+                id = attribute(&start, "id").and_then(|id| id.parse::<u32>().ok());
+                message = Message { name: attribute(&start, "name").unwrap_or_default(), fields: Vec::new() };
+                extensions = false;
+            }
+            Ok(Event::Empty(start)) if start.name().as_ref() == b"extensions" => extensions = true,
+            Ok(Event::Start(start)) if start.name().as_ref() == b"field" => {
+                let found = field(&start, extensions);
+                in_field = found.is_some();
+                message.fields.extend(found);
+            }
+            Ok(Event::Empty(start)) if start.name().as_ref() == b"field" => {
+                message.fields.extend(field(&start, extensions));
+            }
+            Ok(Event::Text(text)) if in_field => {
+                if let (Some(field), Ok(text)) = (message.fields.last_mut(), text.decode()) {
+                    field.meaning.words += &text;
+                }
+            }
+            Ok(Event::End(end)) if end.name().as_ref() == b"field" => in_field = false,
+            Ok(Event::End(end)) if end.name().as_ref() == b"message" => {
+                if let Some(id) = id.take() {
+                    place(&mut message.fields);
+                    dialect.messages.insert(id, std::mem::take(&mut message));
+                }
+            }
+            Ok(Event::Start(start)) if start.name().as_ref() == b"enum" => {
+                words_of = attribute(&start, "name");
+            }
+            Ok(Event::Start(start) | Event::Empty(start)) if start.name().as_ref() == b"entry" => {
+                if let (Some(name), Some(word)) = (&words_of, entry(&start)) {
+                    dialect.enums.entry(name.clone()).or_default().push(word);
+                }
+            }
+            Ok(Event::Eof) | Err(_) => return,
+            Ok(_) => {}
+        }
+    }
+}
+
+/// The number and the name of an enum's entry; a number that is written otherwise than in decimal digits is left out.
+fn entry(start: &BytesStart<'_>) -> Option<(i64, String)> {
+    Some((attribute(start, "value")?.parse().ok()?, attribute(start, "name")?))
+}
+
+fn field(start: &BytesStart<'_>, extension: bool) -> Option<Field> {
+    let (name, given) = (attribute(start, "name")?, attribute(start, "type")?);
+    let (wire, count) = match given.split_once('[') {
+        None => (given.as_str(), None),
+        Some((wire, rest)) => (wire, Some(rest.trim_end_matches(']').parse().ok()?)),
+    };
+    let meaning = Meaning {
+        unit: attribute(start, "units").unwrap_or_default(),
+        words: String::new(),
+        values_of: attribute(start, "enum"),
+    };
+    Some(Field { name, wire: Wire::named(wire)?, count, extension, at: 0, meaning })
+}
+
+fn attribute(start: &BytesStart<'_>, name: &str) -> Option<String> {
+    let found = start.try_get_attribute(name).ok()??;
+    Some(String::from_utf8_lossy(&found.value).into_owned())
+}
+
+/// On the wire the largest types come first, and extensions last, in their own order.
+fn place(fields: &mut [Field]) {
+    let mut order: Vec<usize> = (0..fields.len()).collect();
+    order.sort_by_key(|k| {
+        let field = &fields[*k];
+        (field.extension, if field.extension { 0 } else { 8 - field.wire.size() })
+    });
+    let mut at = 0;
+    for k in order {
+        fields[k].at = at;
+        at += fields[k].wire.size() * fields[k].count.unwrap_or(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The generated code and the XML agree on the name of every message, and no payload is longer than a frame's.
+    #[test]
+    fn every_message_of_the_dialect_has_its_fields() {
+        assert!(DIALECT.messages.len() > 200, "{}", DIALECT.messages.len());
+        for (id, message) in &DIALECT.messages {
+            let Some(name) = protocol::dialect::message_name(*id) else { continue };
+            assert_eq!(message.name, name);
+            let end = |field: &Field| field.at + field.wire.size() * field.count.unwrap_or(1);
+            assert!(message.fields.iter().map(end).max().is_some_and(|end| end <= 255), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_field_has_its_unit_its_meaning_and_its_words() {
+        let status = DIALECT.messages.values().find(|message| message.name == "TD_FLIGHT_STATUS").unwrap();
+        let field = |name: &str| status.fields.iter().find(|field| field.name == name).unwrap();
+        assert_eq!(field("time_boot_ms").meaning.unit, "ms");
+        assert_eq!(field("time_boot_ms").meaning.words, "Time since boot.");
+        let words = words_of(field("phase").meaning.values_of.as_deref().unwrap());
+        assert!(words.contains(&(9, "TD_PHASE_POWERED".to_owned())), "{words:?}");
+    }
+}

@@ -1,0 +1,154 @@
+//! Tests small questions that used to be answered badly.
+
+use std::io::Write as _;
+use std::process::Stdio;
+use std::sync::atomic::AtomicBool;
+
+use replay::log::Recording;
+use replay::refly::ReflyOptions;
+use replay::sweep::{BisectOptions, bisect};
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::LANDED;
+use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
+
+#[test]
+fn another_seed_is_named_in_the_answer_and_in_the_log() {
+    let path = DISPERSED.beside("seed.mcap");
+    let (code, stdout, stderr) =
+        run(replay("refly", &DISPERSED.log).args(["--seed", "77", "--log"]).arg(&path));
+    assert!(
+        code == 0 && stdout.contains("plant drawn with seed 77 instead of the recorded one"),
+        "{stdout}{stderr}"
+    );
+    let run_facts = Recording::open(&path).unwrap().head.run;
+    assert_eq!(run_facts["seed"], "77");
+    assert_eq!(run_facts["reflown_instead_of_seed"], "2");
+}
+
+#[test]
+fn a_setting_after_the_end_of_the_flight_is_refused() {
+    for (log, setting) in
+        [(&NOMINAL.log, "nmpc.weights.w=90@600"), (&LANDED.log, "powered.weights.theta=9@600")]
+    {
+        let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", setting]));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
+        assert!(stderr.contains("takes effect after the end of"), "{stderr}");
+        assert!(stderr.contains("whose last tick is at T+"), "{stderr}");
+    }
+}
+
+/// 61 m/s of wind cannot be flown; the search goes on without the values that cannot.
+#[test]
+fn a_bisection_passes_over_values_that_cannot_be_flown() {
+    let recording = Recording::open(&LANDED.log).unwrap();
+    let options = BisectOptions {
+        path: "truth.wind_m_s".to_owned(),
+        plant_alone: true,
+        value: Some(3.0),
+        from: 0.0,
+        to: 63.0,
+        steps: 2,
+        refly: ReflyOptions::default(),
+    };
+    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
+    let refused: Vec<f64> = report.refused.iter().map(|refused| refused.value).collect();
+    assert!(report.above.is_some() || refused == [63.0], "{report:?}");
+    // Stopped before it began: what is known is said.
+    let report = bisect(&recording, &options, &AtomicBool::new(true)).unwrap();
+    assert!(report.interrupted && report.flown == 1 && report.above.is_none() && report.outcome.landed);
+    let mut text = Vec::new();
+    replay::print::print_bisect(&report, &mut text).unwrap();
+    assert!(String::from_utf8(text).unwrap().contains("INTERRUPTED after 1 flight"));
+}
+
+#[test]
+fn info_takes_several_logs_and_standard_input() {
+    let (code, stdout, _) = run(replay("info", &NOMINAL.log).arg(&LANDED.log));
+    assert!(code == 0 && stdout.matches("grade ").count() == 2, "{stdout}");
+    let (code, stdout, stderr) = run(replay("info", &NOMINAL.log).arg(NOMINAL.beside("none.mcap")));
+    assert!(
+        code == 2 && stdout.contains("grade ") && stderr.contains("none.mcap: cannot be read"),
+        "{stderr}"
+    );
+    let mut child = replay("info", &"-".into()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(&std::fs::read(&NOMINAL.log).unwrap()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        output.status.success() && text.starts_with("standard input\n") && text.contains("bit-exact"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
+    let text = NOMINAL.beside("notes.mcap");
+    std::fs::write(&text, "notes").unwrap();
+    let telemetry = WITH_FRAMES.beside("swept.tlog");
+    let (ground, open) =
+        (WITH_FRAMES.beside("swept.mcap"), || replay::log::FlightLog::open(&WITH_FRAMES.log));
+    replay::export::export_tlog(&open, None, &telemetry).unwrap();
+    replay::import::import_tlog(&telemetry, &ground, &mut |_| {}).unwrap();
+    let (code, stdout, stderr) = run(replay("sweep", &NOMINAL.log).arg(&text).arg(&ground).args([
+        "--vary",
+        "nmpc.weights.w=80,90",
+        "--jobs",
+        "1",
+    ]));
+    assert!(code == 0 && stdout.contains("2 points on 1 flight"), "{stdout}{stderr}");
+    assert_eq!(stderr.matches("skipped: ").count(), 2, "{stderr}");
+    let (code, _, stderr) = run(replay("sweep", &text).arg(&ground).args(["--vary", "nmpc.weights.w=80,90"]));
+    assert!(code == 2 && stderr.contains("none of the 2 logs can be flown again"), "{stderr}");
+}
+
+/// A message and its cause do not repeat each other.
+#[test]
+fn no_message_is_printed_twice() {
+    let none = NOMINAL.beside("none.mcap");
+    let mut sweep = replay("sweep", &NOMINAL.log);
+    sweep.args(["--vary", "nmpc.wights.w=80,90"]);
+    let mut unknown = replay("refly", &NOMINAL.log);
+    unknown.args(["--set", "nmpc.wights.w=80"]);
+    for mut command in
+        [replay("info", &none), replay("verify", &none), replay("report", &none), sweep, unknown]
+    {
+        let (code, stdout, stderr) = run(&mut command);
+        assert!(code == 2, "{stdout}{stderr}");
+        let message = stderr.lines().last().unwrap_or_default();
+        let parts: Vec<&str> = message.split(": ").collect();
+        for (place, part) in parts.iter().enumerate() {
+            assert!(
+                part.len() < 8 || !parts[place + 1..].iter().any(|later| later.contains(part)),
+                "{message}"
+            );
+        }
+    }
+}
+
+/// A profile with a key more, and one with a key fewer, are explained.
+#[test]
+fn a_profile_of_another_release_is_explained() {
+    use crate::flown::{FLIGHT, PROFILE, Recipe, write_log};
+    let directory = tempfile::tempdir().unwrap();
+    let whole = vehicles::profile::builtin_toml(PROFILE).unwrap();
+    let more = whole.replacen("[nmpc]", "[nmpc]\nfuture_key = 1.0", 1);
+    let fewer: String =
+        whole.split_inclusive('\n').filter(|line| !line.starts_with("sample_time_s")).collect();
+    assert!(more != whole && fewer != whole);
+    for (name, text, words) in [
+        ("more.mcap", more, "this build does not know that key"),
+        ("fewer.mcap", fewer, "this build needs that key"),
+    ] {
+        let path = directory.path().join(name);
+        let recipe = Recipe { profile_toml: Some(text), with_frames: false };
+        std::fs::write(&path, write_log(&FLIGHT.ticks, &recipe).bytes).unwrap();
+        let (_, info, _) = run(&mut replay("info", &path));
+        let (code, _, refly) = run(&mut replay("refly", &path));
+        let (_, verify, _) = run(&mut replay("verify", &path));
+        assert_eq!(code, 2);
+        for said in [info, refly, verify] {
+            assert!(said.contains(words), "{words} is not in {said}");
+        }
+    }
+}

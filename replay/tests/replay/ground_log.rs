@@ -1,0 +1,140 @@
+//! Tests the log of a ground station, which has what was heard and nothing that the vehicle recorded.
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use protocol::log::record::{Direction, RawFrame, Record};
+use protocol::log::writer::{LogHeader, LogWriter};
+use replay::export::{TableFormat, export_tables, export_tlog};
+use replay::import::import_tlog;
+use replay::info::info;
+use replay::log::{Clock, Entry, FlightLog, Recording};
+
+use crate::command_line::{replay, run};
+use crate::simulated::{MK2_WITH_FRAMES, Simulated, WITH_FRAMES};
+
+/// The station was started this long before the vehicle, ns.
+const EARLIER_NS: u64 = 3_000_000_000;
+const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
+
+/// The log that a station writes which hears every frame of a vehicle.
+fn heard(flight: &Simulated) -> PathBuf {
+    let (tlog, imported) = (flight.beside("heard.tlog"), flight.beside("heard.mcap"));
+    let open = || FlightLog::open(&flight.log);
+    export_tlog(&open, None, &tlog).unwrap();
+    import_tlog(&tlog, &imported, &mut |_| {}).unwrap();
+    let path = flight.beside("ground.mcap");
+    let header =
+        LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
+    let mut log = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
+    let mut from = FlightLog::open(&imported).unwrap();
+    let mut first_ns = None;
+    while let Some(stamped) = from.next_entry().unwrap() {
+        let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
+        let at_ns = EARLIER_NS + since_ns;
+        let record = match stamped.entry {
+            Entry::RawFrame => Record::RawFrame(RawFrame {
+                direction: Direction::Rx,
+                endpoint: "ground",
+                link: "udpin:0.0.0.0:14550".to_owned(),
+                bytes: stamped.data,
+            }),
+            Entry::Telemetry(mut telemetry) => {
+                telemetry.time_s = at_ns as f64 / 1e9;
+                Record::Telemetry(telemetry)
+            }
+            _ => continue,
+        };
+        log.write(&record, at_ns).unwrap();
+    }
+    log.finish().unwrap();
+    path
+}
+
+static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
+static GROUND_MK2: LazyLock<PathBuf> = LazyLock::new(|| heard(&MK2_WITH_FRAMES));
+
+/// The verdict that was heard is the vehicle's own, to the precision of a message.
+#[test]
+fn a_ground_log_has_the_verdict_that_was_heard() {
+    for (log, vehicle) in [(&*GROUND, &*WITH_FRAMES), (&*GROUND_MK2, &*MK2_WITH_FRAMES)] {
+        let (heard, own) = (info(log).unwrap(), info(&vehicle.log).unwrap());
+        let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
+        assert_eq!((verdict.landed, verdict.clock), (recorded.landed, Clock::Boot));
+        let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
+        assert!((verdict.time_s - boot.time_s).abs() < 0.001, "{} {boot}", verdict.time_s);
+        let limits = verdict.limits.iter().zip(&recorded.limits);
+        for (heard, own) in limits {
+            assert_eq!((&heard.name, &heard.unit, heard.passed), (&own.name, &own.unit, own.passed));
+            assert!((heard.value - own.value).abs() < 1e-4, "{heard:?} {own:?}");
+            assert!((heard.maximum - own.maximum).abs() < 1e-4, "{heard:?} {own:?}");
+        }
+        assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
+    }
+    let (code, stdout, _) = run(&mut replay("info", &GROUND));
+    assert!(code == 0 && stdout.contains("verdict     LANDED inside every limit"), "{stdout}");
+    // Table 2 is not sent; the legs' verdict does not stand for it.
+    let (_, stdout, _) = run(&mut replay("info", &GROUND_MK2));
+    assert!(stdout.contains("Table 2 is not known") && stdout.contains("vertical speed"), "{stdout}");
+}
+
+#[test]
+fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
+    let recording = Recording::open(&GROUND).unwrap();
+    let contact_s = recording.contact_s().unwrap();
+    let own_s = WITH_FRAMES.recording().verdict.unwrap().time_s;
+    assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
+    let page = replay::report::report(&GROUND).unwrap().html;
+    assert!(page.contains("LANDED inside every limit") && page.contains(">touchdown<"));
+}
+
+#[test]
+fn every_message_becomes_a_table_with_every_field() {
+    let directory = WITH_FRAMES.beside("messages");
+    let mut log = FlightLog::open(&GROUND).unwrap();
+    let files = export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    let names: Vec<String> =
+        files.iter().map(|file| file.path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
+    for message in ["heartbeat", "attitude_quaternion", "td_flight_status", "td_landing_verdict", "td_fins"] {
+        assert!(names.contains(&format!("mavlink_1_1_{message}")), "{message}: {names:?}");
+    }
+    let text = std::fs::read_to_string(directory.join("mavlink_1_1_td_landing_verdict.csv")).unwrap();
+    let head = text.lines().next().unwrap();
+    assert_eq!(
+        head,
+        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,x_m,altitude_m,pitch_rad,u_m_s,w_m_s,\
+         q_rad_s,limits_violated,landed"
+    );
+    // As many rows as frames of the dialect.
+    let frames: u64 = files
+        .iter()
+        .filter(|file| file.path.display().to_string().contains("mavlink_"))
+        .map(|file| file.rows)
+        .sum();
+    let raw = info(&GROUND)
+        .unwrap()
+        .channels
+        .iter()
+        .find(|channel| channel.topic == "/mavlink/rx/raw")
+        .unwrap()
+        .messages;
+    assert_eq!(frames, raw);
+}
+
+/// The same messages at both ends of the link: nothing differs, at the vehicle's own times.
+#[test]
+fn a_ground_log_is_compared_with_the_vehicles_own() {
+    for (log, vehicle) in [(&*GROUND, &*WITH_FRAMES), (&*GROUND_MK2, &*MK2_WITH_FRAMES)] {
+        let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(log).arg("--json"));
+        assert_eq!(code, 0, "{stdout}{stderr}");
+        let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        let signals: Vec<&str> = report[0]["signals"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|signal| signal["signal"].as_str().unwrap())
+            .collect();
+        assert!(signals.len() > 50 && signals.iter().all(|name| name.starts_with("mavlink_1_1_")));
+        assert!(signals.contains(&"mavlink_1_1_local_position_ned.x"), "{signals:?}");
+    }
+}

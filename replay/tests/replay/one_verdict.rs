@@ -1,0 +1,74 @@
+//! Tests that every answer says the same of how a flight ended.
+
+use replay::info::info;
+use replay::report::report;
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::{self, LANDED, Logged};
+use crate::simulated::{MK2, NOMINAL};
+
+/// The sentence of `info`, after checking that text and page say it, too.
+fn said_alike(log: &std::path::PathBuf) -> String {
+    let ending = info(log).unwrap().ending.unwrap();
+    let (code, stdout, _) = run(&mut replay("info", log));
+    assert!(code == 0 && stdout.contains(&format!("verdict     {ending}")), "{ending}: {stdout}");
+    let page = report(log).unwrap().html;
+    assert!(page.contains(&format!("\">{ending}</p>")), "{ending}");
+    ending
+}
+
+#[test]
+fn both_verdicts_are_shown_with_every_row() {
+    for log in [&LANDED.log, &MK2.log] {
+        let verdict = info(log).unwrap().verdict.unwrap();
+        let names = |limits: &[replay::info::VerdictLimit]| -> Vec<String> {
+            limits.iter().map(|limit| limit.name.clone()).collect()
+        };
+        assert_eq!(
+            names(&verdict.limits),
+            ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"]
+        );
+        assert_eq!(names(&verdict.table_2), ["x", "altitude", "pitch error", "u", "w", "pitch rate"]);
+        let strict = verdict.table_2.iter().all(|limit| limit.passed);
+        let ending = said_alike(log);
+        assert_eq!(ending.contains("every limit"), verdict.landed && strict, "{ending}");
+        let (_, stdout, _) = run(&mut replay("info", log));
+        for words in
+            ["by the limits of the legs:", "by the landing paper's Table 2:", "rotation rate", "pitch rate"]
+        {
+            assert!(stdout.contains(words), "{words} is not in {stdout}");
+        }
+    }
+    assert_eq!(said_alike(&NOMINAL.log), "LANDED inside every limit");
+}
+
+fn aborted(fault: &str) -> Logged {
+    from_apogee::fly(&[fault])
+}
+
+#[test]
+fn an_abort_and_a_parachute_are_called_that() {
+    let ending = said_alike(&aborted("abort@3").log);
+    assert_eq!(ending, "ABORTED, then DOWN UNDER THE PARACHUTE, not landed");
+    let ending = said_alike(&aborted("no-light@0").log);
+    assert!(ending.starts_with("DOWN UNDER THE PARACHUTE") || ending.starts_with("NOT LANDED: "), "{ending}");
+}
+
+/// A start that the vehicle refuses is no flight; the log says why.
+#[test]
+fn a_refused_start_is_called_that() {
+    use protocol::log::record::{Event, EventLevel, Record};
+    use protocol::log::writer::{LogHeader, LogWriter};
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("refused.mcap");
+    let header = LogHeader { writer: "test".to_owned(), ..LogHeader::default() };
+    let mut log = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
+    let event = Event {
+        level: EventLevel::Info,
+        name: "vehicle".to_owned(),
+        message: "REFUSED: pin: in, must be out".to_owned(),
+    };
+    log.write(&Record::Event(event), 0).unwrap();
+    log.finish().unwrap();
+    assert_eq!(said_alike(&path), "REFUSED: pin: in, must be out");
+}

@@ -1,0 +1,74 @@
+//! Tests counterfactuals: a flight flown again with other faults is the flight that had those faults.
+
+use replay::log::Recording;
+use replay::refly::{FaultChanges, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::verify::{Verification, verify};
+
+use crate::command_line::{replay, run};
+use crate::flown::only;
+use crate::from_apogee::{self, LANDED};
+use crate::simulated::NOMINAL;
+
+fn changed(with: &[&str], without: &[&str]) -> ReflyOptions {
+    let owned = |given: &[&str]| given.iter().map(|text| (*text).to_owned()).collect();
+    ReflyOptions {
+        faults: FaultChanges { with: owned(with), without: owned(without) },
+        ..ReflyOptions::default()
+    }
+}
+
+/// Adding a fault to the healthy flight, and leaving it out of the broken one, give each other's verdict bit for bit.
+#[test]
+fn the_same_flight_with_and_without_a_fault() {
+    const FAULTS: [&str; 2] = ["weak-motor:0.8@ignition", "gnss-out@5"];
+    let broken = from_apogee::fly(&FAULTS);
+    let (healthy, broken) = (Recording::open(&LANDED.log).unwrap(), Recording::open(&broken.log).unwrap());
+    assert_ne!(healthy.verdict, broken.verdict);
+    for start in [StartAt::Landing, StartAt::Tick(1)] {
+        let without = ReflyOptions { start: start.clone(), ..changed(&[], &["weak-motor", "gnss-out@5"]) };
+        let (report, flown) = refly_flight(&broken, &without).unwrap();
+        assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
+        assert!(report.recorded.is_some() && report.faults == without.faults);
+        let with = ReflyOptions { start, ..changed(&FAULTS, &[]) };
+        assert_eq!(refly_flight(&healthy, &with).unwrap().1.verdict, broken.verdict);
+    }
+    let (report, flown) = refly_flight(&broken, &changed(&[], &["all"])).unwrap();
+    assert_eq!(flown.verdict, healthy.verdict);
+    assert_eq!(
+        report.verdict_changed,
+        Some(healthy.verdict.unwrap().landed != broken.verdict.unwrap().landed)
+    );
+}
+
+/// Its log says which faults it was flown with, and verifies.
+#[test]
+fn a_counterfactual_is_a_log_that_verifies() {
+    let recording = Recording::open(&LANDED.log).unwrap();
+    let options = changed(&["fin-stuck:1@3"], &[]);
+    let (report, flown) = refly_flight(&recording, &options).unwrap();
+    let path = LANDED.beside("fault.mcap");
+    write_log(&path, &recording, &options, &report, &flown).unwrap();
+    assert_eq!(only(verify(&path).unwrap()).outcome, Verification::Identical);
+    assert_eq!(Recording::open(&path).unwrap().head.run["faults"], "fin-stuck:1@3");
+}
+
+#[test]
+fn a_fault_that_cannot_be_is_refused_with_what_could() {
+    let refused = |log: &std::path::PathBuf, arguments: &[&str], words: &str| {
+        let (code, stdout, stderr) = run(replay("refly", log).args(arguments));
+        assert!(code == 2 && stdout.is_empty() && stderr.contains(words), "{stdout}{stderr}");
+    };
+    refused(
+        &LANDED.log,
+        &["--without-fault", "gnss-out"],
+        "no fault `gnss-out` to leave out; it was flown with no faults",
+    );
+    refused(&LANDED.log, &["--fault", "gnss-gone@5"], "fault `gnss-gone@5`");
+    refused(&NOMINAL.log, &["--fault", "gnss-out@5"], "only for a flight from apogee");
+    let (code, stdout, stderr) = run(replay("refly", &LANDED.log).args(["--fault", "no-light@0"]));
+    assert!(
+        code == 0 && stdout.contains("with the fault no-light@0, from the beginning"),
+        "{stdout}{stderr}"
+    );
+    assert!(stdout.contains("the verdict CHANGES"), "{stdout}");
+}
