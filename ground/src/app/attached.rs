@@ -22,6 +22,7 @@ use crate::attach::socket;
 use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::action::{Action, Request};
+use crate::model::bindings::Bindings;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
@@ -40,6 +41,7 @@ const WAITING_MAX: usize = 4_096;
 pub struct Viewer {
     pub watch: bool,
     pub operator: String,
+    pub keys: Bindings,
 }
 
 /// Shows the station until the person at the screen quits; the station keeps running. Without a terminal it prints
@@ -116,7 +118,7 @@ pub async fn session(
                     link = found;
                     // Another station has another clock and another history.
                     times = Times::default();
-                    let pages = model.pages;
+                    let pages = std::mem::take(&mut model.pages);
                     model = Model::new(settings(&Hello::default(), viewer));
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
@@ -160,6 +162,7 @@ async fn act(
                 link.ask(&ToStation::Key(action.detail)).await;
             }
             Action::Redraw => output.clear(),
+            Action::NextTheme => output.next_theme(),
             Action::Bell => output.bell(),
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
@@ -252,6 +255,7 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         seat: Seat::new(hello.screen, viewer.operator.clone()),
         demonstration: hello.demonstration,
         auto: hello.auto,
+        keys: viewer.keys.clone(),
         ..Settings::on_screen(&hello.link_name)
     }
 }

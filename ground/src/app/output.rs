@@ -67,6 +67,12 @@ impl Output {
         }
     }
 
+    pub(super) fn next_theme(&mut self) {
+        if let Self::Screen(screen) = self {
+            screen.next_theme();
+        }
+    }
+
     pub(super) fn clear(&mut self) {
         if let Self::Screen(screen) = self {
             screen.clear();

@@ -17,7 +17,7 @@ use crate::exit::{self, Exit};
 use crate::model::{Role, Settings, words};
 use crate::replay::player::Player;
 use crate::replay::recording::{Progress, Recording};
-use crate::update::Msg;
+use crate::update::{Action, Msg};
 
 /// How often the time moves on.
 const STEP: Duration = Duration::from_millis(100);
@@ -33,7 +33,12 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
     let damage = recording.damage.clone();
     let name = path.display().to_string();
     let settings =
-        Settings { log_path: Some(name.clone()), role: Role::Replaying, ..Settings::on_screen(name) };
+        Settings {
+            log_path: Some(name.clone()),
+            role: Role::Replaying,
+            keys: config.keys.clone(),
+            ..Settings::on_screen(name)
+        };
     let mut player = Player::new(recording, settings);
     match cli.from {
         None => {}
@@ -94,8 +99,18 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             biased;
             _ = signals.next() => return Ok(()),
             msg = screen.input() => match msg {
-                Msg::Key(crate::key::Key::CtrlL) => screen.clear(),
-                Msg::Key(key) if player.on_key(key) => return Ok(()),
+                Msg::Key(key) => {
+                    for action in player.on_key(key) {
+                        match action {
+                            Action::Redraw => screen.clear(),
+                            Action::NextTheme => screen.next_theme(),
+                            Action::Quit => return Ok(()),
+                            // What the ground did is part of the recording.
+                            _ => {}
+                        }
+                    }
+                    screen.mark_changed();
+                }
                 // Held or pasted keys count only if they scroll or move the time.
                 Msg::Keys(keys) => {
                     for key in keys.into_iter().filter(|key| key.scrolls()) {

@@ -26,7 +26,7 @@ use rustix::termios::QueueSelector;
 
 use super::pace::Pace;
 use super::terminal_writer::{self, FrameBuffer, TerminalWriter};
-use crate::cli::{Characters, Colour};
+use crate::cli::{Characters, ThemeChoice};
 use crate::config::Config;
 use crate::key::Key;
 use crate::model::Model;
@@ -136,6 +136,12 @@ impl Screen {
         self.mark_changed();
     }
 
+    /// Changes to the next theme.
+    pub fn next_theme(&mut self) {
+        self.theme.palette = self.theme.palette.next();
+        self.mark_changed();
+    }
+
     /// Whether the terminal distinguishes a held key's repeats from presses.
     pub fn reports_repeats(&self) -> bool {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
@@ -198,17 +204,16 @@ impl Drop for Screen {
 /// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
-    let colour = match config.colour {
-        Colour::Auto => found.colour,
-        Colour::Always => true,
-        Colour::Never => false,
+    let palette = match config.theme {
+        ThemeChoice::Auto => found.palette,
+        ThemeChoice::Palette(palette) => palette,
     };
     let ascii = match config.characters {
         Characters::Auto => found.ascii,
         Characters::Unicode => false,
         Characters::Ascii => true,
     };
-    Theme { colour, ascii }
+    Theme { palette, ascii }
 }
 
 fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<FrameBuffer>>, TerminalWriter)> {

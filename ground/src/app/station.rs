@@ -256,6 +256,7 @@ impl Station {
                     }
                 }
                 Action::Redraw => self.output.clear(),
+                Action::NextTheme => self.output.next_theme(),
                 Action::Bell => self.output.bell(),
                 Action::Alarm(words) => self.tell_alarm(&words),
                 // Only attached screens send requests.

@@ -12,7 +12,8 @@ use protocol::transport::LinkAddress;
 
 use crate::demo::Speed;
 use crate::exit;
-pub use values::{Characters, Colour, LogChoice, ReplayFrom, Seconds};
+use crate::model::bindings::Bindings;
+pub use values::{Characters, LogChoice, ReplayFrom, Seconds, ThemeChoice};
 
 /// The profile that the demonstration flies by default.
 const DEMO_PROFILE: &str = "mk2";
@@ -114,9 +115,14 @@ pub struct Cli {
     #[arg(long, value_name = "WHICH", global = true)]
     pub characters: Option<Characters>,
 
-    /// Whether to use colours. Default: auto, by NO_COLOR and TERM.
-    #[arg(long, value_name = "WHEN", visible_alias = "color", global = true)]
-    pub colour: Option<Colour>,
+    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
+    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub theme: Option<ThemeChoice>,
+
+    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
+    #[arg(long, value_name = "ACTION=KEY,...", global = true)]
+    pub keys: Option<Bindings>,
 
     /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
     #[arg(long, global = true)]

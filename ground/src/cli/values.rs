@@ -9,6 +9,7 @@ use protocol::dialect::TdPhase;
 use serde::Deserialize;
 
 use crate::model::words;
+use crate::view::theme::Palette;
 
 /// Where the log goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -84,15 +85,35 @@ pub enum Characters {
     Ascii,
 }
 
-/// Whether colours may be used.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Colour {
-    /// Decide by the environment
+/// Which colours to use.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub enum ThemeChoice {
+    /// Decide by the environment.
     #[default]
     Auto,
-    /// Always use colours
-    Always,
-    /// Never use colours
-    Never,
+    Palette(Palette),
+}
+
+impl FromStr for ThemeChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if given == "auto" {
+            return Ok(Self::Auto);
+        }
+        let found = Palette::ALL.into_iter().find(|palette| palette.name() == given);
+        found.map(Self::Palette).ok_or_else(|| {
+            let names = Palette::ALL.map(Palette::name).join(", ");
+            format!("`{given}` is no theme; give auto, {names}")
+        })
+    }
+}
+
+impl TryFrom<String> for ThemeChoice {
+    type Error = String;
+
+    fn try_from(given: String) -> Result<Self, String> {
+        given.parse()
+    }
 }

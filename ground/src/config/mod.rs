@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
-use crate::cli::{Characters, Cli, Colour, Command, LogChoice};
+use crate::cli::{Characters, Cli, Command, LogChoice, ThemeChoice};
+use crate::model::bindings::Bindings;
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
@@ -39,8 +40,13 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
 #characters = "auto"
 
-# Use colours: "always", "never", or "auto": by NO_COLOR and TERM.
-#colour = "auto"
+# Colours: "dark", "light" (black on white, for sunlight), "16" (the terminal's own), "none", "contrast" (high
+# contrast), or "auto": by NO_COLOR, TERM, COLORTERM and COLORFGBG. The key c changes them too.
+#theme = "auto"
+
+# Other keys for actions; the key : lists every action. The keys of the abort, Enter and Esc cannot be chosen.
+# Actions that open a ladder (arm, start, disarm) need a capital letter.
+#keys = { theme = "c", path = "p" }
 "#;
 
 /// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
@@ -61,7 +67,9 @@ pub struct Config {
     #[serde(default)]
     pub characters: Characters,
     #[serde(default)]
-    pub colour: Colour,
+    pub theme: ThemeChoice,
+    #[serde(default)]
+    pub keys: Bindings,
 }
 
 /// Why a settings file cannot be used.
@@ -156,7 +164,8 @@ impl Config {
             bell: cli.bell.or(self.bell),
             alarm_command: alarm_command.filter(|command| command != "none"),
             characters: cli.characters.unwrap_or(self.characters),
-            colour: cli.colour.unwrap_or(self.colour),
+            theme: cli.theme.unwrap_or(self.theme),
+            keys: cli.keys.clone().unwrap_or(self.keys),
             ..self
         }
     }

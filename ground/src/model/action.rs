@@ -29,6 +29,8 @@ pub enum Action {
     SyncLog,
     /// Redraw the whole screen.
     Redraw,
+    /// Change the screen's colours to the next theme.
+    NextTheme,
     /// Ask the station, from a screen in another process.
     Request(Request),
     /// Tell the other screens that the crew has asked for this on the station's own screen.

@@ -4,9 +4,11 @@
 //! nor `view`.
 
 pub mod abort_too_late;
+pub mod act;
 pub mod action;
 pub mod alarm;
 mod auto_step;
+pub mod bindings;
 pub mod boot;
 pub mod chord;
 pub mod command;
@@ -24,17 +26,23 @@ pub mod link_state;
 pub mod motion;
 pub mod motor;
 pub mod page;
+pub mod palette;
 pub mod parameters;
+pub mod permits;
+pub mod quantity;
 pub mod seat;
 pub mod telemetry;
 pub mod touchdown;
+pub mod trace;
 pub mod trend;
 pub mod uplink;
 pub mod vehicle;
 pub mod words;
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::OperatorAction;
@@ -43,6 +51,7 @@ use protocol::text::Reassembler;
 use action::Action;
 use alarm::{Alarm, Alarms};
 pub(crate) use auto_step::AutoStep;
+use bindings::Bindings;
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
@@ -83,6 +92,8 @@ pub struct Settings {
     pub auto: bool,
     /// Whether a person watches a screen; then the end of the flight does not end the program.
     pub interactive: bool,
+    /// Which key does what.
+    pub keys: Bindings,
     /// Without a screen: give up if the flight has not ended after this time.
     pub time_limit: Option<Duration>,
 }
@@ -103,6 +114,7 @@ impl Settings {
             demonstration: false,
             auto: false,
             interactive: true,
+            keys: Bindings::default(),
             time_limit: None,
         }
     }
@@ -134,7 +146,7 @@ impl Role {
 }
 
 /// The position and speed of a replay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Playback {
     /// Time since the first frame.
     pub position: Duration,
@@ -143,6 +155,8 @@ pub struct Playback {
     /// Recorded time per real time.
     pub speed: f64,
     pub paused: bool,
+    /// Each phase of the recording and when it began.
+    pub phases: Arc<[(TdPhase, Duration)]>,
 }
 
 /// The state of the log writer.

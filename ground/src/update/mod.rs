@@ -6,6 +6,7 @@ pub mod alarms;
 pub mod auto;
 pub mod commands;
 pub mod crew;
+mod entry;
 pub mod frames;
 pub mod keys;
 pub mod tick;

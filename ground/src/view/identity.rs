@@ -5,6 +5,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
+use super::draw_line;
 use super::theme::{TextRole, Theme};
 use crate::model::{Model, Role, words};
 
@@ -23,12 +24,12 @@ pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
         Constraint::Fill(1),
         Constraint::Length(CREW_COLUMNS),
     ]));
-    frame.render_widget(mode(model, theme), mode_area);
-    frame.render_widget(Span::styled(vehicle(model), theme.style(TextRole::Plain)), vehicle_area);
+    draw_line(frame, mode_area, mode(model, theme).into());
+    draw_line(frame, vehicle_area, Line::styled(vehicle(model), theme.style(TextRole::Plain)));
     let Address { system_id, component_id } = model.settings.us;
     let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
-    frame.render_widget(Span::styled(station, theme.style(TextRole::Label)), station_area);
-    frame.render_widget(crew(model, theme), crew_area);
+    draw_line(frame, station_area, Line::styled(station, theme.style(TextRole::Label)));
+    draw_line(frame, crew_area, crew(model, theme).into());
 }
 
 /// The same for narrow screens.

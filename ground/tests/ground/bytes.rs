@@ -11,7 +11,7 @@ use flight::computer::LogState;
 use ground::app::pace::Pace;
 use ground::model::Model;
 use ground::update::{Action, Msg, update};
-use ground::view::theme::Theme;
+use ground::view::theme::{Palette, Theme};
 use ground::view::view;
 use onboard_sim::endpoint::VehicleEndpoint;
 use onboard_sim::fly::DeadlinePolicy;
@@ -77,7 +77,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
         }
         pace.check_urgent(&model);
         if now >= pace.redraw_at() {
-            let theme = Theme { colour: true, ascii: false };
+            let theme = Theme { palette: Palette::Dark, ascii: false };
             terminal.draw(|frame| view(&model, theme, now, frame)).expect("memory takes it");
             let bytes = std::mem::take(&mut *line.0.borrow_mut()).len();
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);

@@ -15,6 +15,7 @@ mod links;
 mod lossy_link;
 mod phases;
 mod program;
+mod pictures;
 mod radio;
 mod replay;
 mod rig;
