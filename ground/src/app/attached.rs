@@ -23,6 +23,7 @@ use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::action::{Action, Request};
 use crate::model::bindings::Bindings;
+use crate::model::callouts::Talk;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
@@ -42,6 +43,7 @@ pub struct Viewer {
     pub watch: bool,
     pub operator: String,
     pub keys: Bindings,
+    pub talk: Talk,
 }
 
 /// Shows the station until the person at the screen quits; the station keeps running. Without a terminal it prints
@@ -164,6 +166,11 @@ async fn act(
             Action::Redraw => output.clear(),
             Action::NextTheme => output.next_theme(),
             Action::Bell => output.bell(),
+            Action::Say(text) => {
+                if let Some(ended) = output.say(&text) {
+                    model.warn(now, ended.to_string());
+                }
+            }
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
             Action::Send(_)
@@ -236,8 +243,8 @@ fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -
         }
         ToScreen::Msg(msg) => {
             let actions = update(model, msg, at);
-            // The station does the actions; a screen only rings the bell.
-            actions.into_iter().filter(|action| *action == Action::Bell).collect()
+            // The station does the actions; a screen only rings the bell and talks.
+            actions.into_iter().filter(|action| matches!(action, Action::Bell | Action::Say(_))).collect()
         }
         ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
     }
@@ -256,6 +263,7 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         demonstration: hello.demonstration,
         auto: hello.auto,
         keys: viewer.keys.clone(),
+        talk: viewer.talk,
         ..Settings::on_screen(&hello.link_name)
     }
 }

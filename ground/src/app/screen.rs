@@ -25,6 +25,7 @@ use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
 use super::pace::Pace;
+use super::voice::{Voice, VoiceEnded};
 use super::terminal_writer::{self, FrameBuffer, TerminalWriter};
 use crate::cli::{Characters, ThemeChoice};
 use crate::config::Config;
@@ -59,6 +60,7 @@ pub struct Screen {
     events: EventStream,
     theme: Theme,
     bell: bool,
+    voice: Option<Voice>,
     pace: Pace,
     /// Whether the next frame is written completely.
     whole: bool,
@@ -73,6 +75,8 @@ impl Screen {
     /// # Errors
     /// Standard output is no terminal, or it cannot be prepared.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
+        let voice = config.voice.as_deref().map(Voice::start).transpose();
+        let voice = voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
         let (terminal, writer) =
             take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
@@ -82,6 +86,7 @@ impl Screen {
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
+            voice,
             pace: Pace::default(),
             whole: false,
             waiting: None,
@@ -134,6 +139,13 @@ impl Screen {
     pub fn clear(&mut self) {
         self.whole = true;
         self.mark_changed();
+    }
+
+    /// Calls a text out. Returns why nothing can be called out any more, once.
+    pub fn say(&mut self, text: &str) -> Option<VoiceEnded> {
+        let ended = self.voice.as_ref()?.say(text).err();
+        self.voice = self.voice.take().filter(|_| ended.is_none());
+        ended
     }
 
     /// Changes to the next theme.

@@ -13,7 +13,7 @@ use protocol::transport::LinkAddress;
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::bindings::Bindings;
-pub use values::{Characters, LogChoice, ReplayFrom, Seconds, ThemeChoice};
+pub use values::{Characters, LogChoice, ReplayFrom, Seconds, TalkAmount, ThemeChoice};
 
 /// The profile that the demonstration flies by default.
 const DEMO_PROFILE: &str = "mk2";
@@ -119,6 +119,18 @@ pub struct Cli {
     /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
     #[arg(long, value_name = "WHICH", global = true)]
     pub theme: Option<ThemeChoice>,
+
+    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub voice: Option<String>,
+
+    /// How much is called out. Default: normal.
+    #[arg(long, value_name = "HOW_MUCH", global = true)]
+    pub talk: Option<TalkAmount>,
+
+    /// The least time between two heights that are called out. Default: 1.5.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, global = true)]
+    pub talk_every_s: Option<Seconds>,
 
     /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
     #[arg(long, value_name = "ACTION=KEY,...", global = true)]

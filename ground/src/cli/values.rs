@@ -57,19 +57,45 @@ impl FromStr for ReplayFrom {
     }
 }
 
-/// A time limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How much is called out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum TalkAmount {
+    /// Neither voice nor bells, except those of alarms
+    Nothing,
+    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO and a lost link
+    Few,
+    /// Also phases and every 50 m
+    #[default]
+    Normal,
+    /// Also every 10 m below 50 m
+    All,
+}
+
+/// A time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "f64")]
 pub struct Seconds(pub Duration);
 
 impl FromStr for Seconds {
     type Err = String;
 
     fn from_str(given: &str) -> Result<Self, String> {
-        match given.parse::<f64>() {
-            Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(Self(Duration::from_secs_f64(seconds))),
-            _ => Err(format!("`{given}` is not a number of seconds from 0.1 to 86400")),
-        }
+        given.parse::<f64>().map_err(|_| wrong_seconds(given)).and_then(Self::try_from)
     }
+}
+
+impl TryFrom<f64> for Seconds {
+    type Error = String;
+
+    fn try_from(seconds: f64) -> Result<Self, String> {
+        let accepted = (0.1..=86_400.0).contains(&seconds);
+        if accepted { Ok(Self(Duration::from_secs_f64(seconds))) } else { Err(wrong_seconds(seconds)) }
+    }
+}
+
+fn wrong_seconds(given: impl std::fmt::Display) -> String {
+    format!("`{given}` is not a number of seconds from 0.1 to 86400")
 }
 
 /// What the terminal can show.

@@ -38,6 +38,8 @@ pub enum Action {
     /// Give the terminal back and continue without a screen.
     LeaveScreen,
     Bell,
+    /// Call this out with the crew's voice.
+    Say(String),
     /// An alarm was raised: run the alarm command with its text.
     Alarm(String),
     Quit,

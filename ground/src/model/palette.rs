@@ -5,7 +5,7 @@ use super::act::{Act, DEFINITIONS};
 use super::quantity::{self, Quantity};
 
 /// How to abort.
-pub const ABORT_WORDS: &str = "abort, from anywhere: Ctrl-X, then Enter within 2 s (or Ctrl-X again)";
+pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X (or Ctrl-X twice)";
 
 /// What an entry of the palette does.
 #[derive(Debug, Clone, Copy, PartialEq)]

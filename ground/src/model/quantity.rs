@@ -112,7 +112,7 @@ pub static ALL: [Quantity; COUNT] = [
     },
     Quantity { name: "cost", unit: "", decimals: 1, read: |m, _| solver(m, |c| f64::from(c.cost)) },
     Quantity { name: "link rate", unit: "B/s", decimals: 0, read: |m, now| {
-        Some(Sample::new(m.link.stats.figures(now).rx_bytes_s, now))
+        m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now))
     } },
     Quantity { name: "link loss", unit: "%", decimals: 1, read: |m, now| {
         m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))

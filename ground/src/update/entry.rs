@@ -63,6 +63,11 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
 /// Does what an entry of the palette says. It goes the way of its key, so it never does more than the key.
 fn perform(model: &mut Model, does: Does, now: Duration) {
     match does {
+        // Enter has chosen it, and a held Enter would confirm it.
+        Does::Act(act @ Act::Disarm) => {
+            let key = model.settings.keys.name(act);
+            model.info(now, format!("press {key}, then Enter: only these keys disarm"));
+        }
         Does::Act(act) => keys::perform(model, act, now),
         Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
         Does::Plot(quantity) => {

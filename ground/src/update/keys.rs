@@ -17,11 +17,14 @@ use crate::model::dialog::Dialog;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
 use crate::model::permits::{why_not_arm, why_not_start};
+use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, quantity};
 
 /// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
+/// How far Left and Right move the look at the past.
+const LOOK_STEP: Duration = Duration::from_secs(1);
 /// The furthest scroll position; no list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
@@ -157,6 +160,7 @@ fn expire(model: &mut Model, now: Duration) {
 /// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
+    model.look_back = model.look_back.filter(|looks| now < looks.until);
     pass_abort_chord(model, now);
     pass_quit(model, now);
 }
@@ -177,6 +181,7 @@ fn on_free_key(model: &mut Model, key: Key, now: Duration) {
     match key {
         Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
         Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
+        Key::Left | Key::Right if model.playing.is_none() => look_back(model, key == Key::Left, now),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
@@ -219,6 +224,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => {
+            model.look_back = None;
             model.pages.filter.clear();
             model.pages.hold(None);
         }
@@ -232,6 +238,14 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
     }
+}
+
+/// Moves the look at the past of this flight; at its end the screen is live again.
+fn look_back(model: &mut Model, earlier: bool, now: Duration) {
+    let at = model.look_back.map_or(now, |looks| looks.at);
+    let at = if earlier { at.saturating_sub(LOOK_STEP) } else { at + LOOK_STEP };
+    let begin = model.recall.begin().filter(|_| at < now);
+    model.look_back = begin.map(|begin| LookBack { at: at.max(begin), until: now + LOOKS_FOR });
 }
 
 /// Chooses the next or the previous quantity to plot.

@@ -8,7 +8,7 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, commands, crew, frames, keys};
+use super::{Action, auto, callouts, commands, crew, frames, keys};
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link_state::LinkState;
@@ -52,6 +52,10 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
     trace::note(model, now);
+    if model.vehicle.in_flight() || model.vehicle.countdown_s().is_some() {
+        model.recall.note(&model.vehicle, now);
+    }
+    callouts::ring(model);
     auto::step(model, now);
     commands::poll(model, now);
     commands::observe(model, now);

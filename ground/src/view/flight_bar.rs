@@ -6,6 +6,7 @@ use protocol::dialect::TdPhase;
 use protocol::log::record::EventLevel;
 use ratatui::Frame;
 use ratatui::layout::Rect;
+use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
 use super::draw_line;
@@ -37,14 +38,26 @@ fn first(model: &Model) -> Option<Duration> {
     model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
 }
 
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+/// Draws the bar up to the present, with a mark at the shown moment.
+pub fn draw(
+    model: &Model,
+    theme: Theme,
+    (now, shown_at): (Duration, Duration),
+    frame: &mut Frame,
+    area: Rect,
+) {
     if area.height > 0 && is_shown(model) {
-        draw_line(frame, area, line(model, theme, now, usize::from(area.width)));
+        draw_line(frame, area, line(model, theme, (now, shown_at), usize::from(area.width)));
     }
 }
 
-fn line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    let columns = columns.saturating_sub(2);
+fn line(
+    model: &Model,
+    theme: Theme,
+    (now, shown_at): (Duration, Duration),
+    columns: usize,
+) -> Line<'static> {
+    let columns = columns.saturating_sub(2).max(1);
     let (phases, span): (&[(TdPhase, Duration)], Shown) = match &model.playing {
         Some(playing) => {
             let length_s = playing.length.as_secs_f64().max(1.0);
@@ -83,9 +96,16 @@ fn line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'sta
             *cell = EVENT;
         }
     }
-    let here = column(now);
-    if let Some(cell) = cells.get_mut(here) {
+    let here = column(shown_at);
+    if let Some(cell) = cells.get_mut(here).filter(|cell| !cell.is_alphabetic()) {
         *cell = NOW;
     }
-    Line::from(vec![Span::raw(" "), Span::styled(cells.into_iter().collect::<String>(), theme.style(TextRole::Plain))])
+    let part = |cells: &[char], role| Span::styled(cells.iter().collect::<String>(), theme.style(role));
+    let (before, rest) = cells.split_at(here);
+    Line::from(vec![
+        Span::raw(" "),
+        part(before, TextRole::Plain),
+        part(&rest[..1], TextRole::Key).patch_style(Modifier::REVERSED),
+        part(&rest[1..], TextRole::Plain),
+    ])
 }

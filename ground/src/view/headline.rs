@@ -8,7 +8,7 @@ use tui_big_text::{BigText, PixelSize};
 use super::theme::{TextRole, Theme};
 
 /// Columns between two items.
-const GAP_COLUMNS: u16 = 3;
+const GAP_COLUMNS: u16 = 2;
 /// The headline takes at most this part of the rows.
 const SHARE: u16 = 3;
 /// From this width on, numbers have decimals.

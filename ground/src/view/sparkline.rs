@@ -47,7 +47,10 @@ pub fn draw(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fra
     ];
     if least <= most {
         let range = format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
-        spans.push(Span::styled(range, theme.style(TextRole::Label)));
+        let used: usize = spans.iter().map(Span::width).sum();
+        if used + range.len() <= usize::from(heading.width) {
+            spans.push(Span::styled(range, theme.style(TextRole::Label)));
+        }
     }
     draw_line(frame, heading, Line::from(spans));
     let span = (most - least).max(f64::MIN_POSITIVE);

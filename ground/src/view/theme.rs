@@ -106,7 +106,6 @@ impl Palette {
 struct Colours {
     back: u8,
     plain: u8,
-    label: u8,
     good: u8,
     caution: u8,
     /// Text and background.
@@ -118,25 +117,22 @@ struct Colours {
 const DARK: Colours = Colours {
     back: 16,
     plain: 255,
-    label: 250,
     good: 114,
     caution: 221,
     alarm: (231, 124),
-    inks: [221, 80, 210, 177, 248, 255],
+    inks: [221, 80, 210, 177, 255, 255],
 };
 const LIGHT: Colours = Colours {
     back: 231,
     plain: 16,
-    label: 238,
     good: 22,
     caution: 88,
     alarm: (231, 124),
-    inks: [16, 19, 88, 54, 238, 16],
+    inks: [16, 19, 88, 54, 16, 16],
 };
 const CONTRAST: Colours = Colours {
     back: 16,
     plain: 231,
-    label: 231,
     good: 46,
     caution: 226,
     alarm: (16, 231),
@@ -199,8 +195,11 @@ impl Theme {
             Some(colours) => {
                 let on_back = |colour| plain.fg(Color::Indexed(colour));
                 match role {
-                    TextRole::Plain | TextRole::Title | TextRole::Key => on_back(colours.plain),
-                    TextRole::Label | TextRole::Stale => on_back(colours.label),
+                    // Labels are as strong as values: pale ones cannot be read in the sun, and every change of colour
+                    // costs twenty bytes on the line.
+                    TextRole::Plain | TextRole::Label | TextRole::Stale | TextRole::Title | TextRole::Key => {
+                        on_back(colours.plain)
+                    }
                     TextRole::Good => on_back(colours.good),
                     TextRole::Caution => on_back(colours.caution),
                     TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),

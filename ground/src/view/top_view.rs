@@ -109,7 +109,6 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             for x in ticks::multiples(margin - half_x, half_x - 6.0 * margin, step) {
                 context.print(x, -half_y, label(format!("'{}", shortest(x))));
             }
-            context.print(0.0, half_y, TextLine::styled("N", theme.style(TextRole::Title)));
             context.print(-half_x, half_y, label(wind(model)));
             if let Some(fence_m) = fence_m.filter(|fence_m| *fence_m > half_x.min(half_y)) {
                 let words = format!("fence {} m", shortest(fence_m));

@@ -12,18 +12,24 @@ use super::{alarm_line, dialog, draw_line, flight_bar, identity, pages, palette,
 use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::page::Page;
+use crate::model::recall::LookBack;
 
 /// From this width on every page is named; below, those with a letter are not.
 const EVERY_NAME_COLUMNS: u16 = 100;
 
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let bar_rows = u16::from(flight_bar::is_shown(model));
+    // The top lines, dialogs and the alarm line always show the present.
+    let past = model.past();
+    let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
+    let past_rows = u16::from(past.is_some());
     let pinned_rows = u16::from(!model.pages.pinned.is_empty());
-    let [identity, status, abort, command, pinned, body, bar, alarm, names] = area.layout(&Layout::vertical([
+    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] = area.layout(&Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(1),
         Constraint::Length(1),
+        Constraint::Length(past_rows),
         Constraint::Length(pinned_rows),
         Constraint::Fill(1),
         Constraint::Length(bar_rows),
@@ -34,9 +40,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     draw_status(model, theme, now, frame, status);
     draw_line(frame, abort, top_lines::abort(model, theme, now));
     draw_line(frame, command, top_lines::command(model, theme, now));
-    draw_line(frame, pinned, pins::line(model, theme, now));
-    pages::draw(model, theme, now, frame, body);
-    flight_bar::draw(model, theme, now, frame, bar);
+    if let Some(looks) = model.look_back.filter(|_| past.is_some()) {
+        draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
+    }
+    draw_line(frame, pinned, pins::line(shown, theme, shown_at));
+    pages::draw(shown, theme, shown_at, frame, body);
+    flight_bar::draw(model, theme, (now, shown_at), frame, bar);
     alarm_line::draw(model, theme, now, frame, alarm);
     draw_line(frame, names, names_line(model, theme, names.width));
     palette::draw(model, theme, frame, body);
@@ -56,6 +65,14 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
     draw_line(frame, countdown, top_lines::countdown(model, theme, now).into());
     draw_line(frame, link, top_lines::link(model, theme, now));
     draw_line(frame, abort, Line::styled(top_lines::abort_key(model), theme.style(TextRole::Key)));
+}
+
+/// Says that the page shows the past, and for how long.
+fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -> Line<'static> {
+    let ago_s = now.saturating_sub(shown_at).as_secs_f64();
+    let left_s = looks.until.saturating_sub(now).as_secs();
+    let words = format!(" PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move");
+    Line::styled(words, theme.style(TextRole::Alarm))
 }
 
 /// Keys and names of the pages, the shown one in brackets, and whether it is held.

@@ -146,7 +146,7 @@ fn no_page_cuts_what_it_shows() {
     let mut cut = Vec::new();
     every_page(|name, rig, size| {
         let rows = rows(&drawn(rig, size, Palette::Dark));
-        for row in rows.iter().filter(|row| row.contains(CUT_MARK) && !row.contains("A last …")) {
+        for row in rows.iter().filter(|row| row.contains(CUT_MARK) && !row.contains("A last … is")) {
             cut.push(format!("{name}: {row}"));
         }
     });
@@ -216,7 +216,7 @@ fn large_screens_are_used() {
             let left = used(|row, half| row.chars().take(half).collect());
             let right = used(|row, half| row.chars().skip(half).collect());
             let all = f64::from(*rows_of_screen);
-            assert!(left / all > 0.6 && right / all > 0.6, "{name} {columns}: {left} and {right} of {all}\n{}", rows.join("\n"));
+            assert!(left / all > 0.5 && right / all > 0.5, "{name} {columns}: {left} and {right} of {all}\n{}", rows.join("\n"));
         }
     }
 }
@@ -225,7 +225,7 @@ fn large_screens_are_used() {
 #[test]
 fn what_must_be_seen_first_is_the_largest() {
     for (name, rig) in states() {
-        for (size, least) in SIZES.into_iter().zip([40, 60, 150]) {
+        for (size, least) in SIZES.into_iter().zip([30, 60, 70]) {
             let buffer = drawn(&rig, size, Palette::Dark);
             let blocks = "█▀▄▌▐▘▝▖▗▚▞▙▛▜▟";
             let large = buffer.content.iter().filter(|cell| blocks.contains(cell.symbol())).count();

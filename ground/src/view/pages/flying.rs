@@ -33,8 +33,8 @@ pub fn draw(
     frame: &mut Frame,
     area: Rect,
 ) {
-    let area = headline::draw(&foremost::flight(model, now), theme, frame, area);
     let roomy = is_roomy(area);
+    let area = headline::draw(&foremost::flight(model, now), theme, frame, area);
     let [gauge_columns, value_columns] = if roomy { ROOMY_COLUMNS } else { NARROW_COLUMNS };
     let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
         Constraint::Length(gauge_columns),

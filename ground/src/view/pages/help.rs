@@ -10,7 +10,7 @@ use crate::model::palette::ABORT_WORDS;
 use crate::view::theme::{TextRole, Theme};
 
 /// Columns of a key.
-const KEY_COLUMNS: usize = 12;
+const KEY_COLUMNS: usize = 13;
 
 const REPLAY: [(&str, &str); 4] = [
     ("Space", "pause, or go on"),
@@ -19,12 +19,11 @@ const REPLAY: [(&str, &str); 4] = [
     ("+ -", "faster or slower"),
 ];
 
-const MARKS: [&str; 5] = [
-    "~ before a value: older than 1.5 s. Commanded, acknowledged and observed are",
-    "three facts; armed is what HEARTBEAT says. o command, # actual. The line is",
-    "flown, the dots are planned. After a loss of the link, + is the PREDICTED",
-    "position, with a circle that contains it in 19 of 20 cases. * computed on ground.",
-    "A last … means that a line is cut: there is more on a wider screen.",
+const MARKS: [&str; 4] = [
+    "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed",
+    "on the ground. Commanded, acknowledged and observed are three facts; armed is",
+    "what HEARTBEAT says. Without link, + is the PREDICTED position, its circle",
+    "contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.",
 ];
 
 /// The actions whose keys do something now; those that show a page in one line.

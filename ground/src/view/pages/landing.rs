@@ -14,7 +14,7 @@ use crate::view::number::{STALE_MARK, fixed, row};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
     actuators, controller, draw_lines, event_list, flight, foremost, headline, link_line, lost_position, side_view,
-    sparkline, top_lines, touchdown,
+    top_lines, touchdown,
 };
 
 /// Rows of the panels, with their title.
@@ -27,8 +27,9 @@ const FIN_ROWS: u16 = 5;
 /// Draws the headline, the panels, the events and the side view.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let first = if model.vehicle.verdict.is_some() { foremost::verdict(model) } else { foremost::burn(model, now) };
+    let roomy = is_roomy(area);
     let area = headline::draw(&first, theme, frame, area);
-    let (left, right) = if is_roomy(area) {
+    let (left, right) = if roomy {
         let [panels, below] =
             area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS + 1), Constraint::Fill(1)]));
         let quarters = [Constraint::Fill(1); 4];
@@ -38,13 +39,8 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         let inside = titled("Controller (NMPC)", theme, frame, solver);
         draw_lines(frame, inside, &controller::rows(model, theme, now));
         draw_actuators(model, theme, now, frame, actuators);
-        let [left, right] =
+        let [events, right] =
             below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
-        let [lines, events] = left.layout(&Layout::vertical([
-            Constraint::Length(2 * sparkline::ROWS),
-            Constraint::Fill(1),
-        ]));
-        sparkline::draw_all(&["vertical speed", "height"], model, theme, now, frame, lines);
         (events, right)
     } else {
         let [left, right] =

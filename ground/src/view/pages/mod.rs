@@ -78,7 +78,7 @@ pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect 
 
 /// From this size on a page has room for more than the essentials.
 fn is_roomy(area: Rect) -> bool {
-    area.width >= 120 && area.height >= 30
+    area.width >= 120 && area.height >= 24
 }
 
 /// This many lines from a start line on.

@@ -60,7 +60,7 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let words = match top_view::comes_down(model, now) {
         Some(at) => {
             let words = format!(
-                " x comes down {} m north, {} m east; moved ±{} m in 5 s*",
+                " x comes down {} m N, {} m E, moved ±{} m in 5 s*",
                 fixed(at.north_m, 1),
                 fixed(at.east_m, 1),
                 fixed(at.radius_m, 1)
@@ -71,6 +71,6 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     };
     Line::from(vec![
         Span::styled(words, theme.style(TextRole::Plain)),
-        Span::styled("  line flown, dots planned", theme.style(TextRole::Label)),
+        Span::styled("; line flown, dots planned", theme.style(TextRole::Label)),
     ])
 }

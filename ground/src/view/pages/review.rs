@@ -6,11 +6,11 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::{is_roomy, path};
+use super::{is_roomy, path, titled};
 use crate::model::{Model, words};
 use crate::view::number::fixed;
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{draw_lines, foremost, headline, touchdown, verdict};
+use crate::view::{draw_lines, event_list, foremost, headline, touchdown, verdict};
 
 /// Columns of the predicted touchdown beside the greatest values.
 const PLAN_COLUMNS: usize = 37;
@@ -19,20 +19,29 @@ const MAXIMA_COLUMNS: usize = 34;
 /// Columns of a phase with its time.
 const TIMELINE_COLUMNS: usize = 24;
 /// Rows of verdict, limits and timeline on a larger screen.
-const TABLE_ROWS: u16 = 20;
+const TABLE_ROWS: u16 = 17;
+/// Columns of them on a larger screen; the events are beside them.
+const TABLE_COLUMNS: u16 = 80;
 
 /// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let roomy = is_roomy(area);
     let area = headline::draw(&foremost::verdict(model), theme, frame, area);
-    let mut lines = lines(model, theme, now, usize::from(area.width));
-    if !is_roomy(area) {
+    let columns = if roomy { TABLE_COLUMNS } else { area.width };
+    let mut lines = lines(model, theme, now, usize::from(columns));
+    if !roomy {
         // The bar of the flight below shows the phases too.
         lines.truncate(usize::from(area.height));
         return draw_lines(frame, area, &lines);
     }
     let [table, pictures] =
         area.layout(&Layout::vertical([Constraint::Length(TABLE_ROWS), Constraint::Fill(1)]));
-    draw_lines(frame, table, &lines);
+    let [left, right] =
+        table.layout(&Layout::horizontal([Constraint::Length(TABLE_COLUMNS), Constraint::Fill(1)]));
+    draw_lines(frame, left, &lines);
+    let inside = titled("Events", theme, frame, right);
+    let events = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &events);
     path::draw(model, theme, now, frame, pictures);
 }
 

@@ -84,7 +84,7 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
     let page = colours(&buffer.content[0]).1;
     let svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         font-family=\"DejaVu Sans Mono,Menlo,Consolas,monospace\" font-size=\"15\" xml:space=\"preserve\">\n\
+         font-family=\"DejaVu Sans Mono,Menlo,Consolas,monospace\" font-size=\"15\">\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>\n",
         hex(page)
     );
@@ -128,7 +128,8 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
                 let (x, length) = (x + begin as u16 * CELL.0, trimmed.chars().count() as u16 * CELL.0);
                 let bold =
                     if run[0].modifier.contains(Modifier::BOLD) { " font-weight=\"bold\"" } else { "" };
-                let escaped = trimmed.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+                // Several spaces would become one.
+                let escaped = trimmed.replace(' ', "\u{a0}").replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
                 let _ = writeln!(
                     texts,
                     "<text x=\"{x}\" y=\"{}\" textLength=\"{length}\" fill=\"{}\"{bold}>{escaped}</text>",
