@@ -71,7 +71,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
             (Some(Command::Status), _) => stations::list().await,
             (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
             (Some(Command::Attach { watch }), _) => {
-                let viewer = Viewer { watch: *watch, operator, keys: config.keys.clone(), talk: config.talk() };
+                let viewer =
+                    Viewer { watch: *watch, operator, keys: config.keys.clone(), talk: config.talk() };
                 attached::session(socket, &viewer, config, interactive).await
             }
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,

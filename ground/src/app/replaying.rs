@@ -32,13 +32,12 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
     let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
     let damage = recording.damage.clone();
     let name = path.display().to_string();
-    let settings =
-        Settings {
-            log_path: Some(name.clone()),
-            role: Role::Replaying,
-            keys: config.keys.clone(),
-            ..Settings::on_screen(name)
-        };
+    let settings = Settings {
+        log_path: Some(name.clone()),
+        role: Role::Replaying,
+        keys: config.keys.clone(),
+        ..Settings::on_screen(name)
+    };
     let mut player = Player::new(recording, settings);
     match cli.from {
         None => {}

@@ -25,8 +25,8 @@ use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
 use super::pace::Pace;
-use super::voice::{Voice, VoiceEnded};
 use super::terminal_writer::{self, FrameBuffer, TerminalWriter};
+use super::voice::{Voice, VoiceEnded};
 use crate::cli::{Characters, ThemeChoice};
 use crate::config::Config;
 use crate::key::Key;
@@ -76,7 +76,8 @@ impl Screen {
     /// Standard output is no terminal, or it cannot be prepared.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
         let voice = config.voice.as_deref().map(Voice::start).transpose();
-        let voice = voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
+        let voice =
+            voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
         let (terminal, writer) =
             take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;

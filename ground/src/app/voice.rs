@@ -36,11 +36,14 @@ impl Voice {
             .spawn()?;
         let (lines, waiting) = sync_channel(WAITING_MAX);
         let thread = std::thread::Builder::new().name("voice".to_owned());
-        let _thread = thread.spawn(move || speak(child, &waiting))?;
+        let thread = thread.spawn(move || speak(child, &waiting))?;
+        // It is never joined, because it may hang with the command.
+        #[cfg(not(test))]
+        drop(thread);
         Ok(Self {
             lines,
             #[cfg(test)]
-            thread: _thread,
+            thread,
         })
     }
 

@@ -81,7 +81,10 @@ impl FromStr for Seconds {
     type Err = String;
 
     fn from_str(given: &str) -> Result<Self, String> {
-        given.parse::<f64>().map_err(|_| wrong_seconds(given)).and_then(Self::try_from)
+        match given.parse::<f64>() {
+            Ok(seconds) => Self::try_from(seconds),
+            Err(_) => Err(wrong_seconds(given)),
+        }
     }
 }
 

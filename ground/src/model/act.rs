@@ -57,7 +57,12 @@ pub const DEFINITIONS: [Definition; 26] = [
     define(Act::Show(Page::Log), "log", Key::Char('8'), "page: the recording"),
     define(Act::Show(Page::Alarms), "alarms", Key::Char('9'), "page: every alarm"),
     define(Act::Show(Page::Path), "path", Key::Char('p'), "page: the flight from two sides and from above"),
-    define(Act::Show(Page::Values), "values", Key::Char('v'), "page: every value, with the solver's residuals"),
+    define(
+        Act::Show(Page::Values),
+        "values",
+        Key::Char('v'),
+        "page: every value, with the solver's residuals",
+    ),
     define(Act::Show(Page::Plot), "plot", Key::Char('t'), "page: one number over time"),
     define(Act::Show(Page::Help), "help", Key::Char('?'), "page: the keys that work now"),
     define(Act::Hold, "hold", Key::Char('h'), "hold this page, or follow the flight again"),

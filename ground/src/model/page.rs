@@ -138,7 +138,15 @@ const PINNED_MAX: usize = 4;
 
 impl Default for Pages {
     fn default() -> Self {
-        Self { held: None, scroll: 0, chosen: None, plotted: &quantity::ALL[0], pinned: Vec::new(), filter: String::new(), entry: None }
+        Self {
+            held: None,
+            scroll: 0,
+            chosen: None,
+            plotted: &quantity::ALL[0],
+            pinned: Vec::new(),
+            filter: String::new(),
+            entry: None,
+        }
     }
 }
 

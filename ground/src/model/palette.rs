@@ -34,11 +34,7 @@ pub fn found(model: &Model, typed: &str) -> Vec<Entry> {
 }
 
 fn every(model: &Model) -> impl Iterator<Item = Entry> {
-    let abort = Entry {
-        words: ABORT_WORDS.to_owned(),
-        key: "Ctrl-X".to_owned(),
-        does: Does::TellAbort,
-    };
+    let abort = Entry { words: ABORT_WORDS.to_owned(), key: "Ctrl-X".to_owned(), does: Does::TellAbort };
     let acts = DEFINITIONS.iter().map(|definition| Entry {
         words: definition.words.to_owned(),
         key: model.settings.keys.name(definition.act),

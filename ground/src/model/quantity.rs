@@ -51,15 +51,40 @@ pub const COUNT: usize = 33;
 
 pub static ALL: [Quantity; COUNT] = [
     Quantity { name: "height", unit: "m", decimals: 1, read: |model, _| model.vehicle.height_m() },
-    Quantity { name: "vertical speed", unit: "m/s", decimals: 1, read: |model, _| model.vehicle.vertical_m_s() },
-    Quantity { name: "horizontal speed", unit: "m/s", decimals: 1, read: |m, _| motion(m, Motion::horizontal_m_s) },
+    Quantity {
+        name: "vertical speed",
+        unit: "m/s",
+        decimals: 1,
+        read: |model, _| model.vehicle.vertical_m_s(),
+    },
+    Quantity {
+        name: "horizontal speed",
+        unit: "m/s",
+        decimals: 1,
+        read: |m, _| motion(m, Motion::horizontal_m_s),
+    },
     Quantity { name: "distance", unit: "m", decimals: 1, read: |m, _| motion(m, Motion::distance_m) },
     Quantity { name: "north", unit: "m", decimals: 1, read: |m, _| motion(m, |motion| motion.x_m) },
     Quantity { name: "east", unit: "m", decimals: 1, read: |m, _| motion(m, |motion| motion.y_m) },
     Quantity { name: "axial speed", unit: "m/s", decimals: 2, read: |m, _| body(m, |body| body.u_m_s) },
-    Quantity { name: "lateral speed", unit: "m/s", decimals: 2, read: |m, _| body(m, BodySpeed::lateral_m_s) },
-    Quantity { name: "tilt", unit: "deg", decimals: 1, read: |m, _| attitude(m, |a| a.tilt_rad.to_degrees()) },
-    Quantity { name: "pitch", unit: "deg", decimals: 1, read: |m, _| attitude(m, |a| a.pitch_rad.to_degrees()) },
+    Quantity {
+        name: "lateral speed",
+        unit: "m/s",
+        decimals: 2,
+        read: |m, _| body(m, BodySpeed::lateral_m_s),
+    },
+    Quantity {
+        name: "tilt",
+        unit: "deg",
+        decimals: 1,
+        read: |m, _| attitude(m, |a| a.tilt_rad.to_degrees()),
+    },
+    Quantity {
+        name: "pitch",
+        unit: "deg",
+        decimals: 1,
+        read: |m, _| attitude(m, |a| a.pitch_rad.to_degrees()),
+    },
     Quantity {
         name: "turn rate",
         unit: "deg/s",
@@ -83,21 +108,56 @@ pub static ALL: [Quantity; COUNT] = [
     Quantity { name: "fin 3", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 2) },
     Quantity { name: "fin 4", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 3) },
     Quantity { name: "apogee", unit: "m", decimals: 0, read: |m, _| descent(m, |d| d.apogee_m) },
-    Quantity { name: "ignition height", unit: "m", decimals: 1, read: |m, _| descent(m, |d| d.chosen_height_m) },
-    Quantity { name: "commit height", unit: "m", decimals: 1, read: |m, _| descent(m, |d| d.commit_height_m) },
-    Quantity { name: "time to ignition", unit: "s", decimals: 1, read: |m, now| m.vehicle.ignition_in_s(now) },
+    Quantity {
+        name: "ignition height",
+        unit: "m",
+        decimals: 1,
+        read: |m, _| descent(m, |d| d.chosen_height_m),
+    },
+    Quantity {
+        name: "commit height",
+        unit: "m",
+        decimals: 1,
+        read: |m, _| descent(m, |d| d.commit_height_m),
+    },
+    Quantity {
+        name: "time to ignition",
+        unit: "s",
+        decimals: 1,
+        read: |m, now| m.vehicle.ignition_in_s(now),
+    },
     Quantity {
         name: "wind",
         unit: "m/s",
         decimals: 1,
         read: |m, _| descent(m, |d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s)),
     },
-    Quantity { name: "touchdown north", unit: "m", decimals: 1, read: |m, _| descent(m, |d| d.touchdown_x_m) },
+    Quantity {
+        name: "touchdown north",
+        unit: "m",
+        decimals: 1,
+        read: |m, _| descent(m, |d| d.touchdown_x_m),
+    },
     Quantity { name: "touchdown east", unit: "m", decimals: 1, read: |m, _| descent(m, |d| d.touchdown_y_m) },
     Quantity { name: "drag", unit: "x", decimals: 3, read: |m, _| descent(m, |d| d.drag_scale) },
-    Quantity { name: "time to touchdown", unit: "s", decimals: 1, read: |m, now| m.vehicle.touchdown_in_s(now) },
-    Quantity { name: "predicted speed", unit: "m/s", decimals: 2, read: |m, _| m.vehicle.predicted_speed_m_s() },
-    Quantity { name: "thrust", unit: "x", decimals: 3, read: |m, _| solver(m, |c| f64::from(c.thrust_scale)) },
+    Quantity {
+        name: "time to touchdown",
+        unit: "s",
+        decimals: 1,
+        read: |m, now| m.vehicle.touchdown_in_s(now),
+    },
+    Quantity {
+        name: "predicted speed",
+        unit: "m/s",
+        decimals: 2,
+        read: |m, _| m.vehicle.predicted_speed_m_s(),
+    },
+    Quantity {
+        name: "thrust",
+        unit: "x",
+        decimals: 3,
+        read: |m, _| solver(m, |c| f64::from(c.thrust_scale)),
+    },
     Quantity {
         name: "solve time",
         unit: "ms",
@@ -111,12 +171,18 @@ pub static ALL: [Quantity; COUNT] = [
         read: |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0),
     },
     Quantity { name: "cost", unit: "", decimals: 1, read: |m, _| solver(m, |c| f64::from(c.cost)) },
-    Quantity { name: "link rate", unit: "B/s", decimals: 0, read: |m, now| {
-        m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now))
-    } },
-    Quantity { name: "link loss", unit: "%", decimals: 1, read: |m, now| {
-        m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))
-    } },
+    Quantity {
+        name: "link rate",
+        unit: "B/s",
+        decimals: 0,
+        read: |m, now| m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now)),
+    },
+    Quantity {
+        name: "link loss",
+        unit: "%",
+        decimals: 1,
+        read: |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now)),
+    },
 ];
 
 fn motion(model: &Model, pick: fn(&Motion) -> f64) -> Option<Sample<f64>> {
@@ -152,7 +218,7 @@ mod tests {
         for quantity in &ALL {
             assert_eq!(Quantity::named(quantity.name), Some(quantity));
             assert_eq!(quantity.name, quantity.name.to_lowercase());
-            assert!(std::ptr::eq(&ALL[quantity.place()], quantity), "{quantity:?} is named twice");
+            assert_eq!(ALL.iter().filter(|other| *other == quantity).count(), 1, "{quantity:?}");
         }
         assert_eq!(Quantity::named("colour"), None);
     }

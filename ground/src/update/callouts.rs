@@ -82,10 +82,12 @@ fn height(model: &mut Model, now: Duration) {
     let Some(before_m) = model.called.height_m.replace(height_m) else { return };
     let low = height_m.min(before_m) < LOW_BELOW_M;
     let (step_m, amount) = if low { (LOW_STEP_M, Amount::All) } else { (HIGH_STEP_M, Amount::Normal) };
-    if libm::floor(before_m / step_m) == libm::floor(height_m / step_m) {
+    let steps_below = |height_m: f64| libm::floor(height_m / step_m) as i64;
+    if steps_below(before_m) == steps_below(height_m) {
         return;
     }
-    let passed_m = if height_m > before_m { libm::floor(height_m / step_m) } else { libm::ceil(height_m / step_m) };
+    let passed_m =
+        if height_m > before_m { libm::floor(height_m / step_m) } else { libm::ceil(height_m / step_m) };
     let passed_m = passed_m * step_m;
     // 50 m is a step of both.
     let amount = if passed_m % HIGH_STEP_M == 0.0 { Amount::Normal } else { amount };

@@ -231,10 +231,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Filter => entry::open_filter(model),
         Act::Palette => entry::open_palette(model),
         Act::Pin if shown == Page::Plot => model.pages.pin(model.pages.plotted),
-        Act::Pin => {}
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::AskParameters if shown == Page::Parameters && model.playing.is_none() => ask_parameters(model),
-        Act::AskParameters => {}
+        Act::Pin | Act::AskParameters => {}
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
     }

@@ -51,24 +51,16 @@ pub fn draw(
     }
 }
 
-fn line(
-    model: &Model,
-    theme: Theme,
-    (now, shown_at): (Duration, Duration),
-    columns: usize,
-) -> Line<'static> {
+fn line(model: &Model, theme: Theme, (now, shown_at): (Duration, Duration), columns: usize) -> Line<'static> {
     let columns = columns.saturating_sub(2).max(1);
-    let (phases, span): (&[(TdPhase, Duration)], Shown) = match &model.playing {
-        Some(playing) => {
-            let length_s = playing.length.as_secs_f64().max(1.0);
-            (&playing.phases, Shown { from: Duration::ZERO, length_s })
-        }
-        None => {
-            let from = first(model).unwrap_or(now);
-            let passed_s = now.saturating_sub(from).as_secs_f64();
-            let length_s = LENGTHS_S.into_iter().find(|length_s| passed_s < *length_s).unwrap_or(passed_s);
-            (&model.history.timeline, Shown { from, length_s })
-        }
+    let (phases, span): (&[(TdPhase, Duration)], Shown) = if let Some(playing) = &model.playing {
+        let length_s = playing.length.as_secs_f64().max(1.0);
+        (&playing.phases, Shown { from: Duration::ZERO, length_s })
+    } else {
+        let from = first(model).unwrap_or(now);
+        let passed_s = now.saturating_sub(from).as_secs_f64();
+        let length_s = LENGTHS_S.into_iter().find(|length_s| passed_s < *length_s).unwrap_or(passed_s);
+        (&model.history.timeline, Shown { from, length_s })
     };
     let column = |at: Duration| {
         let share = at.saturating_sub(span.from).as_secs_f64() / span.length_s;

@@ -9,6 +9,7 @@ use super::headline::Item;
 use super::number::{STALE_MARK, age_mark, fixed};
 use super::theme::TextRole;
 use crate::model::Model;
+use crate::model::dead_reckoning::{is_unheard, predict_position};
 use crate::model::motor::{KeepAway, hold_words};
 use crate::model::vehicle::{Sample, is_on_pad};
 
@@ -18,12 +19,7 @@ const PAD_LETTERS: u16 = 8;
 /// Whether the vehicle may be armed; on the way to the start, how far it is.
 pub fn pad(model: &Model, now: Duration) -> Vec<Item> {
     let (word, role) = pad_word(model, now);
-    vec![Item {
-        label: String::new(),
-        text: [word.clone(), word],
-        letters: [PAD_LETTERS; 2],
-        role,
-    }]
+    vec![Item { label: String::new(), text: [word.clone(), word], letters: [PAD_LETTERS; 2], role }]
 }
 
 fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
@@ -53,9 +49,30 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     word("GO", TextRole::Good)
 }
 
+/// After a loss of the link in flight: the predicted height instead of an old one, its error, and the silence.
+fn lost(model: &Model, now: Duration) -> Vec<Item> {
+    let at = predict_position(&model.vehicle, now);
+    let sample = |value: f64| Some(Sample::new(value, now));
+    let silence_s = model.vehicle.best_motion().map(|motion| motion.age(now).as_secs_f64());
+    vec![
+        Item {
+            label: "link".to_owned(),
+            text: ["LOST".to_owned(), "LOST".to_owned()],
+            letters: [5, 5],
+            role: TextRole::Alarm,
+        },
+        number("PREDICTED m up", at.and_then(|at| sample(at.altitude_m)), [0, 0], [5, 4], now),
+        number("error m", at.and_then(|at| sample(at.error_m)), [0, 0], [5, 4], now),
+        number("silent s", silence_s.and_then(sample), [0, 0], [4, 4], now),
+    ]
+}
+
 /// Phase, height, vertical speed and time since release.
 pub fn flight(model: &Model, now: Duration) -> Vec<Item> {
     let vehicle = &model.vehicle;
+    if is_unheard(vehicle, now) {
+        return lost(model, now);
+    }
     let phase = vehicle.phase();
     let (mark, role) = phase.map_or((" ", TextRole::Label), |phase| age_mark(&phase, now));
     let word = phase.map_or("--", |phase| phase_word(phase.value));
@@ -76,6 +93,9 @@ pub fn flight(model: &Model, now: Duration) -> Vec<Item> {
 /// Time to touchdown and its predicted speed; height and vertical speed.
 pub fn burn(model: &Model, now: Duration) -> Vec<Item> {
     let vehicle = &model.vehicle;
+    if is_unheard(vehicle, now) {
+        return lost(model, now);
+    }
     vec![
         number("touchdown in s", vehicle.touchdown_in_s(now), [1, 1], [4, 4], now),
         number("lands at m/s", vehicle.predicted_speed_m_s(), [2, 1], [5, 4], now),

@@ -61,13 +61,7 @@ pub fn draw(items: &[Item], theme: Theme, frame: &mut Frame, area: Rect) -> Rect
 }
 
 /// Where each item begins; `None` if one is wider than the area.
-fn places(
-    items: &[Item],
-    form: usize,
-    size: Size,
-    labelled: u16,
-    columns: u16,
-) -> Option<Vec<(u16, u16)>> {
+fn places(items: &[Item], form: usize, size: Size, labelled: u16, columns: u16) -> Option<Vec<(u16, u16)>> {
     let (mut x, mut y) = (1, 0);
     let mut places = Vec::new();
     for item in items {
@@ -98,6 +92,7 @@ fn one(item: &Item, form: usize, (size, labelled): (Size, u16), theme: Theme, fr
         let middle = Rect { y: below.y + 1, height: 1, ..below };
         return frame.render_widget(Line::styled(spaced, style), middle.intersection(below));
     }
-    let big = BigText::builder().pixel_size(size.pixels).style(style).lines([Line::raw(text.clone())]).build();
+    let big =
+        BigText::builder().pixel_size(size.pixels).style(style).lines([Line::raw(text.clone())]).build();
     frame.render_widget(big, below);
 }

@@ -14,7 +14,7 @@ use crate::model::Model;
 use crate::model::quantity::Quantity;
 
 /// How far back a sparkline reaches.
-const SPAN: Duration = Duration::from_secs(60);
+const SPAN: Duration = Duration::from_mins(1);
 /// Rows of one sparkline with its heading.
 pub const ROWS: u16 = 4;
 /// Steps of the height of a bar; a terminal shows eight a row.
@@ -46,7 +46,8 @@ pub fn draw(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fra
         Span::styled(format!("{mark}{value} {}", quantity.unit), theme.style(role)),
     ];
     if least <= most {
-        let range = format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
+        let range =
+            format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
         let used: usize = spans.iter().map(Span::width).sum();
         if used + range.len() <= usize::from(heading.width) {
             spans.push(Span::styled(range, theme.style(TextRole::Label)));
@@ -54,7 +55,8 @@ pub fn draw(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fra
     }
     draw_line(frame, heading, Line::from(spans));
     let span = (most - least).max(f64::MIN_POSITIVE);
-    let heights = values.iter().map(|value| value.map(|value| (1.0 + (STEPS - 1.0) * (value - least) / span) as u64));
+    let heights =
+        values.iter().map(|value| value.map(|value| (1.0 + (STEPS - 1.0) * (value - least) / span) as u64));
     let bars = Rect { x: bars.x + 1, width: bars.width.saturating_sub(2), ..bars };
     let widget = Sparkline::default()
         .data(heights.collect::<Vec<_>>())

@@ -191,30 +191,27 @@ impl Theme {
     /// The style of a role. A letter's weight and slant say the same without colour.
     pub fn style(self, role: TextRole) -> Style {
         let plain = Style::new();
-        let style = match self.palette.colours() {
-            Some(colours) => {
-                let on_back = |colour| plain.fg(Color::Indexed(colour));
-                match role {
-                    // Labels are as strong as values: pale ones cannot be read in the sun, and every change of colour
-                    // costs twenty bytes on the line.
-                    TextRole::Plain | TextRole::Label | TextRole::Stale | TextRole::Title | TextRole::Key => {
-                        on_back(colours.plain)
-                    }
-                    TextRole::Good => on_back(colours.good),
-                    TextRole::Caution => on_back(colours.caution),
-                    TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
+        let style = if let Some(colours) = self.palette.colours() {
+            let on_back = |colour| plain.fg(Color::Indexed(colour));
+            match role {
+                // Labels are as strong as values: pale ones cannot be read in the sun, and every change of colour costs
+                // twenty bytes on the line.
+                TextRole::Plain | TextRole::Label | TextRole::Stale | TextRole::Title | TextRole::Key => {
+                    on_back(colours.plain)
                 }
+                TextRole::Good => on_back(colours.good),
+                TextRole::Caution => on_back(colours.caution),
+                TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
             }
-            None => {
-                let style = if role == TextRole::Alarm { plain.add_modifier(Modifier::REVERSED) } else { plain };
-                let colour = match role {
-                    TextRole::Good => Some(Color::Green),
-                    TextRole::Caution => Some(Color::Yellow),
-                    TextRole::Alarm => Some(Color::Red),
-                    _ => None,
-                };
-                Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..style }
-            }
+        } else {
+            let style = if role == TextRole::Alarm { plain.add_modifier(Modifier::REVERSED) } else { plain };
+            let colour = match role {
+                TextRole::Good => Some(Color::Green),
+                TextRole::Caution => Some(Color::Yellow),
+                TextRole::Alarm => Some(Color::Red),
+                _ => None,
+            };
+            Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..style }
         };
         match role {
             TextRole::Plain | TextRole::Label | TextRole::Good => style,

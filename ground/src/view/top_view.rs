@@ -58,10 +58,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         return;
     }
     let vehicle = &model.vehicle;
-    let flown: Vec<(f64, f64)> = vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
+    let flown: Vec<(f64, f64)> =
+        vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
     let lost = predict_position(vehicle, now);
-    let fence_m = vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
+    let fence_m =
+        vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
     let furthest = flown.iter().map(|(east, north)| east.abs().max(north.abs()));
     let furthest = furthest
         .chain(down.map(|at| at.east_m.abs().max(at.north_m.abs()) + at.radius_m))
@@ -120,7 +122,11 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 /// Where the wind blows to, as an arrow, and its speed.
 fn wind(model: &Model) -> String {
-    let known = model.vehicle.descent.as_ref().map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
+    let known = model
+        .vehicle
+        .descent
+        .as_ref()
+        .map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
     let Some((north, east)) = known.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
         return String::new();
     };

@@ -24,18 +24,19 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
     let past_rows = u16::from(past.is_some());
     let pinned_rows = u16::from(!model.pages.pinned.is_empty());
-    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] = area.layout(&Layout::vertical([
-        Constraint::Length(1),
-        Constraint::Length(1),
-        Constraint::Length(1),
-        Constraint::Length(1),
-        Constraint::Length(past_rows),
-        Constraint::Length(pinned_rows),
-        Constraint::Fill(1),
-        Constraint::Length(bar_rows),
-        Constraint::Length(1),
-        Constraint::Length(1),
-    ]));
+    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] =
+        area.layout(&Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(past_rows),
+            Constraint::Length(pinned_rows),
+            Constraint::Fill(1),
+            Constraint::Length(bar_rows),
+            Constraint::Length(1),
+            Constraint::Length(1),
+        ]));
     identity::draw(model, theme, frame, identity);
     draw_status(model, theme, now, frame, status);
     draw_line(frame, abort, top_lines::abort(model, theme, now));
@@ -71,7 +72,9 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
 fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -> Line<'static> {
     let ago_s = now.saturating_sub(shown_at).as_secs_f64();
     let left_s = looks.until.saturating_sub(now).as_secs();
-    let words = format!(" PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move");
+    let words = format!(
+        " PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move"
+    );
     Line::styled(words, theme.style(TextRole::Alarm))
 }
 

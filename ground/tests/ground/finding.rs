@@ -194,10 +194,16 @@ fn help_shows_only_the_keys_that_work_now() {
     let mut rig = on_the_pad();
     rig.key(Key::Char('?'));
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("type ARM") && !screen.contains("type START") && !screen.contains("disarm:"), "{screen}");
+    assert!(
+        screen.contains("type ARM") && !screen.contains("type START") && !screen.contains("disarm:"),
+        "{screen}"
+    );
     let mut rig = armed();
     rig.key(Key::Char('?'));
     let screen = rig.screen(80, 24);
-    assert!(!screen.contains("type ARM") && screen.contains("type START") && screen.contains("disarm:"), "{screen}");
+    assert!(
+        !screen.contains("type ARM") && screen.contains("type START") && screen.contains("disarm:"),
+        "{screen}"
+    );
     assert!(!Act::Pin.works(&rig.model, rig.now));
 }

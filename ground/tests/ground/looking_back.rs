@@ -69,7 +69,12 @@ fn header_and_abort_stay_live() {
     rig.run(0.2);
     let screen = rig.screen(80, 24);
     assert!(screen.lines().nth(1).unwrap().contains("LAND_ARMED") && screen.contains("PAST"), "{screen}");
-    assert!(!screen.lines().take(24).any(|line| line.contains("AERO_DESCENT -> LAND_ARMED") && line.contains("vehicle")));
+    assert!(
+        !screen
+            .lines()
+            .take(24)
+            .any(|line| line.contains("AERO_DESCENT -> LAND_ARMED") && line.contains("vehicle"))
+    );
     rig.take_commands();
     rig.abort();
     assert!(rig.take_commands().iter().any(is_abort));

@@ -10,7 +10,7 @@ use ground::key::Key;
 use ground::model::page::Page;
 use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
-use protocol::dialect::{TdBooster, TdChute, TdCheck, TdLimit, TdPhase};
+use protocol::dialect::{TdBooster, TdCheck, TdChute, TdLimit, TdPhase};
 use ratatui::buffer::Buffer;
 use ratatui::style::Modifier;
 
@@ -27,7 +27,8 @@ fn contrast_min(palette: Palette) -> f64 {
 
 fn no_go() -> Rig {
     let mut rig = on_the_pad();
-    rig.checks_failed = (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
+    rig.checks_failed =
+        (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
     rig.interlocks = protocol::dialect::TdInterlock::empty();
     rig.run(1.0);
     rig
@@ -216,7 +217,11 @@ fn large_screens_are_used() {
             let left = used(|row, half| row.chars().take(half).collect());
             let right = used(|row, half| row.chars().skip(half).collect());
             let all = f64::from(*rows_of_screen);
-            assert!(left / all > 0.5 && right / all > 0.5, "{name} {columns}: {left} and {right} of {all}\n{}", rows.join("\n"));
+            assert!(
+                left / all > 0.5 && right / all > 0.5,
+                "{name} {columns}: {left} and {right} of {all}\n{}",
+                rows.join("\n")
+            );
         }
     }
 }
@@ -231,6 +236,20 @@ fn what_must_be_seen_first_is_the_largest() {
             let large = buffer.content.iter().filter(|cell| blocks.contains(cell.symbol())).count();
             assert!(large >= least || name == "pad", "{name} {size:?}: {large} cells");
         }
+    }
+}
+
+/// After a loss of the link an old height would be the most dangerous thing to show large.
+#[test]
+fn the_headline_shows_no_old_height() {
+    let mut lost = flying(TdPhase::TD_PHASE_AERO_DESCENT);
+    assert!(lost.screen(80, 24).contains("height m"));
+    lost.speaks = false;
+    lost.run(6.0);
+    for page in ['2', '3'] {
+        lost.key(Key::Char(page));
+        let screen = lost.screen(80, 24);
+        assert!(!screen.contains("height m") && screen.contains("PREDICTED m up"), "{screen}");
     }
 }
 

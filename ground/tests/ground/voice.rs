@@ -57,8 +57,17 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
     let mut rig = rig(Amount::Normal, true);
     fly(&mut rig);
     let expected = [
-        "liftoff", "50 metres", "100 metres", "coast", "apogee", "100 metres", "50 metres", "ignition", "powered",
-        "touchdown", "landed",
+        "liftoff",
+        "50 metres",
+        "100 metres",
+        "coast",
+        "apogee",
+        "100 metres",
+        "50 metres",
+        "ignition",
+        "powered",
+        "touchdown",
+        "landed",
     ];
     assert_eq!(said(&mut rig), expected);
 }
@@ -71,7 +80,12 @@ fn more_or_less_is_called_out_as_the_crew_wants() {
     let mut all = rig(Amount::All, true);
     fly(&mut all);
     let all = said(&mut all);
-    assert!(["40 metres", "30 metres", "20 metres", "10 metres"].iter().all(|text| all.iter().any(|said| said == text)), "{all:?}");
+    assert!(
+        ["40 metres", "30 metres", "20 metres", "10 metres"]
+            .iter()
+            .all(|text| all.iter().any(|said| said == text)),
+        "{all:?}"
+    );
     let mut nothing = rig(Amount::Nothing, true);
     fly(&mut nothing);
     assert!(said(&mut nothing).is_empty());

@@ -70,14 +70,7 @@ fn draw_values(
     }
 }
 
-fn draw_pictures(
-    model: &Model,
-    with_fins: bool,
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) {
+fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [upper, sides] = area.layout(&Layout::vertical([
         if with_fins { Constraint::Length(fins::ROWS + 1) } else { Constraint::Length(0) },
         Constraint::Fill(1),

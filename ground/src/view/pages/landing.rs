@@ -13,35 +13,35 @@ use crate::model::vehicle::Sample;
 use crate::view::number::{STALE_MARK, fixed, row};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
-    actuators, controller, draw_lines, event_list, flight, foremost, headline, link_line, lost_position, side_view,
-    top_lines, touchdown,
+    actuators, controller, draw_lines, event_list, flight, foremost, headline, link_line, lost_position,
+    side_view, top_lines, touchdown,
 };
 
 /// Rows of the panels, with their title.
 const PANEL_ROWS: u16 = 9;
 /// Columns left of the side view at 80 columns.
 const LEFT_COLUMNS: u16 = 54;
+/// Rows of the events on a larger screen, with their title.
+const EVENT_ROWS: u16 = 8;
 /// Rows of the fins on a larger screen, with their title.
 const FIN_ROWS: u16 = 5;
 
 /// Draws the headline, the panels, the events and the side view.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let first = if model.vehicle.verdict.is_some() { foremost::verdict(model) } else { foremost::burn(model, now) };
+    let first =
+        if model.vehicle.verdict.is_some() { foremost::verdict(model) } else { foremost::burn(model, now) };
     let roomy = is_roomy(area);
     let area = headline::draw(&first, theme, frame, area);
     let (left, right) = if roomy {
         let [panels, below] =
             area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS + 1), Constraint::Fill(1)]));
-        let quarters = [Constraint::Fill(1); 4];
-        let [flight, landing, solver, actuators] = panels.layout(&Layout::horizontal(quarters));
+        let [flight, landing, actuators] = panels.layout(&Layout::horizontal([Constraint::Fill(1); 3]));
         draw_flight(model, theme, now, frame, flight);
         draw_touchdown(model, theme, now, frame, landing);
-        let inside = titled("Controller (NMPC)", theme, frame, solver);
-        draw_lines(frame, inside, &controller::rows(model, theme, now));
         draw_actuators(model, theme, now, frame, actuators);
-        let [events, right] =
-            below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
-        (events, right)
+        let [events, right] = below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
+        // The newest are enough: a change of page should not fill a slow line.
+        (Rect { height: events.height.min(EVENT_ROWS), ..events }, right)
     } else {
         let [left, right] =
             area.layout(&Layout::horizontal([Constraint::Length(LEFT_COLUMNS), Constraint::Fill(1)]));
@@ -78,7 +78,10 @@ fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
         draw_lines(frame, inside, &lost_position::rows(model, theme, now));
     } else {
         let inside = titled("Flight", theme, frame, area);
-        draw_lines(frame, inside, &flight::rows(model, theme, now));
+        let mut rows = controller::rows(model, theme, now);
+        rows.truncate(1);
+        rows.extend(flight::rows(model, theme, now));
+        draw_lines(frame, inside, &rows);
     }
 }
 
@@ -106,8 +109,7 @@ fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 }
 
 fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [fins, gimbal] =
-        area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
+    let [fins, gimbal] = area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
     let inside = titled("Fins command|actual", theme, frame, fins);
     draw_lines(frame, inside, &actuators::fin_rows(model, theme, now));
     let inside = titled("Gimbal", theme, frame, gimbal);

@@ -4,8 +4,8 @@ use ratatui::text::Line;
 
 use super::window;
 use crate::model::Model;
-use crate::view::{event_list, filter};
 use crate::view::theme::{TextRole, Theme};
+use crate::view::{event_list, filter};
 
 /// Enough lines for every kept event, each wrapped to a few lines.
 const EVERY_LINE: usize = 4_000;

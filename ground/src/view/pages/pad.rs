@@ -16,7 +16,8 @@ use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
-    actuators, draw_lines, event_list, flight, foremost, headline, link_line, next_event, side_view, top_lines,
+    actuators, draw_lines, event_list, flight, foremost, headline, link_line, next_event, side_view,
+    top_lines,
 };
 
 /// Columns of the checks at 80 columns.
@@ -41,15 +42,14 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             Constraint::Fill(1),
         ]));
         draw_now(model, theme, now, frame, right);
-        let [events, picture] =
-            below.layout(&Layout::horizontal([Constraint::Fill(3), Constraint::Fill(2)]));
+        let [events, picture] = below.layout(&Layout::horizontal([Constraint::Fill(3), Constraint::Fill(2)]));
         draw_rehearsal(model, theme, now, frame, picture);
         (left, middle, events)
     } else {
         let [upper, events] =
             area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
-        let [left, right] = upper
-            .layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
+        let [left, right] =
+            upper.layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
         let [go, ladder] =
             right.layout(&Layout::vertical([Constraint::Length(GO_ROWS), Constraint::Fill(1)]));
         let inside = titled("Now", theme, frame, go);
@@ -105,7 +105,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let status = model.vehicle.status.as_ref().filter(|_| !off_pad);
     let stale = status.is_some_and(|status| status.is_stale(now));
-    let lines = TdCheck::all()
+    TdCheck::all()
         .iter_names()
         .map(|(name, bit)| {
             let (word, role) = match status {
@@ -129,8 +129,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
                 Span::styled(reason, theme.style(TextRole::Caution)),
             ])
         })
-        .collect();
-    lines
+        .collect()
 }
 
 /// Whether the checks pass, in words.

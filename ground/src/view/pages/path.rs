@@ -24,12 +24,14 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let [east, south, above] = if area.height < ROWS_FOR_TWO {
         pictures.layout(&thirds())
     } else {
-        let [left, above] =
-            pictures.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+        let [left, above] = pictures.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
         let [east, south] = left.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Fill(1)]));
         [east, south, above]
     };
-    for (from, title, at) in [(Viewpoint::East, "From east, north right", east), (Viewpoint::South, "From south, east right", south)] {
+    for (from, title, at) in [
+        (Viewpoint::East, "From east, north right", east),
+        (Viewpoint::South, "From south, east right", south),
+    ] {
         let inside = titled(title, theme, frame, at);
         side_view::draw(model, (FlightPart::Whole, from), theme, now, frame, inside);
     }

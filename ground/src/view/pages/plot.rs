@@ -20,7 +20,7 @@ use crate::view::{draw_line, draw_lines, ticks};
 /// Columns of the list of quantities.
 const LIST_COLUMNS: u16 = 24;
 /// Without a flight this much of the past is shown; in flight all of it, and this much before.
-const CALM_SPAN: Duration = Duration::from_secs(120);
+const CALM_SPAN: Duration = Duration::from_mins(2);
 const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
 
 /// Draws the list of quantities and the plot of the chosen one.
@@ -41,7 +41,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let chosen = model.pages.plotted;
     std::iter::once(chosen)
         .chain(ALL.iter().filter(|quantity| *quantity != chosen))
-        .map(|quantity| row(theme, quantity.name, quantity.read(model, now), quantity.decimals, quantity.unit, now))
+        .map(|quantity| {
+            row(theme, quantity.name, quantity.read(model, now), quantity.decimals, quantity.unit, now)
+        })
         .collect()
 }
 
@@ -49,10 +51,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 fn names(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
     let chosen = model.pages.plotted;
     let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
-    let line = |quantity: &Quantity| {
+    let line = |quantity: &'static Quantity| {
         let is_chosen = quantity == chosen;
         let (mark, role) = if is_chosen { (">", TextRole::Key) } else { (" ", TextRole::Label) };
-        let pin = if model.pages.pinned.iter().any(|pinned| *pinned == quantity) { "*" } else { " " };
+        let pin = if model.pages.pinned.contains(&quantity) { "*" } else { " " };
         Line::styled(format!("{mark}{pin}{}", quantity.name), theme.style(role))
     };
     ALL.iter().skip(start).take(rows).map(line).collect()
@@ -63,8 +65,14 @@ fn present(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> L
     let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
     let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
     Line::from(vec![
-        Span::styled(format!("{mark}{value} {}", quantity.unit), theme.style(role).patch(theme.style(TextRole::Title))),
-        Span::styled(format!("   {} pins it to every page", model.settings.keys.name(Act::Pin)), theme.style(TextRole::Label)),
+        Span::styled(
+            format!("{mark}{value} {}", quantity.unit),
+            theme.style(role).patch(theme.style(TextRole::Title)),
+        ),
+        Span::styled(
+            format!("   {} pins it to every page", model.settings.keys.name(Act::Pin)),
+            theme.style(TextRole::Label),
+        ),
     ])
 }
 
@@ -90,7 +98,8 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     let axis = |(least, most): (f64, f64), parts: usize| {
         let span = (most - least).max(1e-6);
         let step = ticks::step(span, parts);
-        let (low, high) = (libm::floor(least / step) * step, (libm::ceil(most / step) * step).max(low_end(least, step)));
+        let (low, high) =
+            (libm::floor(least / step) * step, (libm::ceil(most / step) * step).max(low_end(least, step)));
         let labels: Vec<String> = ticks::multiples(low - step / 2.0, high + step / 2.0, step)
             .map(|tick| fixed(tick, ticks::decimals(step)))
             .collect();

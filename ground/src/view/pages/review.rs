@@ -127,5 +127,8 @@ fn timeline(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     if entries.is_empty() {
         return vec![Line::styled("  nothing heard", theme.style(TextRole::Label))];
     }
-    entries.chunks((columns / TIMELINE_COLUMNS).max(1)).map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain))).collect()
+    entries
+        .chunks((columns / TIMELINE_COLUMNS).max(1))
+        .map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain)))
+        .collect()
 }

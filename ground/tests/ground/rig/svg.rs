@@ -92,7 +92,8 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
     for (row, cells) in buffer.content.chunks(usize::from(buffer.area.width)).enumerate() {
         let y = row as u16 * CELL.1;
         let mut at = 0;
-        for run in cells.chunk_by(|one, next| colours(one) == colours(next) && one.modifier == next.modifier) {
+        for run in cells.chunk_by(|one, next| colours(one) == colours(next) && one.modifier == next.modifier)
+        {
             let (fore, back) = colours(&run[0]);
             let (x, columns) = (at * CELL.0, run.len() as u16 * CELL.0);
             if back != page {
@@ -113,7 +114,8 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
                         text.push(' ');
                         for (dx, dy, w, h) in parts {
                             let (w, h) = (w * f32::from(CELL.0), h * f32::from(CELL.1));
-                            let (dx, dy) = (left + dx * f32::from(CELL.0), f32::from(y) + dy * f32::from(CELL.1));
+                            let (dx, dy) =
+                                (left + dx * f32::from(CELL.0), f32::from(y) + dy * f32::from(CELL.1));
                             let _ = write!(path, "M{dx} {dy}h{w}v{h}h-{w}z");
                         }
                     }
@@ -129,7 +131,11 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
                 let bold =
                     if run[0].modifier.contains(Modifier::BOLD) { " font-weight=\"bold\"" } else { "" };
                 // Several spaces would become one.
-                let escaped = trimmed.replace(' ', "\u{a0}").replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+                let escaped = trimmed
+                    .replace(' ', "\u{a0}")
+                    .replace('&', "&amp;")
+                    .replace('<', "&lt;")
+                    .replace('>', "&gt;");
                 let _ = writeln!(
                     texts,
                     "<text x=\"{x}\" y=\"{}\" textLength=\"{length}\" fill=\"{}\"{bold}>{escaped}</text>",
