@@ -87,8 +87,9 @@ pub struct Cli {
     #[arg(long, conflicts_with = "connect", global = true)]
     pub demo: bool,
 
-    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
+    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
+    /// touchdown-*.mcap in the current directory.
+    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
     pub replay: Option<PathBuf>,
 
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
