@@ -28,7 +28,8 @@ const LAST: &str = "last";
 /// The newest log that has the usual name, which begins with its date.
 fn newest_log(folder: &Path) -> anyhow::Result<PathBuf> {
     let entries = std::fs::read_dir(folder).context("looking for the last log")?;
-    let is_log = |name: &str| name.starts_with("touchdown-") && name.ends_with(".mcap");
+    let is_mcap = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "mcap");
+    let is_log = |name: &str| name.starts_with("touchdown-") && is_mcap(name);
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let newest = names.filter(|name| is_log(name)).max();
     newest

@@ -21,8 +21,9 @@ use crate::view::{
 const PANEL_ROWS: u16 = 9;
 /// Columns left of the side view at 80 columns.
 const LEFT_COLUMNS: u16 = 54;
-/// Rows of the events on a larger screen, with their title.
+/// Rows of the events on a larger screen, with their title, if fewer than the second number are left.
 const EVENT_ROWS: u16 = 8;
+const TALL_ROWS: u16 = 24;
 /// Rows of the fins on a larger screen, with their title.
 const FIN_ROWS: u16 = 5;
 
@@ -40,8 +41,9 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         draw_touchdown(model, theme, now, frame, landing);
         draw_actuators(model, theme, now, frame, actuators);
         let [events, right] = below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
-        // The newest are enough: a change of page should not fill a slow line.
-        (Rect { height: events.height.min(EVENT_ROWS), ..events }, right)
+        // On a middling screen the newest are enough: a change of page should not fill a slow line.
+        let rows = if events.height < TALL_ROWS { EVENT_ROWS } else { events.height };
+        (Rect { height: events.height.min(rows), ..events }, right)
     } else {
         let [left, right] =
             area.layout(&Layout::horizontal([Constraint::Length(LEFT_COLUMNS), Constraint::Fill(1)]));
