@@ -72,6 +72,10 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
             return;
         }
     }
+    let is_free = model.pages.entry.is_none() && model.dialog == Dialog::Closed;
+    if key == Key::CtrlL && !is_free {
+        model.outbox.push(Action::Redraw);
+    }
     if model.pages.entry.is_some() && model.dialog == Dialog::Closed {
         return entry::on_key(model, key, now);
     }

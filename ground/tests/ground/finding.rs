@@ -6,7 +6,7 @@ use ground::model::dialog::Dialog;
 use ground::model::page::Page;
 use ground::model::palette::{self, Does};
 use ground::model::quantity;
-use ground::update::Action;
+use ground::update::{Action, Msg};
 use proptest::prelude::*;
 
 use crate::rig::{Rig, is_abort, is_arm, settings, typed};
@@ -206,4 +206,18 @@ fn help_shows_only_the_keys_that_work_now() {
         "{screen}"
     );
     assert!(!Act::Pin.works(&rig.model, rig.now));
+}
+
+/// Pasted text opens nothing, and closes what was open.
+#[test]
+fn a_paste_does_not_reach_the_palette() {
+    let mut rig = on_the_pad();
+    let pasted = [typed(":type ARM"), vec![Key::Enter], typed("ARM"), vec![Key::Enter]].concat();
+    rig.msg(Msg::Keys(pasted));
+    assert_eq!((rig.model.pages.entry.clone(), rig.model.dialog.clone()), (None, Dialog::Closed));
+    rig.run(1.0);
+    rig.key(Key::Char(':'));
+    rig.msg(Msg::Pasted);
+    assert_eq!(rig.model.pages.entry, None);
+    assert!(rig.take_commands().is_empty());
 }
