@@ -6,7 +6,7 @@ use divan::Bencher;
 use ground::key::Key;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
-use ground::view::theme::Theme;
+use ground::view::theme::{Palette, Theme};
 use ground::view::view;
 use protocol::dialect::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage};
 use protocol::frame::Encoder;
@@ -52,7 +52,7 @@ fn frame(bencher: Bencher, page: char, columns: u16, rows: u16) {
     let mut model = flying();
     drop(update(&mut model, Msg::Key(Key::Char(page)), NOW));
     let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("memory");
-    let theme = Theme { colour: true, ascii: false };
+    let theme = Theme { palette: Palette::Dark, ascii: false };
     bencher.bench_local(|| {
         terminal.draw(|frame| view(&model, theme, NOW, frame)).map(|drawn| drawn.count).expect("memory")
     });

@@ -22,6 +22,8 @@ use crate::attach::socket;
 use crate::config::Config;
 use crate::exit::{self, Exit};
 use crate::model::action::{Action, Request};
+use crate::model::bindings::Bindings;
+use crate::model::callouts::Talk;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
@@ -40,6 +42,8 @@ const WAITING_MAX: usize = 4_096;
 pub struct Viewer {
     pub watch: bool,
     pub operator: String,
+    pub keys: Bindings,
+    pub talk: Talk,
 }
 
 /// Shows the station until the person at the screen quits; the station keeps running. Without a terminal it prints
@@ -116,7 +120,7 @@ pub async fn session(
                     link = found;
                     // Another station has another clock and another history.
                     times = Times::default();
-                    let pages = model.pages;
+                    let pages = std::mem::take(&mut model.pages);
                     model = Model::new(settings(&Hello::default(), viewer));
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
@@ -160,7 +164,13 @@ async fn act(
                 link.ask(&ToStation::Key(action.detail)).await;
             }
             Action::Redraw => output.clear(),
+            Action::NextTheme => output.next_theme(),
             Action::Bell => output.bell(),
+            Action::Say(text) => {
+                if let Some(ended) = output.say(&text) {
+                    model.warn(now, ended.to_string());
+                }
+            }
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
             Action::Send(_)
@@ -233,8 +243,8 @@ fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -
         }
         ToScreen::Msg(msg) => {
             let actions = update(model, msg, at);
-            // The station does the actions; a screen only rings the bell.
-            actions.into_iter().filter(|action| *action == Action::Bell).collect()
+            // The station does the actions; a screen only rings the bell and talks.
+            actions.into_iter().filter(|action| matches!(action, Action::Bell | Action::Say(_))).collect()
         }
         ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
     }
@@ -252,6 +262,8 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         seat: Seat::new(hello.screen, viewer.operator.clone()),
         demonstration: hello.demonstration,
         auto: hello.auto,
+        keys: viewer.keys.clone(),
+        talk: viewer.talk,
         ..Settings::on_screen(&hello.link_name)
     }
 }

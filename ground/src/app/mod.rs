@@ -16,6 +16,7 @@ pub mod signals;
 mod station;
 pub mod stations;
 mod terminal_writer;
+pub mod voice;
 pub mod wire;
 
 use std::io::IsTerminal as _;
@@ -70,7 +71,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
             (Some(Command::Status), _) => stations::list().await,
             (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
             (Some(Command::Attach { watch }), _) => {
-                let viewer = Viewer { watch: *watch, operator };
+                let viewer =
+                    Viewer { watch: *watch, operator, keys: config.keys.clone(), talk: config.talk() };
                 attached::session(socket, &viewer, config, interactive).await
             }
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
@@ -166,6 +168,8 @@ async fn start(
         auto,
         // A daemon also keeps running after a flight.
         interactive: interactive || is_daemon,
+        keys: config.keys.clone(),
+        talk: config.talk(),
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });

@@ -6,6 +6,7 @@ use anyhow::Context as _;
 
 use super::lines::Lines;
 use super::screen::Screen;
+use super::voice::VoiceEnded;
 use crate::config::Config;
 use crate::model::Model;
 use crate::update::Msg;
@@ -64,6 +65,20 @@ impl Output {
     pub(super) fn bell(&mut self) {
         if let Self::Screen(screen) = self {
             screen.bell();
+        }
+    }
+
+    /// Calls a text out. Returns why nothing can be called out any more, once.
+    pub(super) fn say(&mut self, text: &str) -> Option<VoiceEnded> {
+        match self {
+            Self::Screen(screen) => screen.say(text),
+            Self::Lines(_) => None,
+        }
+    }
+
+    pub(super) fn next_theme(&mut self) {
+        if let Self::Screen(screen) = self {
+            screen.next_theme();
         }
     }
 

@@ -1,7 +1,7 @@
 //! The run loop of a replay: a screen and a recording, without a link or a log.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -17,10 +17,25 @@ use crate::exit::{self, Exit};
 use crate::model::{Role, Settings, words};
 use crate::replay::player::Player;
 use crate::replay::recording::{Progress, Recording};
-use crate::update::Msg;
+use crate::update::{Action, Msg};
 
 /// How often the time moves on.
 const STEP: Duration = Duration::from_millis(100);
+
+/// Stands for the newest log in the current directory.
+const LAST: &str = "last";
+
+/// The newest log that has the usual name, which begins with its date.
+fn newest_log(folder: &Path) -> anyhow::Result<PathBuf> {
+    let entries = std::fs::read_dir(folder).context("looking for the last log")?;
+    let is_mcap = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "mcap");
+    let is_log = |name: &str| name.starts_with("touchdown-") && is_mcap(name);
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let newest = names.filter(|name| is_log(name)).max();
+    newest
+        .map(|name| folder.join(name))
+        .context("the current directory has no touchdown-*.mcap; give --replay a file")
+}
 
 /// Shows a recorded flight until the person at the screen quits; without a screen, prints its events at once.
 ///
@@ -28,12 +43,18 @@ const STEP: Duration = Duration::from_millis(100);
 /// The log cannot be read, the terminal failed, or the recording has no such phase.
 pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
     let mut told = 0;
+    let newest = (path == Path::new(LAST)).then(|| newest_log(Path::new("."))).transpose()?;
+    let path = newest.as_deref().unwrap_or(path);
     let vehicle = cli.vehicle_sysid.map(|_| cli.vehicle());
     let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
     let damage = recording.damage.clone();
     let name = path.display().to_string();
-    let settings =
-        Settings { log_path: Some(name.clone()), role: Role::Replaying, ..Settings::on_screen(name) };
+    let settings = Settings {
+        log_path: Some(name.clone()),
+        role: Role::Replaying,
+        keys: config.keys.clone(),
+        ..Settings::on_screen(name)
+    };
     let mut player = Player::new(recording, settings);
     match cli.from {
         None => {}
@@ -94,8 +115,18 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             biased;
             _ = signals.next() => return Ok(()),
             msg = screen.input() => match msg {
-                Msg::Key(crate::key::Key::CtrlL) => screen.clear(),
-                Msg::Key(key) if player.on_key(key) => return Ok(()),
+                Msg::Key(key) => {
+                    for action in player.on_key(key) {
+                        match action {
+                            Action::Redraw => screen.clear(),
+                            Action::NextTheme => screen.next_theme(),
+                            Action::Quit => return Ok(()),
+                            // What the ground did is part of the recording.
+                            _ => {}
+                        }
+                    }
+                    screen.mark_changed();
+                }
                 // Held or pasted keys count only if they scroll or move the time.
                 Msg::Keys(keys) => {
                     for key in keys.into_iter().filter(|key| key.scrolls()) {
@@ -118,5 +149,23 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
             () = clock.sleep_until(Some(redraw_at)) => {}
         }
         screen.show(&player.model, clock.now(), player.position()).context("drawing on the terminal")?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_log_is_found_by_its_date() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(newest_log(folder.path()).unwrap_err().to_string().contains("give --replay a file"));
+        for name in
+            ["touchdown-20261120-064030.mcap", "touchdown-20261121-010203.mcap", "other.mcap", "x.tlog"]
+        {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = newest_log(folder.path()).unwrap();
+        assert_eq!(found.file_name().unwrap(), "touchdown-20261121-010203.mcap");
     }
 }

@@ -26,7 +26,8 @@ use rustix::termios::QueueSelector;
 
 use super::pace::Pace;
 use super::terminal_writer::{self, FrameBuffer, TerminalWriter};
-use crate::cli::{Characters, Colour};
+use super::voice::{Voice, VoiceEnded};
+use crate::cli::{Characters, ThemeChoice};
 use crate::config::Config;
 use crate::key::Key;
 use crate::model::Model;
@@ -59,6 +60,7 @@ pub struct Screen {
     events: EventStream,
     theme: Theme,
     bell: bool,
+    voice: Option<Voice>,
     pace: Pace,
     /// Whether the next frame is written completely.
     whole: bool,
@@ -73,6 +75,9 @@ impl Screen {
     /// # Errors
     /// Standard output is no terminal, or it cannot be prepared.
     pub fn open(config: &Config) -> anyhow::Result<Self> {
+        let voice = config.voice.as_deref().map(Voice::start).transpose();
+        let voice =
+            voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
         let (terminal, writer) =
             take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
@@ -82,6 +87,7 @@ impl Screen {
             events: EventStream::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
+            voice,
             pace: Pace::default(),
             whole: false,
             waiting: None,
@@ -133,6 +139,19 @@ impl Screen {
     /// Forgets what the terminal shows, so that the next frame is written completely.
     pub fn clear(&mut self) {
         self.whole = true;
+        self.mark_changed();
+    }
+
+    /// Calls a text out. Returns why nothing can be called out any more, once.
+    pub fn say(&mut self, text: &str) -> Option<VoiceEnded> {
+        let ended = self.voice.as_ref()?.say(text).err();
+        self.voice = self.voice.take().filter(|_| ended.is_none());
+        ended
+    }
+
+    /// Changes to the next theme.
+    pub fn next_theme(&mut self) {
+        self.theme.palette = self.theme.palette.next();
         self.mark_changed();
     }
 
@@ -198,17 +217,16 @@ impl Drop for Screen {
 /// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
-    let colour = match config.colour {
-        Colour::Auto => found.colour,
-        Colour::Always => true,
-        Colour::Never => false,
+    let palette = match config.theme {
+        ThemeChoice::Auto => found.palette,
+        ThemeChoice::Palette(palette) => palette,
     };
     let ascii = match config.characters {
         Characters::Auto => found.ascii,
         Characters::Unicode => false,
         Characters::Ascii => true,
     };
-    Theme { colour, ascii }
+    Theme { palette, ascii }
 }
 
 fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<FrameBuffer>>, TerminalWriter)> {

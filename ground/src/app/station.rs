@@ -256,7 +256,13 @@ impl Station {
                     }
                 }
                 Action::Redraw => self.output.clear(),
+                Action::NextTheme => self.output.next_theme(),
                 Action::Bell => self.output.bell(),
+                Action::Say(text) => {
+                    if let Some(ended) = self.output.say(&text) {
+                        model.warn(now, ended.to_string());
+                    }
+                }
                 Action::Alarm(words) => self.tell_alarm(&words),
                 // Only attached screens send requests.
                 Action::Request(_) => {}

@@ -12,7 +12,8 @@ use protocol::transport::LinkAddress;
 
 use crate::demo::Speed;
 use crate::exit;
-pub use values::{Characters, Colour, LogChoice, ReplayFrom, Seconds};
+use crate::model::bindings::Bindings;
+pub use values::{Characters, LogChoice, ReplayFrom, Seconds, TalkAmount, ThemeChoice};
 
 /// The profile that the demonstration flies by default.
 const DEMO_PROFILE: &str = "mk2";
@@ -86,8 +87,9 @@ pub struct Cli {
     #[arg(long, conflicts_with = "connect", global = true)]
     pub demo: bool,
 
-    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
+    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
+    /// touchdown-*.mcap in the current directory.
+    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
     pub replay: Option<PathBuf>,
 
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
@@ -114,9 +116,26 @@ pub struct Cli {
     #[arg(long, value_name = "WHICH", global = true)]
     pub characters: Option<Characters>,
 
-    /// Whether to use colours. Default: auto, by NO_COLOR and TERM.
-    #[arg(long, value_name = "WHEN", visible_alias = "color", global = true)]
-    pub colour: Option<Colour>,
+    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
+    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub theme: Option<ThemeChoice>,
+
+    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub voice: Option<String>,
+
+    /// How much is called out. Default: normal.
+    #[arg(long, value_name = "HOW_MUCH", global = true)]
+    pub talk: Option<TalkAmount>,
+
+    /// The least time between two heights that are called out. Default: 1.5.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, global = true)]
+    pub talk_every_s: Option<Seconds>,
+
+    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
+    #[arg(long, value_name = "ACTION=KEY,...", global = true)]
+    pub keys: Option<Bindings>,
 
     /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
     #[arg(long, global = true)]

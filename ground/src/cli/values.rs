@@ -9,6 +9,7 @@ use protocol::dialect::TdPhase;
 use serde::Deserialize;
 
 use crate::model::words;
+use crate::view::theme::Palette;
 
 /// Where the log goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,8 +57,24 @@ impl FromStr for ReplayFrom {
     }
 }
 
-/// A time limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How much is called out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum TalkAmount {
+    /// Neither voice nor bells, except those of alarms
+    Nothing,
+    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO and a lost link
+    Few,
+    /// Also phases and every 50 m
+    #[default]
+    Normal,
+    /// Also every 10 m below 50 m
+    All,
+}
+
+/// A time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "f64")]
 pub struct Seconds(pub Duration);
 
 impl FromStr for Seconds {
@@ -65,10 +82,23 @@ impl FromStr for Seconds {
 
     fn from_str(given: &str) -> Result<Self, String> {
         match given.parse::<f64>() {
-            Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(Self(Duration::from_secs_f64(seconds))),
-            _ => Err(format!("`{given}` is not a number of seconds from 0.1 to 86400")),
+            Ok(seconds) => Self::try_from(seconds),
+            Err(_) => Err(wrong_seconds(given)),
         }
     }
+}
+
+impl TryFrom<f64> for Seconds {
+    type Error = String;
+
+    fn try_from(seconds: f64) -> Result<Self, String> {
+        let accepted = (0.1..=86_400.0).contains(&seconds);
+        if accepted { Ok(Self(Duration::from_secs_f64(seconds))) } else { Err(wrong_seconds(seconds)) }
+    }
+}
+
+fn wrong_seconds(given: impl std::fmt::Display) -> String {
+    format!("`{given}` is not a number of seconds from 0.1 to 86400")
 }
 
 /// What the terminal can show.
@@ -84,15 +114,35 @@ pub enum Characters {
     Ascii,
 }
 
-/// Whether colours may be used.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Colour {
-    /// Decide by the environment
+/// Which colours to use.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub enum ThemeChoice {
+    /// Decide by the environment.
     #[default]
     Auto,
-    /// Always use colours
-    Always,
-    /// Never use colours
-    Never,
+    Palette(Palette),
+}
+
+impl FromStr for ThemeChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if given == "auto" {
+            return Ok(Self::Auto);
+        }
+        let found = Palette::ALL.into_iter().find(|palette| palette.name() == given);
+        found.map(Self::Palette).ok_or_else(|| {
+            let names = Palette::ALL.map(Palette::name).join(", ");
+            format!("`{given}` is no theme; give auto, {names}")
+        })
+    }
+}
+
+impl TryFrom<String> for ThemeChoice {
+    type Error = String;
+
+    fn try_from(given: String) -> Result<Self, String> {
+        given.parse()
+    }
 }

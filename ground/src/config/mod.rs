@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
-use crate::cli::{Characters, Cli, Colour, Command, LogChoice};
+use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, TalkAmount, ThemeChoice};
+use crate::model::bindings::Bindings;
+use crate::model::callouts::{Amount, Talk};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
@@ -39,8 +41,22 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
 #characters = "auto"
 
-# Use colours: "always", "never", or "auto": by NO_COLOR and TERM.
-#colour = "auto"
+# Colours: "dark", "light" (black on white, for sunlight), "16" (the terminal's own), "none", "contrast" (high
+# contrast), or "auto": by NO_COLOR, TERM, COLORTERM and COLORFGBG. The key c changes them too.
+#theme = "auto"
+
+# Calls out the flight: a command that speaks each line of its standard input. Its words are split at spaces, without
+# a shell. Linux: "espeak-ng -s 170" (words per minute; -a is the loudness) or "spd-say -e". macOS: "xargs -I{} say {}".
+# Or "none", the default: then bells ring, one to three of them.
+#voice = "espeak-ng -s 170"
+
+# How much is called out: "nothing", "few", "normal" or "all", and the least time between two heights, s.
+#talk = "normal"
+#talk_every_s = 1.5
+
+# Other keys for actions; the key : lists every action. The keys of the abort, Enter and Esc cannot be chosen.
+# Actions that open a ladder (arm, start, disarm) need a capital letter.
+#keys = { theme = "c", path = "p" }
 "#;
 
 /// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
@@ -61,7 +77,13 @@ pub struct Config {
     #[serde(default)]
     pub characters: Characters,
     #[serde(default)]
-    pub colour: Colour,
+    pub theme: ThemeChoice,
+    #[serde(default)]
+    pub keys: Bindings,
+    pub voice: Option<String>,
+    #[serde(default)]
+    pub talk: TalkAmount,
+    pub talk_every_s: Option<Seconds>,
 }
 
 /// Why a settings file cannot be used.
@@ -116,6 +138,9 @@ impl Config {
         if config.alarm_command.as_ref().is_some_and(|command| command.trim().is_empty()) {
             return Err("alarm_command is empty; give a command or \"none\"".to_owned());
         }
+        if config.voice.as_ref().is_some_and(|command| command.trim().is_empty()) {
+            return Err("voice is empty; give a command or \"none\"".to_owned());
+        }
         Ok(config)
     }
 
@@ -148,6 +173,19 @@ impl Config {
         }
     }
 
+    /// What is called out.
+    pub fn talk(&self) -> Talk {
+        let amount = match self.talk {
+            TalkAmount::Nothing => Amount::Nothing,
+            TalkAmount::Few => Amount::Few,
+            TalkAmount::Normal => Amount::Normal,
+            TalkAmount::All => Amount::All,
+        };
+        let usual = Talk::default();
+        let height_every = self.talk_every_s.map_or(usual.height_every, |Seconds(every)| every);
+        Talk { amount, height_every, has_voice: self.voice.is_some() }
+    }
+
     /// The flags about the screen and its alarms override the file.
     #[must_use]
     pub fn overridden_by(self, cli: &Cli) -> Self {
@@ -156,7 +194,11 @@ impl Config {
             bell: cli.bell.or(self.bell),
             alarm_command: alarm_command.filter(|command| command != "none"),
             characters: cli.characters.unwrap_or(self.characters),
-            colour: cli.colour.unwrap_or(self.colour),
+            theme: cli.theme.unwrap_or(self.theme),
+            keys: cli.keys.clone().unwrap_or(self.keys),
+            voice: cli.voice.clone().or(self.voice).filter(|command| command != "none"),
+            talk: cli.talk.unwrap_or(self.talk),
+            talk_every_s: cli.talk_every_s.or(self.talk_every_s),
             ..self
         }
     }

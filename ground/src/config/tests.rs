@@ -1,6 +1,9 @@
 //! Tests of the settings file, its example and the flags.
 
 use super::*;
+use crate::model::act::Act;
+use crate::model::callouts::Amount;
+use crate::view::theme::Palette;
 use clap::{CommandFactory as _, Parser as _};
 
 /// Every key of the example is valid without its comment mark, and the example names every key.
@@ -14,7 +17,7 @@ fn the_example_contains_every_key() {
         !config.connect.is_empty() && config.key.is_some() && config.log.is_some() && config.tlog.is_some()
     );
     assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-    assert_eq!(uncommented.lines().count(), 11, "one line a key: {uncommented}");
+    assert_eq!(uncommented.lines().count(), 15, "one line a key: {uncommented}");
     assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
 }
 
@@ -23,17 +26,21 @@ fn an_error_names_the_wrong_key() {
     let wrong = |text: &str| Config::parse(text).unwrap_err();
     assert!(wrong("belll = true").contains("belll"));
     assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
-    assert!(wrong("colour = \"blue\"").contains("always"));
+    assert!(wrong("theme = \"blue\"").contains("light"));
     assert!(wrong("sysid = 0").contains("sysid: 0 addresses every system"));
     assert!(wrong("vehicle_sysid = 256").contains("vehicle_sysid"));
     assert!(wrong("log = \"\"").contains("log: "));
+    assert!(wrong("voice = \"\"").contains("voice is empty"));
+    assert!(wrong("talk = \"loud\"").contains("few"));
+    assert!(wrong("talk_every_s = 0.0").contains("from 0.1 to 86400"));
+    assert!(wrong("keys = { arm = \"a\" }").contains("capital letter"));
     assert!(wrong("alarm_command = \" \"").contains("empty"));
 }
 
 /// A key, its value in a file, its flags, and a check that the value of the flag is used.
 type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
 
-const OVERRIDES: [Override; 11] = [
+const OVERRIDES: [Override; 15] = [
     ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
         cli.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
     }),
@@ -50,7 +57,15 @@ const OVERRIDES: [Override; 11] = [
     ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
         config.characters == Characters::Ascii
     }),
-    ("colour", "\"always\"", &["--colour", "never"], |_, config| config.colour == Colour::Never),
+    ("theme", "\"dark\"", &["--theme", "light"], |_, config| {
+        config.theme == ThemeChoice::Palette(Palette::Light)
+    }),
+    ("voice", "\"a\"", &["--voice", "b"], |_, config| config.voice.as_deref() == Some("b")),
+    ("talk", "\"few\"", &["--talk", "all"], |_, config| config.talk().amount == Amount::All),
+    ("talk_every_s", "3", &["--talk-every-s", "4"], |_, config| config.talk().height_every.as_secs() == 4),
+    ("keys", "{ theme = \"w\" }", &["--keys", "theme=z"], |_, config| {
+        config.keys.name(Act::NextTheme) == "z"
+    }),
 ];
 
 /// Combines settings and command line as a run does.

@@ -29,6 +29,8 @@ pub enum Action {
     SyncLog,
     /// Redraw the whole screen.
     Redraw,
+    /// Change the screen's colours to the next theme.
+    NextTheme,
     /// Ask the station, from a screen in another process.
     Request(Request),
     /// Tell the other screens that the crew has asked for this on the station's own screen.
@@ -36,6 +38,8 @@ pub enum Action {
     /// Give the terminal back and continue without a screen.
     LeaveScreen,
     Bell,
+    /// Call this out with the crew's voice.
+    Say(String),
     /// An alarm was raised: run the alarm command with its text.
     Alarm(String),
     Quit,

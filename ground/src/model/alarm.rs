@@ -101,6 +101,11 @@ pub struct Alarms {
 }
 
 impl Alarms {
+    /// Whether what arrives is still the past.
+    pub(crate) fn are_in_history(&self) -> bool {
+        self.in_history
+    }
+
     /// For a screen that first receives the history: nothing rings until the history has been received.
     pub(crate) fn in_history() -> Self {
         Self { in_history: true, ..Self::default() }

@@ -52,7 +52,7 @@ impl Event {
 }
 
 /// The latest events.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Events {
     kept: VecDeque<Event>,
     total: u64,
@@ -69,6 +69,12 @@ impl Events {
         }
         self.kept.push_back(Event { at, speaker, level, text });
         self.total += 1;
+    }
+
+    /// The events up to a time.
+    pub(crate) fn until(&self, at: Duration) -> Self {
+        let kept = self.kept.iter().filter(|event| event.at <= at).cloned().collect();
+        Self { kept, total: self.total }
     }
 
     /// How many events there were since the start, including dropped ones.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
+use super::trace::Trace;
 use super::vehicle::Vehicle;
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
@@ -36,6 +37,7 @@ pub struct History {
     /// Each phase and when it was first received, since the start of the run.
     pub timeline: Vec<(TdPhase, Duration)>,
     pub maxima: Maxima,
+    pub trace: Trace,
 }
 
 impl History {

@@ -4,10 +4,13 @@
 //! nor `view`.
 
 pub mod abort_too_late;
+pub mod act;
 pub mod action;
 pub mod alarm;
 mod auto_step;
+pub mod bindings;
 pub mod boot;
+pub mod callouts;
 pub mod chord;
 pub mod command;
 pub mod crew;
@@ -24,17 +27,24 @@ pub mod link_state;
 pub mod motion;
 pub mod motor;
 pub mod page;
+pub mod palette;
 pub mod parameters;
+pub mod permits;
+pub mod quantity;
+pub mod recall;
 pub mod seat;
 pub mod telemetry;
 pub mod touchdown;
+pub mod trace;
 pub mod trend;
 pub mod uplink;
 pub mod vehicle;
 pub mod words;
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::OperatorAction;
@@ -43,6 +53,8 @@ use protocol::text::Reassembler;
 use action::Action;
 use alarm::{Alarm, Alarms};
 pub(crate) use auto_step::AutoStep;
+use bindings::Bindings;
+use callouts::{Called, Talk};
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
@@ -54,6 +66,7 @@ use key_timing::KeyTiming;
 use link::Link;
 use page::{Page, Pages};
 use parameters::Parameters;
+use recall::{LookBack, Recall};
 use seat::Seat;
 use vehicle::Vehicle;
 
@@ -83,6 +96,10 @@ pub struct Settings {
     pub auto: bool,
     /// Whether a person watches a screen; then the end of the flight does not end the program.
     pub interactive: bool,
+    /// Which key does what.
+    pub keys: Bindings,
+    /// What is called out, and how.
+    pub talk: Talk,
     /// Without a screen: give up if the flight has not ended after this time.
     pub time_limit: Option<Duration>,
 }
@@ -103,6 +120,8 @@ impl Settings {
             demonstration: false,
             auto: false,
             interactive: true,
+            keys: Bindings::default(),
+            talk: Talk::default(),
             time_limit: None,
         }
     }
@@ -134,7 +153,7 @@ impl Role {
 }
 
 /// The position and speed of a replay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Playback {
     /// Time since the first frame.
     pub position: Duration,
@@ -143,6 +162,8 @@ pub struct Playback {
     /// Recorded time per real time.
     pub speed: f64,
     pub paused: bool,
+    /// Each phase of the recording and when it began.
+    pub phases: Arc<[(TdPhase, Duration)]>,
 }
 
 /// The state of the log writer.
@@ -184,6 +205,11 @@ pub struct Model {
     pub pages: Pages,
     pub history: History,
     pub parameters: Parameters,
+    pub recall: Recall,
+    /// The moment of the past that the crew looks at; `None` while the screen is live.
+    pub look_back: Option<LookBack>,
+    /// What has been called out.
+    pub called: Called,
     /// `None` for a live flight.
     pub playing: Option<Playback>,
     pub(crate) rebooted_at: Option<Duration>,
@@ -219,6 +245,9 @@ impl Model {
             pages: Pages::default(),
             history: History::default(),
             parameters: Parameters::default(),
+            recall: Recall::default(),
+            look_back: None,
+            called: Called::default(),
             playing: None,
             rebooted_at: None,
             texts: Reassembler::new(),
@@ -249,6 +278,24 @@ impl Model {
     /// The page to show.
     pub fn page(&self) -> Page {
         self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
+    }
+
+    /// The model as the pages show it while the crew looks back, and its time; `None` while the screen is live. It has
+    /// the vehicle and the events of the past, and no link; the page is the present one.
+    pub fn past(&self) -> Option<(Self, Duration)> {
+        let (at, vehicle) = self.recall.at(self.look_back?.at, &self.vehicle)?;
+        let mut past = Self {
+            vehicle,
+            events: self.events.until(at),
+            history: self.history.clone(),
+            parameters: self.parameters.clone(),
+            pages: self.pages.clone(),
+            look_back: self.look_back,
+            log: self.log,
+            ..Self::new(self.settings.clone())
+        };
+        past.pages.held = Some(self.page());
+        Some((past, at))
     }
 
     /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the foremost.

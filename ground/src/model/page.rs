@@ -3,6 +3,7 @@
 use protocol::dialect::TdPhase;
 
 use super::alarm::AlarmKind;
+use super::quantity::{self, Quantity};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {
@@ -25,12 +26,18 @@ pub enum Page {
     Log,
     /// Every alarm, to be acknowledged one by one.
     Alarms,
+    /// The flight from two sides and from above.
+    Path,
+    /// Every value, with the solver's residuals.
+    Values,
+    /// One quantity over time.
+    Plot,
     Help,
 }
 
 impl Page {
-    /// The pages with a digit, in that order; help has `?`.
-    pub const ALL: [Self; 9] = [
+    /// The pages with a digit, in that order.
+    pub const NUMBERED: [Self; 9] = [
         Self::Pad,
         Self::Descent,
         Self::Landing,
@@ -41,18 +48,23 @@ impl Page {
         Self::Log,
         Self::Alarms,
     ];
+    /// The pages with a letter or a mark.
+    pub const LETTERED: [Self; 4] = [Self::Path, Self::Values, Self::Plot, Self::Help];
 
-    /// The key that shows the page.
-    pub fn key(self) -> char {
-        let of = if self == Self::Ascent { Self::Descent } else { self };
-        let digit = Self::ALL.iter().position(|page| *page == of).map(|place| place as u32 + 1);
-        digit.and_then(|digit| char::from_digit(digit, 10)).unwrap_or('?')
+    /// The page whose key shows this one: ascent and descent share one.
+    #[must_use]
+    pub fn keyed(self) -> Self {
+        if self == Self::Ascent { Self::Descent } else { self }
     }
 
-    /// The page of a digit.
-    pub fn from_digit(digit: char) -> Option<Self> {
-        let number = usize::try_from(digit.to_digit(10)?).ok()?;
-        Self::ALL.get(number.checked_sub(1)?).copied()
+    /// Every page that a key shows.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::NUMBERED.into_iter().chain(Self::LETTERED)
+    }
+
+    /// Whether it lists what a filter can narrow down.
+    pub fn has_filter(self) -> bool {
+        matches!(self, Self::Messages | Self::Parameters | Self::Link)
     }
 
     /// The name shown at the bottom of the screen.
@@ -68,6 +80,9 @@ impl Page {
             Self::Parameters => "Params",
             Self::Log => "Log",
             Self::Alarms => "Alarms",
+            Self::Path => "Path",
+            Self::Values => "Values",
+            Self::Plot => "Plot",
             Self::Help => "Help",
         }
     }
@@ -88,7 +103,7 @@ impl Page {
 }
 
 /// Which page is shown, and how far its list is scrolled.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pages {
     /// The page that the crew holds; `None` follows the flight.
     pub held: Option<Page>,
@@ -96,11 +111,48 @@ pub struct Pages {
     pub scroll: usize,
     /// The alarm chosen in the list of alarms; `None` for the foremost.
     pub chosen: Option<AlarmKind>,
+    /// What the plot page shows.
+    pub plotted: &'static Quantity,
+    /// The numbers on every page.
+    pub pinned: Vec<&'static Quantity>,
+    /// Only lines with this text are listed; empty for all.
+    pub filter: String,
+    /// A text that is being typed.
+    pub entry: Option<TextEntry>,
+}
+
+/// A text that is being typed; the keys go to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TextEntry {
+    /// The filter of the shown list.
+    Filter,
+    Palette {
+        typed: String,
+        /// The place of the marked entry among those found.
+        chosen: usize,
+    },
+}
+
+/// How many numbers fit beside each other on every page.
+const PINNED_MAX: usize = 4;
+
+impl Default for Pages {
+    fn default() -> Self {
+        Self {
+            held: None,
+            scroll: 0,
+            chosen: None,
+            plotted: &quantity::ALL[0],
+            pinned: Vec::new(),
+            filter: String::new(),
+            entry: None,
+        }
+    }
 }
 
 impl Pages {
     /// The page to show in this phase.
-    pub fn shown(self, phase: Option<TdPhase>) -> Page {
+    pub fn shown(&self, phase: Option<TdPhase>) -> Page {
         let of_phase = phase.map_or(Page::Pad, Page::of_phase);
         match self.held {
             // The same key, on the way up.
@@ -109,26 +161,32 @@ impl Pages {
         }
     }
 
+    /// Whether a line of a list passes the filter.
+    pub fn lets_pass(&self, text: &str) -> bool {
+        self.filter.is_empty() || text.to_lowercase().contains(&self.filter.to_lowercase())
+    }
+
+    /// Pins a number, or removes it. The oldest makes room for a new one.
+    pub fn pin(&mut self, quantity: &'static Quantity) {
+        if let Some(place) = self.pinned.iter().position(|pinned| *pinned == quantity) {
+            self.pinned.remove(place);
+            return;
+        }
+        if self.pinned.len() == PINNED_MAX {
+            self.pinned.remove(0);
+        }
+        self.pinned.push(quantity);
+    }
+
     /// Holds a page; `None` follows the flight again.
     pub fn hold(&mut self, page: Option<Page>) {
-        *self = Self { held: page, ..Self::default() };
+        (self.held, self.scroll, self.chosen) = (page, 0, None);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_page_has_its_digit() {
-        for page in Page::ALL {
-            assert_eq!(Page::from_digit(page.key()), Some(page));
-        }
-        assert_eq!((Page::Help.key(), Page::Ascent.key()), ('?', Page::Descent.key()));
-        for other in ['0', 'x', '\u{0661}'] {
-            assert_eq!(Page::from_digit(other), None);
-        }
-    }
 
     #[test]
     fn the_phase_chooses_the_page_unless_one_is_held() {

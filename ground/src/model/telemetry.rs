@@ -43,10 +43,10 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             let phase = vehicle.phase().map(|phase| phase.value);
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
-                vehicle.flown.extend(&motion);
+                vehicle.flown.extend(&motion, now);
             }
             if phase.is_some_and(is_burning) {
-                vehicle.burn.extend(&motion);
+                vehicle.burn.extend(&motion, now);
             }
         }
         MavMessage::VFR_HUD(data) => {

@@ -232,6 +232,12 @@ impl Vehicle {
         count_down(self.prediction?.map(|prediction| prediction.time_to_go_s), now)
     }
 
+    /// The speed of the predicted touchdown, m/s.
+    pub fn predicted_speed_m_s(&self) -> Option<Sample<f64>> {
+        self.prediction
+            .map(|prediction| prediction.map(|p| libm::hypot(p.touchdown.u_m_s, p.touchdown.w_m_s)))
+    }
+
     /// Speeds along the body axes, with the age of the older of attitude and velocity.
     pub fn body_speed(&self) -> Option<Sample<BodySpeed>> {
         let (attitude, motion) = (self.attitude?, self.motion?);

@@ -1,14 +1,14 @@
 //! Plays a recording: pause, speed, seek. It reads no clock; the caller passes the elapsed time.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
 use super::recording::{Reader, RecordedEvent, Recording};
 use crate::key::Key;
-use crate::model::page::Page;
 use crate::model::{Model, Playback, Settings};
-use crate::update::{Msg, update};
+use crate::update::{Action, Msg, update};
 
 /// The tick period, as in the live run loop.
 const TICK: Duration = Duration::from_millis(100);
@@ -20,6 +20,7 @@ const SPEED_EXPONENTS: std::ops::RangeInclusive<i32> = -3..=6;
 /// A recording and the present position in it.
 pub struct Player {
     recording: Recording,
+    phases: Arc<[(TdPhase, Duration)]>,
     settings: Settings,
     /// The model at the present position.
     pub model: Model,
@@ -38,6 +39,7 @@ impl Player {
         let settings = Settings { vehicle: recording.vehicle.unwrap_or(settings.vehicle), ..settings };
         let mut player = Self {
             model: Model::new(settings.clone()),
+            phases: recording.phases.iter().copied().collect(),
             recording,
             settings,
             position: Duration::ZERO,
@@ -78,7 +80,7 @@ impl Player {
     pub fn seek(&mut self, to: Duration) {
         let to = to.min(self.recording.length());
         if to < self.position {
-            let pages = self.model.pages;
+            let pages = std::mem::take(&mut self.model.pages);
             self.model = Model::new(self.settings.clone());
             self.model.pages = pages;
             (self.position, self.next_tick) = (Duration::ZERO, Duration::ZERO);
@@ -96,10 +98,14 @@ impl Player {
         begin.is_some()
     }
 
-    /// Handles a key. Returns whether to quit.
-    pub fn on_key(&mut self, key: Key) -> bool {
+    /// Handles a key. Returns what the screen is to do.
+    pub fn on_key(&mut self, key: Key) -> Vec<Action> {
+        let mut actions = Vec::new();
         match key {
-            Key::Char('q' | 'Q') | Key::CtrlC => return true,
+            // A text that is being typed takes every key.
+            _ if self.model.pages.entry.is_some() => {
+                actions = update(&mut self.model, Msg::Key(key), self.position);
+            }
             Key::Char(' ') => self.paused = !self.paused,
             Key::Char('+' | '=') => self.faster(1),
             Key::Char('-') => self.faster(-1),
@@ -109,12 +115,15 @@ impl Player {
             Key::Char(']') => self.seek(self.next_phase_start()),
             Key::Char('g') => self.seek(Duration::ZERO),
             Key::Char('G') => self.seek(self.recording.length()),
-            Key::Char('r') if self.model.page() == Page::Parameters => {}
             // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
-            _ => drop(update(&mut self.model, Msg::Key(key), self.position)),
+            _ => actions = update(&mut self.model, Msg::Key(key), self.position),
+        }
+        // A key to quit waits for a paste to show itself; a replay has nothing to protect.
+        if self.model.quit_at.take().is_some() {
+            actions.push(Action::Quit);
         }
         self.update_playing();
-        false
+        actions
     }
 
     fn faster(&mut self, doublings: i32) {
@@ -201,6 +210,7 @@ impl Player {
             length: self.recording.length(),
             speed: libm::exp2(f64::from(self.speed_exponent)),
             paused: self.paused,
+            phases: Arc::clone(&self.phases),
         });
     }
 }

@@ -6,22 +6,25 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdPhase};
+use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA};
 
-use super::{Action, Request, commands};
+use super::{Action, Request, commands, entry};
 use crate::key::Key;
+use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
+use crate::model::permits::{why_not_arm, why_not_start};
+use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
-use crate::model::vehicle::is_on_pad;
-use crate::model::words;
-use crate::model::{Model, Role};
+use crate::model::{Model, Role, quantity};
 
 /// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
+/// How far Left and Right move the look at the past.
+const LOOK_STEP: Duration = Duration::from_secs(1);
 /// The furthest scroll position; no list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
@@ -69,8 +72,12 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
             return;
         }
     }
-    if key == Key::CtrlL {
+    let is_free = model.pages.entry.is_none() && model.dialog == Dialog::Closed;
+    if key == Key::CtrlL && !is_free {
         model.outbox.push(Action::Redraw);
+    }
+    if model.pages.entry.is_some() && model.dialog == Dialog::Closed {
+        return entry::on_key(model, key, now);
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => on_free_key(model, key, now),
@@ -88,6 +95,7 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
         }
         // An Enter that comes too late for the abort must not confirm a dialog that was open before.
         model.dialog = Dialog::Closed;
+        model.pages.entry = None;
         // If the terminal reports repeats, a second Ctrl-X was really pressed, however soon it came.
         if model.repeats_reported && model.abort_chord.confirm(now) {
             abort(model, now);
@@ -138,6 +146,7 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
 
 /// Closes the open dialog because something else came in between.
 fn cancel(model: &mut Model, now: Duration) {
+    model.pages.entry = None;
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed => {}
         dialog => model.info(now, format!("{}: cancelled, nothing was done", dialog.name())),
@@ -155,6 +164,7 @@ fn expire(model: &mut Model, now: Duration) {
 /// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
+    model.look_back = model.look_back.filter(|looks| now < looks.until);
     pass_abort_chord(model, now);
     pass_quit(model, now);
 }
@@ -168,53 +178,84 @@ fn pass_quit(model: &mut Model, now: Duration) {
 }
 
 fn on_free_key(model: &mut Model, key: Key, now: Duration) {
-    if let (Some(why), Key::Char('A' | 'S' | 'D')) = (model.settings.role.why_not_command(), key) {
-        return model.info(now, why);
+    if let Some(act) = model.settings.keys.act(key) {
+        return perform(model, act, now);
     }
-    match key {
-        Key::Char('A') => match why_not_arm(model, now) {
-            None => model.dialog = Dialog::arm(now),
-            Some(why) => model.warn(now, format!("cannot arm: {why}")),
-        },
-        Key::Char('S') => match why_not_start(model, now) {
-            None => model.dialog = Dialog::start(now),
-            Some(why) => model.warn(now, format!("cannot start: {why}")),
-        },
-        Key::Char('D') => model.dialog = Dialog::disarm(now),
-        Key::Char('a' | 's' | 'd') => model.info(now, "capital letters: A arms, S starts, D disarms"),
-        Key::Char('q' | 'Q') | Key::CtrlC => quit(model, now),
-        _ => on_page_key(model, key, now),
-    }
-}
-
-/// Keys that choose a page, scroll its list or acknowledge an alarm.
-fn on_page_key(model: &mut Model, key: Key, now: Duration) {
     let shown = model.page();
     match key {
-        Key::Char('?') | Key::F1 if shown == Page::Help => model.pages.hold(None),
-        Key::Char('?') | Key::F1 => model.pages.hold(Some(Page::Help)),
-        Key::Escape | Key::Char('0') => model.pages.hold(None),
-        Key::Char('h' | 'H') if model.pages.held.is_some() => model.pages.hold(None),
-        Key::Char('h' | 'H') => model.pages.hold(Some(shown)),
-        Key::Char(' ') => see_alarm(model, now),
-        Key::Char('r') if shown == Page::Parameters => ask_parameters(model),
         Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
+        Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
+        Key::Left | Key::Right if model.playing.is_none() => look_back(model, key == Key::Left, now),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
         Key::PageDown => scroll(model, -SCROLL_PAGE),
         Key::Home => scroll(model, SCROLL_MAX),
         Key::End => scroll(model, -SCROLL_MAX),
-        Key::Char(digit) => {
-            if let Some(page) = Page::from_digit(digit) {
-                model.pages.hold(Some(page));
-                if page == Page::Parameters && !model.parameters.asked {
-                    ask_parameters(model);
-                }
-            }
+        Key::Char(letter) if model.settings.keys.meant_as_capital(letter).is_some() => {
+            let keys = &model.settings.keys;
+            let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(|act| keys.name(act));
+            model.info(now, format!("capital letters: {arm} arms, {start} starts, {disarm} disarms"));
         }
         _ => {}
     }
+}
+
+/// Does what a key or an entry of the palette stands for. What commands the vehicle only opens its dialog.
+pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
+    if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_ladder()) {
+        return model.info(now, why);
+    }
+    let shown = model.page();
+    match act {
+        Act::Arm => match why_not_arm(model, now) {
+            None => model.dialog = Dialog::arm(now),
+            Some(why) => model.warn(now, format!("cannot arm: {why}")),
+        },
+        Act::Start => match why_not_start(model, now) {
+            None => model.dialog = Dialog::start(now),
+            Some(why) => model.warn(now, format!("cannot start: {why}")),
+        },
+        Act::Disarm => model.dialog = Dialog::disarm(now),
+        Act::Acknowledge => see_alarm(model, now),
+        Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),
+        Act::Show(page) => {
+            model.pages.hold(Some(page));
+            if page == Page::Parameters && !model.parameters.asked && model.playing.is_none() {
+                ask_parameters(model);
+            }
+        }
+        Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
+        Act::Hold => model.pages.hold(Some(shown)),
+        Act::Follow => {
+            model.look_back = None;
+            model.pages.filter.clear();
+            model.pages.hold(None);
+        }
+        Act::Filter => entry::open_filter(model),
+        Act::Palette => entry::open_palette(model),
+        Act::Pin if shown == Page::Plot => model.pages.pin(model.pages.plotted),
+        Act::NextTheme => model.outbox.push(Action::NextTheme),
+        Act::AskParameters if shown == Page::Parameters && model.playing.is_none() => ask_parameters(model),
+        Act::Pin | Act::AskParameters => {}
+        Act::Redraw => model.outbox.push(Action::Redraw),
+        Act::Quit => quit(model, now),
+    }
+}
+
+/// Moves the look at the past of this flight; at its end the screen is live again.
+fn look_back(model: &mut Model, earlier: bool, now: Duration) {
+    let at = model.look_back.map_or(now, |looks| looks.at);
+    let at = if earlier { at.saturating_sub(LOOK_STEP) } else { at + LOOK_STEP };
+    let begin = model.recall.begin().filter(|_| at < now);
+    model.look_back = begin.map(|begin| LookBack { at: at.max(begin), until: now + LOOKS_FOR });
+}
+
+/// Chooses the next or the previous quantity to plot.
+fn choose_quantity(model: &mut Model, up: bool) {
+    let at = model.pages.plotted.place();
+    let next = if up { at.saturating_sub(1) } else { (at + 1).min(quantity::COUNT - 1) };
+    model.pages.plotted = &quantity::ALL[next];
 }
 
 /// Scrolls up by this many lines; down if negative. Events are listed from the newest line, parameters and link
@@ -299,37 +340,6 @@ fn choose_alarm(model: &mut Model, up: bool) {
         None => return,
     };
     model.pages.chosen = Some(list[next].kind);
-}
-
-/// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
-fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if model.vehicle.armed().is_some_and(|armed| armed.value) {
-        return Some("armed already".to_owned());
-    }
-    if !model.link.uplink.is_proven(now) {
-        let why = model.link.uplink.why_unheard();
-        return Some(format!("the uplink is not proven: {why}"));
-    }
-    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
-        return Some("the phase is unknown".to_owned());
-    };
-    (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase)))
-}
-
-fn why_not_start(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if !model.vehicle.armed().is_some_and(|armed| armed.value) {
-        return Some("not armed".to_owned());
-    }
-    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
-        return Some("the phase is unknown".to_owned());
-    };
-    (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
 }
 
 /// Lets time pass for the abort chord; only on ticks, because a key may be a further repeat of a held Ctrl-X.

@@ -4,8 +4,10 @@
 
 pub mod alarms;
 pub mod auto;
+mod callouts;
 pub mod commands;
 pub mod crew;
+mod entry;
 pub mod frames;
 pub mod keys;
 pub mod tick;
@@ -158,6 +160,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Tick => tick::on_tick(model, now),
     }
     alarms::watch(model, now);
+    callouts::watch(model, now);
     std::mem::take(&mut model.outbox)
 }
 

@@ -8,12 +8,12 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, commands, crew, frames, keys};
+use super::{Action, auto, callouts, commands, crew, frames, keys};
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link_state::LinkState;
 use crate::model::vehicle::{Deflection, is_on_pad};
-use crate::model::{Model, Role};
+use crate::model::{Model, Role, trace};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 /// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
@@ -51,6 +51,11 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     note_loss(model, now);
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
+    trace::note(model, now);
+    if model.vehicle.in_flight() || model.vehicle.countdown_s().is_some() {
+        model.recall.note(&model.vehicle, now);
+    }
+    callouts::ring(model);
     auto::step(model, now);
     commands::poll(model, now);
     commands::observe(model, now);

@@ -7,6 +7,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::draw_line;
 use super::number::shortest;
 use super::theme::{TextRole, Theme};
 use crate::model::alarm::Alarm;
@@ -21,22 +22,22 @@ const TEXT_COLUMNS_MIN: usize = 12;
 
 /// Draws the foremost alarm; without one, the newest event.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if let Some(playing) = model.playing {
-        return frame.render_widget(replay(playing, theme), area);
+    if let Some(playing) = &model.playing {
+        return draw_line(frame, area, replay(playing, theme));
     }
     if let Some(alarm) = alarm(model, theme, now, usize::from(area.width)) {
-        return frame.render_widget(alarm, area);
+        return draw_line(frame, area, alarm);
     }
     let last = model.events.newest(1).next().map_or_else(Line::default, |event| {
         let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
         let head = format!(" {:.1} ", event.at.as_secs_f64());
         Line::styled(format!("{head}{}{}", event.mark().trim_start(), event.text), theme.style(role))
     });
-    frame.render_widget(last, area);
+    draw_line(frame, area, last);
 }
 
 /// The position of a replay, and its keys.
-pub fn replay(playing: Playback, theme: Theme) -> Line<'static> {
+pub fn replay(playing: &Playback, theme: Theme) -> Line<'static> {
     let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
     let state = if playing.paused { "PAUSED" } else { "plays" };
     Line::styled(

@@ -8,9 +8,11 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
 use super::theme::{TextRole, Theme};
-use super::{alarm_line, dialog, draw_lines, identity, next_event, pages, top_lines};
+use super::{alarm_line, dialog, draw_lines, identity, next_event, pages, palette, top_lines};
 use crate::model::Model;
+use crate::model::act::Act;
 use crate::model::command::CommandKind;
+use crate::model::page::TextEntry;
 
 /// With fewer rows an open dialog replaces the line of countdown and link.
 const DIALOG_ROWS: u16 = 8;
@@ -44,7 +46,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     }
     lines.extend(top_lines::keep_away(model, theme, now));
     lines.extend(next_event::line(model, theme, now));
-    lines.extend(model.playing.map(|playing| alarm_line::replay(playing, theme)));
+    lines.extend(model.playing.as_ref().map(|playing| alarm_line::replay(playing, theme)));
     if model.playing.is_none() {
         lines.extend(alarm_line::alarm(model, theme, now, usize::from(area.width)));
     }
@@ -54,11 +56,16 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let room = Rect { height: area.height.saturating_sub(taken), ..area };
     let mut body = pages::lines(model, page, theme, now, room);
     body.truncate(usize::from(room.height));
-    lines.extend(body);
+    lines.extend(if matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
+        palette::lines(model, theme, usize::from(room.height).saturating_sub(1))
+    } else {
+        body
+    });
     draw_lines(frame, area, &lines);
     if named > 0 {
         let held = if model.pages.held.is_some() { "HELD, 0 follows" } else { "auto" };
-        let text = format!(" [{}{}] 1-9 {held}  ? help", page.key(), page.name());
+        let key = model.settings.keys.name(Act::Show(page.keyed()));
+        let text = format!(" [{key}{}] 1-9 {held}  ? help", page.name());
         let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
         frame.render_widget(Line::styled(text, theme.style(TextRole::Label)), last);
     }

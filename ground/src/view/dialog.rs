@@ -94,6 +94,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let block = Block::bordered().title(Line::styled(format!(" {title} "), theme.style(TextRole::Title)));
     let inside = block.inner(at);
     frame.render_widget(Clear, at);
+    frame.buffer_mut().set_style(at, theme.ground());
     frame.render_widget(block, at);
     let padded = Rect { x: inside.x + 1, width: inside.width.saturating_sub(2), ..inside };
     draw_lines(frame, padded, &lines);

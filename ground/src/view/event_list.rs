@@ -5,6 +5,7 @@ use ratatui::text::{Line, Span};
 
 use super::theme::{TextRole, Theme};
 use crate::model::Model;
+use crate::model::events::Event;
 
 /// Columns before the text of an event: time, speaker and mark.
 const BEFORE_TEXT: usize = 18;
@@ -14,10 +15,28 @@ const WRAP_COLUMNS_MIN: usize = 20;
 /// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
 /// is its reason.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    chosen(model, |_| true, theme, columns, rows)
+}
+
+/// The same of those that the crew's filter lets pass, by their text or their speaker.
+pub fn filtered(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let pages = &model.pages;
+    let passes = |event: &Event| pages.lets_pass(&event.text) || pages.lets_pass(event.speaker.name());
+    chosen(model, passes, theme, columns, rows)
+}
+
+fn chosen(
+    model: &Model,
+    passes: impl Fn(&Event) -> bool,
+    theme: Theme,
+    columns: usize,
+    rows: usize,
+) -> Vec<Line<'static>> {
     let text_columns = columns.saturating_sub(BEFORE_TEXT);
     let mut lines: Vec<Line> = model
         .events
         .newest(rows)
+        .filter(|event| passes(event))
         .flat_map(|event| {
             let role = match event.level {
                 EventLevel::Info => TextRole::Plain,

@@ -13,7 +13,7 @@ use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
 use super::draw_lines;
 use super::number::{STALE_MARK, age_mark, fixed};
-use super::theme::{TextRole, Theme};
+use super::theme::{Ink, TextRole, Theme};
 use crate::model::Model;
 use crate::model::motion::{Attitude, Motion};
 use crate::model::vehicle::Deflection;
@@ -61,17 +61,17 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let roll_rad = model.vehicle.attitude.map_or(0.0, |attitude| roll_rad(&attitude.value));
     // In rows; a column is half as wide as a row is high.
     let (across, up) = (f64::from(COLUMNS - 1) / 4.0, f64::from(ROWS - 1) / 2.0);
-    let colour = |colour| if theme.colour { colour } else { Color::Reset };
     let text = |words: String, role: TextRole| TextLine::styled(words, theme.style(role));
     let canvas = Canvas::default()
         .marker(Marker::Braille)
+        .background_color(theme.back())
         .x_bounds([-across, across])
         .y_bounds([-up, up])
         .paint(|context| {
-            context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: colour(Color::Reset) });
+            context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: theme.ink(Ink::Body) });
             for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
                 let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
-                arm(context, (east, north), fin, colour(Color::Cyan), colour(Color::DarkGray));
+                arm(context, (east, north), fin, theme.ink(Ink::Planned), theme.ink(Ink::Ground));
                 let apart = (fin.commanded_rad - fin.measured_rad).abs().to_degrees() > APART_DEG;
                 let degrees = fixed(fin.measured_rad.to_degrees(), 0);
                 let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });

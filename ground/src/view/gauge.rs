@@ -11,9 +11,8 @@ use crate::model::dead_reckoning::{is_unheard, predict_position};
 
 /// The least height of the scale, m.
 const TOP_MIN_M: f64 = 25.0;
-/// The steps of the scale within a decade (Renard series R10, ISO 3), so that the scale does not change with every
-/// frame.
-const STEPS: [f64; 10] = [1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0];
+/// Heights of a row within a decade, and how many rows make a tick, so that every tick is round.
+const ROW_HEIGHTS: [(f64, usize); 5] = [(1.0, 5), (2.0, 5), (2.5, 4), (4.0, 5), (5.0, 4)];
 
 /// One line per row, the greatest height first.
 pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
@@ -42,17 +41,23 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         (None, _) => (None, " ", TextRole::Label),
     };
     let marks = [height, band.map(|band| band.1), chosen, commit, apogee];
-    let top = top_m(marks.into_iter().flatten().fold(0.0, f64::max));
-    let per_row = top / (rows - 1) as f64;
+    let (per_row, tick_rows) = scale(marks.into_iter().flatten().fold(0.0, f64::max), rows - 1);
     (0..rows)
         .rev()
         .map(|row| {
             let (low, high) = ((row as f64 - 0.5) * per_row, (row as f64 + 0.5) * per_row);
             let here = |height: Option<f64>| height.is_some_and(|height| (low..high).contains(&height));
             let inside = band.is_some_and(|(bottom, top)| bottom < high && top >= low);
+            let is_tick = row % tick_rows == 0;
+            let tick = if is_tick { fixed(row as f64 * per_row, 0) } else { String::new() };
+            let bar = match (inside, is_tick) {
+                (true, _) => "▐█▌",
+                (false, true) => "─┤ ",
+                (false, false) => " │ ",
+            };
             let mut spans = vec![
-                Span::styled(format!("{:>6} ", fixed(row as f64 * per_row, 0)), theme.style(TextRole::Label)),
-                Span::styled(if inside { "▐█▌" } else { " │ " }, theme.style(TextRole::Plain)),
+                Span::styled(format!("{tick:>6} "), theme.style(TextRole::Label)),
+                Span::styled(bar, theme.style(TextRole::Plain)),
             ];
             if here(height) {
                 let text = height.map_or_else(String::new, |height| fixed(height, 1));
@@ -70,11 +75,13 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Lin
         .collect()
 }
 
-/// The smallest step of the scale at or above a height, m.
-fn top_m(highest_m: f64) -> f64 {
-    let highest_m = highest_m.clamp(TOP_MIN_M, 1e6);
-    let decade = libm::exp10(libm::floor(libm::log10(highest_m)));
-    STEPS.into_iter().map(|step| step * decade).find(|top| *top >= highest_m).unwrap_or(10.0 * decade)
+/// The least height of a row for which a height fits into this many rows, m, and how many rows make a tick.
+fn scale(highest_m: f64, rows: usize) -> (f64, usize) {
+    let least_m = highest_m.clamp(TOP_MIN_M, 1e6) / rows as f64;
+    let decade = libm::exp10(libm::floor(libm::log10(least_m)));
+    // A hundredth, because a power of ten is not exact.
+    let fits = ROW_HEIGHTS.into_iter().find(|(height, _)| height * decade >= 0.99 * least_m);
+    fits.map_or((10.0 * decade, 5), |(height, tick_rows)| (height * decade, tick_rows))
 }
 
 #[cfg(test)]
@@ -82,12 +89,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_scale_has_fixed_steps() {
-        for (highest_m, top) in
-            [(0.0, 25.0), (25.0, 25.0), (26.0, 31.5), (99.0, 100.0), (101.0, 125.0), (299.0, 315.0)]
-        {
-            assert!((top_m(highest_m) - top).abs() < 1e-9, "{highest_m}: {}", top_m(highest_m));
+    fn every_tick_is_a_round_height() {
+        for rows in [10, 11, 16, 29, 48] {
+            for highest_m in [0.0, 25.0, 26.0, 99.0, 101.0, 299.0, 4_321.0, f64::MAX] {
+                let (per_row, tick_rows) = scale(highest_m, rows);
+                let tick_m = per_row * tick_rows as f64;
+                let digits = tick_m / libm::exp10(libm::floor(libm::log10(tick_m) + 1e-9));
+                assert!([1.0, 2.0, 5.0].iter().any(|round| (digits - round).abs() < 1e-6), "{tick_m}");
+                let top_m = per_row * rows as f64;
+                assert!(top_m >= 0.98 * highest_m.clamp(TOP_MIN_M, 1e6), "{top_m} for {highest_m}");
+                assert!(top_m <= 2.1 * highest_m.clamp(TOP_MIN_M, 1e6), "{top_m} for {highest_m}");
+            }
         }
-        assert!(top_m(f64::MAX) >= 1e6 && top_m(f64::MAX).is_finite());
     }
 }

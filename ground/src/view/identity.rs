@@ -5,30 +5,30 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
+use super::draw_line;
 use super::theme::{TextRole, Theme};
 use crate::model::{Model, Role, words};
 
 /// Columns of `REPLAY SIM` with its spaces.
 const MODE_COLUMNS: u16 = 12;
-/// Columns of `system 1 boot 1A2B3C4D mk2` with its spaces.
-const VEHICLE_COLUMNS: u16 = 27;
 /// Columns of `by ` and a few names.
 const CREW_COLUMNS: u16 = 14;
 
 /// Draws the line; each part has a fixed place.
 pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
+    let vehicle = vehicle(model);
     let [mode_area, vehicle_area, station_area, crew_area] = area.layout(&Layout::horizontal([
         Constraint::Length(MODE_COLUMNS),
-        Constraint::Length(VEHICLE_COLUMNS),
+        Constraint::Length(vehicle.len() as u16 + 1),
         Constraint::Fill(1),
         Constraint::Length(CREW_COLUMNS),
     ]));
-    frame.render_widget(mode(model, theme), mode_area);
-    frame.render_widget(Span::styled(vehicle(model), theme.style(TextRole::Plain)), vehicle_area);
+    draw_line(frame, mode_area, mode(model, theme).into());
+    draw_line(frame, vehicle_area, Line::styled(vehicle, theme.style(TextRole::Plain)));
     let Address { system_id, component_id } = model.settings.us;
     let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
-    frame.render_widget(Span::styled(station, theme.style(TextRole::Label)), station_area);
-    frame.render_widget(crew(model, theme), crew_area);
+    draw_line(frame, station_area, Line::styled(station, theme.style(TextRole::Label)));
+    draw_line(frame, crew_area, crew(model, theme).into());
 }
 
 /// The same for narrow screens.

@@ -10,6 +10,9 @@ use crate::model::{Model, Role};
 
 /// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
 pub fn link(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+    if model.look_back.is_some() {
+        return Line::styled(" link: only live", theme.style(TextRole::Label));
+    }
     if let Some(why) = &model.link.trouble {
         return Line::styled(format!(" LINK DOWN {why}"), theme.style(TextRole::Alarm));
     }

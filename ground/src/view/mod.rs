@@ -9,14 +9,17 @@
 pub mod actuators;
 pub mod alarm_line;
 pub mod ascii;
-pub mod big_letters;
 pub mod compact;
 pub mod controller;
 pub mod dialog;
 pub mod event_list;
+pub mod filter;
 pub mod fins;
 pub mod flight;
+pub mod flight_bar;
+pub mod foremost;
 pub mod gauge;
+pub mod headline;
 pub mod identity;
 pub mod limit_rows;
 pub mod link_line;
@@ -24,9 +27,14 @@ pub mod lost_position;
 pub mod next_event;
 pub mod number;
 pub mod pages;
+pub mod palette;
+pub mod pins;
 pub mod side_view;
+pub mod sparkline;
 pub mod theme;
+pub mod ticks;
 pub mod top_lines;
+pub mod top_view;
 pub mod touchdown;
 pub mod verdict;
 pub mod wide;
@@ -46,6 +54,7 @@ const WIDE_ROWS: u16 = 24;
 
 pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     let area = frame.area();
+    frame.buffer_mut().set_style(area, theme.ground());
     if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
         wide::draw(model, theme, now, frame, area);
     } else {
@@ -56,10 +65,25 @@ pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     }
 }
 
-/// Draws lines from the top of an area, as many as fit.
+/// The last cell of a line that is cut.
+pub const CUT_MARK: char = '…';
+
+/// Draws lines from the top of an area, as many as fit. What is cut is marked.
 fn draw_lines(frame: &mut Frame, area: Rect, lines: &[Line]) {
     let area = area.intersection(frame.area());
-    for (line, y) in lines.iter().zip(area.y..area.bottom()) {
-        frame.render_widget(line, Rect { y, height: 1, ..area });
+    if area.is_empty() {
+        return;
     }
+    let rows = usize::from(area.height);
+    for (row, (line, y)) in lines.iter().zip(area.y..area.bottom()).enumerate() {
+        frame.render_widget(line, Rect { y, height: 1, ..area });
+        if line.width() > usize::from(area.width) || (row + 1 == rows && lines.len() > rows) {
+            frame.buffer_mut()[(area.right() - 1, y)].set_char(CUT_MARK);
+        }
+    }
+}
+
+/// Draws one line.
+fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
+    draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
 }

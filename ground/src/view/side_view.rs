@@ -5,19 +5,19 @@ use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Circle, Line, Points};
 
 use super::number::shortest;
-use super::theme::Theme;
+use super::theme::{Ink, TextRole, Theme};
+use super::ticks;
 use crate::model::Model;
 use crate::model::dead_reckoning::predict_position;
 use crate::model::motion::NorthEastUp;
 
 /// Braille dots per cell.
-const DOTS_ACROSS: f64 = 2.0;
-const DOTS_UP: f64 = 4.0;
+pub(super) const DOTS_ACROSS: f64 = 2.0;
+pub(super) const DOTS_UP: f64 = 4.0;
 /// The least altitude that the picture shows.
 const ALTITUDE_MIN_M: f64 = 5.0;
 /// The height of the mark of a touchdown limit, dots.
@@ -25,7 +25,11 @@ const LIMIT_DOTS: f64 = 5.0;
 /// The columns that one picture needs.
 const PICTURE_COLUMNS: u16 = 22;
 /// The pad's half width, m.
-const PAD_HALF_M: f64 = 1.0;
+pub(super) const PAD_HALF_M: f64 = 1.0;
+/// Rows between two ticks of the height, at least.
+const TICK_ROWS: u16 = 3;
+/// Columns between two ticks over the ground, at least.
+pub(super) const TICK_COLUMNS: u16 = 9;
 
 /// The touchdown limits are included if they enlarge the picture by no more than this factor.
 const LIMITS_COST_MAX: f64 = 2.0;
@@ -96,33 +100,43 @@ pub fn draw(
     let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
     let view = Bounds::around(&points, limit_m, area);
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
-    let colour = |colour| if theme.colour { colour } else { Color::Reset };
+    let label = |text: String| ratatui::text::Line::styled(text, theme.style(TextRole::Label));
     let canvas = Canvas::default()
         .marker(Marker::Braille)
+        .background_color(theme.back())
         .x_bounds([left, right])
         .y_bounds([bottom, top])
         .paint(|context| {
-            context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: colour(Color::DarkGray) });
+            context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: theme.ink(Ink::Ground) });
             for side in [-PAD_HALF_M, PAD_HALF_M] {
-                context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: colour(Color::Reset) });
+                context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: theme.ink(Ink::Body) });
             }
             for x in limit_m.into_iter().flat_map(|limit_m| [-limit_m, limit_m]) {
                 let y2 = LIMIT_DOTS * per_dot;
-                context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: colour(Color::Red) });
+                context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: theme.ink(Ink::Limit) });
             }
-            context.draw(&Points { coords: predicted, color: colour(Color::Cyan) });
+            context.draw(&Points { coords: predicted, color: theme.ink(Ink::Planned) });
             for pair in flown.windows(2) {
                 let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
-                context.draw(&Line { x1, y1, x2, y2, color: colour(Color::Yellow) });
+                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Flown) });
             }
             if let Some(((x, y), radius)) = lost {
-                context.draw(&Circle { x, y, radius, color: colour(Color::Magenta) });
+                context.draw(&Circle { x, y, radius, color: theme.ink(Ink::Predicted) });
                 context.print(x, y, "+");
             }
-            context.print(left, top, format!("{:.0} m up", top.floor()));
-            let corner = view.corner(limit_m);
-            let columns = corner.chars().count() as f64;
-            context.print(right - columns * DOTS_ACROSS * per_dot, bottom, corner);
+            let step = ticks::step(top, usize::from(area.height / TICK_ROWS));
+            for height in ticks::multiples(step, top - DOTS_UP * per_dot, step) {
+                context.print(left, height, label(format!("{} m", shortest(height))));
+            }
+            let step = ticks::step(right - left, usize::from(area.width / TICK_COLUMNS));
+            let margin = DOTS_ACROSS * per_dot;
+            for x in ticks::multiples(left + margin, right - 6.0 * margin, step) {
+                context.print(x, bottom, label(format!("'{}", shortest(x))));
+            }
+            if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
+                let words = theme.either_side(&format!("limit ±{} m", shortest(limit_m)));
+                context.print(right - words.chars().count() as f64 * margin, top, label(words));
+            }
         });
     frame.render_widget(canvas, area);
 }
@@ -144,8 +158,8 @@ impl Bounds {
         }
         let across = f64::from(area.width) * DOTS_ACROSS;
         let up = f64::from(area.height) * DOTS_UP;
-        // A margin around, and two rows of dots below the ground.
-        let per_dot = |left: f64, right: f64| ((right - left) * 1.1 / across).max(top * 1.05 / (up - 3.0));
+        // A margin around, and a row of ticks below the ground.
+        let per_dot = |left: f64, right: f64| ((right - left) * 1.1 / across).max(top * 1.05 / (up - 5.0));
         if let Some(limit_m) = limit_m {
             let (wider_left, wider_right) = (left.min(-limit_m), right.max(limit_m));
             if per_dot(wider_left, wider_right) <= LIMITS_COST_MAX * per_dot(left, right) {
@@ -155,15 +169,6 @@ impl Bounds {
         let per_dot = per_dot(left, right);
         let middle = f64::midpoint(left, right);
         let half = per_dot * across / 2.0;
-        Self { x: [middle - half, middle + half], y: [-2.0 * per_dot, per_dot * (up - 2.0)], per_dot }
-    }
-
-    /// The label in the corner: how far the picture reaches, or the limit if it lies outside.
-    fn corner(&self, limit_m: Option<f64>) -> String {
-        let [left, right] = self.x;
-        match limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
-            Some(limit_m) => format!("limit ±{} m", shortest(limit_m)),
-            None => format!("{:.0} m", right.floor()),
-        }
+        Self { x: [middle - half, middle + half], y: [-4.0 * per_dot, per_dot * (up - 4.0)], per_dot }
     }
 }

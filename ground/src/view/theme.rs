@@ -1,11 +1,16 @@
-//! Gives each role of a text a style. Colour only repeats what a word or a mark already says.
+//! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a word or a mark
+//! already says.
+//!
+//! Dark, light and high contrast paint their own background, in colours whose values are fixed (the upper 240 of the
+//! 256 of xterm), so that their contrast is known. In the sun only the light theme can be read.
 
 use ratatui::style::{Color, Modifier, Style};
 
 /// The role of a piece of text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum TextRole {
     /// A value or a sentence.
+    #[default]
     Plain,
     /// A name or unit, less important than a value.
     Label,
@@ -21,29 +26,149 @@ pub enum TextRole {
     Key,
 }
 
-/// What the terminal can show.
+impl TextRole {
+    pub const ALL: [Self; 8] = [
+        Self::Plain,
+        Self::Label,
+        Self::Stale,
+        Self::Title,
+        Self::Good,
+        Self::Caution,
+        Self::Alarm,
+        Self::Key,
+    ];
+}
+
+/// A part of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ink {
+    Flown,
+    Planned,
+    Limit,
+    Predicted,
+    Ground,
+    /// The vehicle, its fins, the pad.
+    Body,
+}
+
+impl Ink {
+    pub const ALL: [Self; 6] =
+        [Self::Flown, Self::Planned, Self::Limit, Self::Predicted, Self::Ground, Self::Body];
+}
+
+/// A set of colours.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Palette {
+    #[default]
+    Dark,
+    /// Black on white, without yellow, for sunlight.
+    Light,
+    /// The terminal's own background and its 16 colours.
+    Sixteen,
+    /// No colours.
+    None,
+    /// White on black, the fewest and brightest colours.
+    Contrast,
+}
+
+impl Palette {
+    pub const ALL: [Self; 5] = [Self::Dark, Self::Light, Self::Sixteen, Self::None, Self::Contrast];
+
+    /// The name in the settings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Light => "light",
+            Self::Sixteen => "16",
+            Self::None => "none",
+            Self::Contrast => "contrast",
+        }
+    }
+
+    #[must_use]
+    pub fn next(self) -> Self {
+        let place = Self::ALL.iter().position(|palette| *palette == self).unwrap_or(0);
+        Self::ALL[(place + 1) % Self::ALL.len()]
+    }
+
+    /// `None` if the background is the terminal's own.
+    fn colours(self) -> Option<&'static Colours> {
+        match self {
+            Self::Dark => Some(&DARK),
+            Self::Light => Some(&LIGHT),
+            Self::Contrast => Some(&CONTRAST),
+            Self::Sixteen | Self::None => None,
+        }
+    }
+}
+
+/// Numbers of xterm's 256 colours.
+struct Colours {
+    back: u8,
+    plain: u8,
+    good: u8,
+    caution: u8,
+    /// Text and background.
+    alarm: (u8, u8),
+    /// In the order of [`Ink::ALL`].
+    inks: [u8; 6],
+}
+
+const DARK: Colours = Colours {
+    back: 16,
+    plain: 255,
+    good: 114,
+    caution: 221,
+    alarm: (231, 124),
+    inks: [221, 80, 210, 177, 255, 255],
+};
+const LIGHT: Colours = Colours {
+    back: 231,
+    plain: 16,
+    good: 22,
+    caution: 88,
+    alarm: (231, 124),
+    inks: [16, 19, 88, 54, 16, 16],
+};
+const CONTRAST: Colours = Colours {
+    back: 16,
+    plain: 231,
+    good: 46,
+    caution: 226,
+    alarm: (16, 231),
+    inks: [231, 51, 226, 225, 231, 231],
+};
+
+/// What the terminal can show, and in which colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
-    /// Whether colours may be used.
-    pub colour: bool,
+    pub palette: Palette,
     /// Whether the terminal shows ASCII only.
     pub ascii: bool,
 }
 
 impl Theme {
-    /// Reads what the terminal can show from the environment: `TERM`, `NO_COLOR`, and the first of `LC_ALL`,
-    /// `LC_CTYPE` and `LANG` that is set (POSIX.1-2017, 8.2).
+    /// Reads what the terminal can show from the environment: `TERM`, `COLORTERM`, `COLORFGBG`, `NO_COLOR`, and the
+    /// first of `LC_ALL`, `LC_CTYPE` and `LANG` that is set (POSIX.1-2017, 8.2).
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
         // Terminals without colour.
         let grey = ["vt1", "vt2", "vt3", "ansi-m", "linux-m", "xterm-mono"];
-        let colour = set("NO_COLOR").is_none() && !grey.iter().any(|name| term.starts_with(name));
+        let palette = if set("NO_COLOR").is_some() || grey.iter().any(|name| term.starts_with(name)) {
+            Palette::None
+        } else if !term.contains("256color") && set("COLORTERM").is_none() {
+            Palette::Sixteen
+        } else if set("COLORFGBG").is_some_and(|colours| colours.ends_with(";15")) {
+            Palette::Light
+        } else {
+            Palette::Dark
+        };
         let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default();
         let locale = locale.to_ascii_lowercase();
         let unicode = locale.contains("utf-8") || locale.contains("utf8");
         let old = ["vt1", "vt2", "vt3"].iter().any(|name| term.starts_with(name));
-        Self { colour, ascii: !unicode || old }
+        Self { palette, ascii: !unicode || old }
     }
 
     /// Replaces `±` on a terminal that shows only ASCII.
@@ -51,18 +176,64 @@ impl Theme {
         if self.ascii { text.replace('±', "+-") } else { text.to_owned() }
     }
 
-    /// The style of a role. Uses only the 16 basic colours, which users choose to be readable.
+    /// The style of an empty cell.
+    pub fn ground(self) -> Style {
+        self.palette.colours().map_or_else(Style::new, |colours| {
+            Style::new().fg(Color::Indexed(colours.plain)).bg(Color::Indexed(colours.back))
+        })
+    }
+
+    /// The background of an empty cell.
+    pub fn back(self) -> Color {
+        self.ground().bg.unwrap_or(Color::Reset)
+    }
+
+    /// The style of a role. A letter's weight and slant say the same without colour.
     pub fn style(self, role: TextRole) -> Style {
         let plain = Style::new();
-        let coloured = |colour| if self.colour { plain.fg(colour) } else { plain };
+        let style = if let Some(colours) = self.palette.colours() {
+            let on_back = |colour| plain.fg(Color::Indexed(colour));
+            match role {
+                // Labels are as strong as values: pale ones cannot be read in the sun, and every change of colour costs
+                // twenty bytes on the line.
+                TextRole::Plain | TextRole::Label | TextRole::Stale | TextRole::Title | TextRole::Key => {
+                    on_back(colours.plain)
+                }
+                TextRole::Good => on_back(colours.good),
+                TextRole::Caution => on_back(colours.caution),
+                TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
+            }
+        } else {
+            let style = if role == TextRole::Alarm { plain.add_modifier(Modifier::REVERSED) } else { plain };
+            let colour = match role {
+                TextRole::Good => Some(Color::Green),
+                TextRole::Caution => Some(Color::Yellow),
+                TextRole::Alarm => Some(Color::Red),
+                _ => None,
+            };
+            Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..style }
+        };
         match role {
-            TextRole::Plain => plain,
-            TextRole::Label => plain.add_modifier(Modifier::DIM),
-            TextRole::Stale => plain.add_modifier(Modifier::DIM | Modifier::ITALIC),
-            TextRole::Title | TextRole::Key => plain.add_modifier(Modifier::BOLD),
-            TextRole::Good => coloured(Color::Green),
-            TextRole::Caution => coloured(Color::Yellow).add_modifier(Modifier::BOLD),
-            TextRole::Alarm => coloured(Color::Red).add_modifier(Modifier::BOLD | Modifier::REVERSED),
+            TextRole::Plain | TextRole::Label | TextRole::Good => style,
+            TextRole::Stale => style.add_modifier(Modifier::ITALIC),
+            TextRole::Title | TextRole::Key | TextRole::Caution | TextRole::Alarm => {
+                style.add_modifier(Modifier::BOLD)
+            }
+        }
+    }
+
+    /// The colour of a part of a picture.
+    pub fn ink(self, ink: Ink) -> Color {
+        if let Some(colours) = self.palette.colours() {
+            return Color::Indexed(colours.inks[ink as usize]);
+        }
+        match ink {
+            _ if self.palette == Palette::None => Color::Reset,
+            Ink::Flown => Color::Yellow,
+            Ink::Planned => Color::Cyan,
+            Ink::Limit => Color::Red,
+            Ink::Predicted => Color::Magenta,
+            Ink::Ground | Ink::Body => Color::Reset,
         }
     }
 }
@@ -79,13 +250,29 @@ mod tests {
 
     #[test]
     fn the_environment_says_what_the_terminal_can_show() {
-        let full = Theme { colour: true, ascii: false };
+        let full = Theme { palette: Palette::Dark, ascii: false };
         assert_eq!(of(&[("TERM", "xterm-256color"), ("LANG", "C.UTF-8")]), full);
-        assert_eq!(of(&[("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")]), full);
+        let few = Theme { palette: Palette::Sixteen, ascii: false };
+        assert_eq!(of(&[("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")]), few);
         assert!(of(&[("LANG", "en_US.UTF-8"), ("LC_ALL", "C")]).ascii);
         assert!(of(&[("LANG", "C")]).ascii && of(&[]).ascii);
-        assert!(!of(&[("NO_COLOR", "1"), ("LANG", "C.UTF-8")]).colour);
-        assert!(of(&[("NO_COLOR", ""), ("LANG", "C.UTF-8")]).colour);
-        assert_eq!(of(&[("TERM", "vt100"), ("LANG", "C.UTF-8")]), Theme { colour: false, ascii: true });
+        assert_eq!(of(&[("NO_COLOR", "1"), ("TERM", "xterm-256color")]).palette, Palette::None);
+        assert_eq!(of(&[("NO_COLOR", ""), ("TERM", "xterm-256color")]).palette, Palette::Dark);
+        let white = [("TERM", "rxvt-256color"), ("COLORFGBG", "0;15")];
+        assert_eq!(of(&white).palette, Palette::Light);
+        assert_eq!(
+            of(&[("TERM", "vt100"), ("LANG", "C.UTF-8")]),
+            Theme { palette: Palette::None, ascii: true }
+        );
+    }
+
+    #[test]
+    fn the_next_palette_reaches_every_palette() {
+        let mut seen = vec![Palette::Dark];
+        while seen.len() < Palette::ALL.len() {
+            seen.push(seen[seen.len() - 1].next());
+        }
+        assert_eq!(seen, Palette::ALL);
+        assert_eq!(seen[4].next(), Palette::Dark);
     }
 }

@@ -222,7 +222,8 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = latest {
         return command_facts(track, theme, now);
     }
-    readiness(model, theme, now).unwrap_or_default()
+    let ready = readiness(model, now);
+    ready.map_or_else(Line::default, |(words, role)| Line::styled(format!(" {words}"), theme.style(role)))
 }
 
 /// The latest command other than an abort, while its effect is not observed yet.
@@ -233,19 +234,17 @@ pub fn open_command(model: &Model, now: Duration) -> Option<&TrackedCommand> {
 
 /// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the
 /// vehicle has reported its checks.
-pub fn readiness(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     let status = model.vehicle.status.as_ref()?;
     if status.is_stale(now) {
-        let words = format!(" {STALE_MARK}checks: no longer received");
-        return Some(Line::styled(words, theme.style(TextRole::Stale)));
+        return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
     }
     let failing = words::failed_checks(status.value.checks_failed);
     if !failing.is_empty() {
-        return Some(Line::styled(format!(" NO-GO: {}", failing.join(", ")), theme.style(TextRole::Caution)));
+        return Some((format!("NO-GO: {}", failing.join(", ")), TextRole::Caution));
     }
     if !model.link.uplink.is_proven(now) {
-        let words = " NO-GO: uplink not proven, every other check passes";
-        return Some(Line::styled(words, theme.style(TextRole::Caution)));
+        return Some(("NO-GO: uplink not proven, every other check passes".to_owned(), TextRole::Caution));
     }
-    Some(Line::styled(" GO: every arming check passes", theme.style(TextRole::Good)))
+    Some(("GO: every arming check passes".to_owned(), TextRole::Good))
 }

@@ -62,6 +62,7 @@ fn frames_with_bad_signatures_are_reported_and_counted() {
     rig.msg(counted(3));
     rig.msg(counted(4));
     assert_eq!(rig.events().matches("frames refused: 0 unsigned, 3 wrongly signed").count(), 1);
+    rig.key(Key::Char('5'));
     assert!(rig.screen(140, 40).contains("rejected 4"));
 }
 

@@ -164,7 +164,7 @@ fn regress_land_armed() {
     rig.descent_with(90.0, -38.0, TdChute::TD_CHUTE_STOWED);
     let screen = rig.screen(80, 24);
     assert!(screen.contains(" next IGNITION in 0.8 s at 58 m, motor armed"), "{screen}");
-    assert!(rig.screen(20, 5).contains(" next IGNITION in 0."), "{}", rig.screen(20, 5));
+    assert!(rig.screen(20, 5).contains(" next IGNITION in 0…"), "{}", rig.screen(20, 5));
     snapshot("land_armed", &rig);
 }
 

@@ -34,6 +34,7 @@ fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
             ..RADIO_STATUS_DATA::default()
         }),
     );
+    rig.key(Key::Char('5'));
     assert!(rig.screen(140, 40).contains("rssi 190/188 noise 45/--"), "{}", rig.screen(140, 40));
     rig.run(5.0);
     assert!(!rig.screen(140, 40).contains("rssi"), "no longer fresh");
@@ -143,6 +144,7 @@ fn only_questions_to_this_station_are_answered() {
 fn stale_values_are_marked_without_colour() {
     let mut rig = Rig::crewed();
     rig.state(0.0, 12.0, 0.0, -4.0, 90.0);
+    rig.key(Key::Char('v'));
     assert!(rig.screen(80, 24).contains("     12.00 m"));
     rig.run(2.0);
     assert!(rig.screen(80, 24).contains("~    12.00 m"));

@@ -10,9 +10,14 @@ use ground::model::{Role, Settings};
 use ground::replay::player::Player;
 use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
+use ground::view::view;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, TdPhase};
 use protocol::frame::Encoder;
 use protocol::identity::{GROUND, VEHICLE};
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::buffer::Cell;
+use ratatui::style::Modifier;
 
 use crate::keys::ladder;
 use crate::rig::{MONO, settings};
@@ -55,6 +60,12 @@ fn events(recording: &Recording) -> Vec<(Duration, RecordedEvent)> {
 
 fn player() -> Player {
     Player::new(recording(), Settings { role: Role::Replaying, ..settings(false, true) })
+}
+
+fn drawn(player: &Player) -> Terminal<TestBackend> {
+    let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a test terminal");
+    terminal.draw(|frame| view(&player.model, MONO, player.position(), frame)).expect("drawing in memory");
+    terminal
 }
 
 fn phase(player: &Player) -> TdPhase {
@@ -101,12 +112,7 @@ fn seeking_back_shows_nothing_from_later() {
 /// A position shows the same screen, however it was reached.
 #[test]
 fn a_position_shows_the_same_screen_however_it_was_reached() {
-    let screen = |player: &Player| {
-        let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(80, 24)).unwrap();
-        let now = player.position();
-        terminal.draw(|frame| ground::view::view(&player.model, MONO, now, frame)).unwrap();
-        terminal.backend().to_string()
-    };
+    let screen = |player: &Player| drawn(player).backend().to_string();
     let (mut straight, mut astray) = (player(), player());
     straight.seek(S(43));
     for second in [60, 3, 41, 12, 43] {
@@ -124,7 +130,7 @@ fn no_key_commands_anything_in_a_replay() {
         player.pass(Duration::from_millis(200));
     }
     assert!(player.model.commands.tracks.is_empty());
-    assert!(player.on_key(Key::Char('q')), "quits at once: nothing is armed here");
+    assert!(player.on_key(Key::Char('q')).contains(&Action::Quit), "quits at once: nothing is armed here");
 }
 
 /// The link rates are those of the flight, and the log page does not claim to record.
@@ -237,4 +243,34 @@ fn a_long_tlog_is_played_in_bounded_memory() {
     let said = String::from_utf8(process.wait_with_output().unwrap().stderr).unwrap();
     assert!(0 < most_kb && most_kb < MOST_KB, "{most_kb} kB; {said}");
     assert!(said.contains("long.tlog: 16 of 3") && said.matches("ground: reading").count() >= 8, "{said}");
+}
+
+/// The bar shows the whole recording, also what is still to come, and where the replay is.
+#[test]
+fn the_bar_shows_the_whole_recording_and_the_place_in_it() {
+    let place = |second: u64| {
+        let mut player = player();
+        player.seek(S(second));
+        let terminal = drawn(&player);
+        let bar = &terminal.backend().buffer().content[21 * 80..22 * 80];
+        let text: String = bar.iter().map(Cell::symbol).collect();
+        let names = ["PAD_ARMED", "AERO_DESCENT", "POWERED", "TOUCHDOWN"].map(|name| text.find(name));
+        assert!(names.iter().all(Option::is_some) && names.is_sorted(), "{text}");
+        bar.iter().position(|cell| cell.modifier.contains(Modifier::REVERSED)).expect("a mark")
+    };
+    assert_eq!([0, 30, 60].map(place), [1, 40, 78]);
+}
+
+/// The keys of the screen itself work in a replay.
+#[test]
+fn palette_filter_and_theme_work_in_a_replay() {
+    let mut player = player();
+    assert!(player.on_key(Key::Char('c')).contains(&Action::NextTheme));
+    for key in [Key::Char(':'), Key::Char('q'), Key::Char(' '), Key::Escape] {
+        assert!(!player.on_key(key).contains(&Action::Quit), "it is a letter of a text");
+    }
+    player.pass(S(3));
+    assert_eq!(player.position(), S(3), "the space did not pause it");
+    player.on_key(Key::Char('p'));
+    assert_eq!(player.model.page(), Page::Path);
 }

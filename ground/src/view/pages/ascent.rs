@@ -4,63 +4,40 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_DESCENT_DATA, TdBooster, TdPhase};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::titled;
+use super::flying::{self, of_descent};
 use crate::model::motion::Motion;
 use crate::model::vehicle::Sample;
 use crate::model::{Model, words};
+use crate::view::lost_position;
 use crate::view::number::{age_mark, row, text_row};
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{draw_lines, gauge, link_line, lost_position, side_view};
 
-/// Columns of the height gauge.
-const GAUGE_COLUMNS: u16 = 27;
-/// Columns of the values.
-const NUMBER_COLUMNS: u16 = 28;
-
-/// Draws the gauge on the left, the values in the middle, the side views on the right.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
-        Constraint::Length(GAUGE_COLUMNS),
-        Constraint::Length(NUMBER_COLUMNS),
-        Constraint::Fill(1),
-    ]));
-    let inside = titled("Height, m", theme, frame, gauge_area);
-    draw_lines(frame, inside, &gauge::lines(model, theme, now, usize::from(inside.height)));
-    let [numbers, below] = middle.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]));
-    let title = if lost_position::is_lost(model, now) { "PREDICTED, not heard" } else { "Ascent" };
-    let inside = titled(title, theme, frame, numbers);
-    draw_lines(frame, inside, &lines(model, theme, now));
-    draw_lines(frame, below, &[link_line::link(model, theme, now, usize::from(below.width))]);
-    for (from, title, area) in side_view::pictures(model, right) {
-        let inside = titled(title, theme, frame, area);
-        side_view::draw(model, (side_view::FlightPart::Whole, from), theme, now, frame, inside);
-    }
+    let values = values(model, theme, now);
+    flying::draw(model, ("Ascent", values), false, theme, now, frame, area);
+}
+
+/// For small screens: the values, with height and speed, which have no headline there.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = values(model, theme, now);
+    flying::insert_height(&mut lines, model, theme, now);
+    lines
 }
 
 /// The values, the most important first.
-pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+fn values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = lost_position::rows(model, theme, now);
-    let descent = model.vehicle.descent.as_ref();
     let motion = model.vehicle.best_motion();
-    let of = |pick: fn(&TD_DESCENT_DATA) -> f32| {
-        descent
-            .map(|d| Sample { value: f64::from(pick(&d.value)), received_at: d.received_at })
-            .filter(|sample| sample.value.is_finite())
-    };
+    let of = |pick| of_descent(model, pick);
     lines.push(motor(model, theme, now));
-    // A prediction is shown above; a second height would be another value for the same quantity.
-    if !lost_position::is_lost(model, now) {
-        lines.push(row(theme, "height", model.vehicle.height_m(), 1, "m", now));
-        lines.push(row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
-    }
     lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
     lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
     let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
     lines.push(row(theme, "tilt", tilt, 1, "deg", now));
-    lines.push(booster(descent, theme, now));
+    lines.push(booster(model.vehicle.descent.as_ref(), theme, now));
     let horizontal = motion.map(|motion| motion.map(Motion::horizontal_m_s));
     let distance = motion.map(|motion| motion.map(Motion::distance_m));
     lines.push(row(theme, "horizontal", horizontal, 1, "m/s", now));

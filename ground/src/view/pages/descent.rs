@@ -4,85 +4,63 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_DESCENT_DATA, TdChute};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::titled;
+use super::flying::{self, of_descent};
+use crate::model::motion::Motion;
 use crate::model::vehicle::Sample;
 use crate::model::{Model, words};
-use crate::view::number::{age_mark, row, text_row};
+use crate::view::lost_position;
+use crate::view::number::{age_mark, fixed, row, text_row};
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{draw_lines, fins, gauge, link_line, lost_position, side_view};
 
-/// Columns of the height gauge.
-const GAUGE_COLUMNS: u16 = 27;
-/// Columns of the values.
-const NUMBER_COLUMNS: u16 = 28;
-/// Rows of the values, with their title.
-const NUMBER_ROWS: u16 = 18;
-
-/// Draws the gauge on the left, the values in the middle, fins and side view on the right.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
-        Constraint::Length(GAUGE_COLUMNS),
-        Constraint::Length(NUMBER_COLUMNS),
-        Constraint::Fill(1),
-    ]));
-    let inside = titled("Height, m", theme, frame, gauge_area);
-    draw_lines(frame, inside, &gauge::lines(model, theme, now, usize::from(inside.height)));
-    let [numbers, below] =
-        middle.layout(&Layout::vertical([Constraint::Length(NUMBER_ROWS), Constraint::Fill(1)]));
-    let title = if lost_position::is_lost(model, now) { "PREDICTED, not heard" } else { "Descent" };
-    let inside = titled(title, theme, frame, numbers);
-    draw_lines(frame, inside, &lines(model, theme, now));
-    draw_lines(frame, below, &[link_line::link(model, theme, now, usize::from(below.width))]);
-    let [fin_area, picture] =
-        right.layout(&Layout::vertical([Constraint::Length(fins::ROWS + 1), Constraint::Fill(1)]));
-    let inside = titled(&fins::title(model, now), theme, frame, fin_area);
-    fins::draw(model, theme, now, frame, inside);
-    for (from, title, area) in side_view::pictures(model, picture) {
-        let inside = titled(title, theme, frame, area);
-        side_view::draw(model, (side_view::FlightPart::Whole, from), theme, now, frame, inside);
-    }
+    let values = values(model, theme, now);
+    flying::draw(model, ("Descent", values), true, theme, now, frame, area);
+}
+
+/// For small screens: the values, with height and speed, which have no headline there.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = values(model, theme, now);
+    flying::insert_height(&mut lines, model, theme, now);
+    lines
 }
 
 /// The values, the most important first.
-pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+fn values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = lost_position::rows(model, theme, now);
-    let descent = model.vehicle.descent.as_ref();
     let motion = model.vehicle.best_motion();
-    let of = |pick: fn(&TD_DESCENT_DATA) -> f32| {
-        descent
-            .map(|d| Sample { value: f64::from(pick(&d.value)), received_at: d.received_at })
-            .filter(|sample| sample.value.is_finite())
+    let of = |pick| of_descent(model, pick);
+    let of_motion = |pick: fn(&Motion) -> f64| {
+        motion.map(|motion| motion.map(pick)).filter(|sample| !sample.value.is_nan())
     };
-    let of_motion = |value: Option<f64>| {
-        value.zip(motion.map(|motion| motion.received_at)).map(|(value, at)| Sample::new(value, at))
-    };
-    lines.push(band_word(model, theme, now));
-    // A prediction is shown above; a second height would be another value for the same quantity.
-    if !lost_position::is_lost(model, now) {
-        lines.push(row(theme, "height", model.vehicle.height_m(), 1, "m", now));
-        lines.push(row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
-    }
     let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
+    lines.push(band_word(model, theme, now));
     lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
     lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
-    lines.push(row(theme, "band high", of(|d| d.band_high_m), 1, "m", now));
-    lines.push(row(theme, "band low", of(|d| d.band_low_m), 1, "m", now));
+    lines.push(band(model.vehicle.descent.as_ref(), theme, now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
-    lines.push(chute(descent, theme, now));
-    let attitude = model.vehicle.attitude;
-    let tilt = attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
-    lines.push(row(theme, "horizontal", of_motion(motion.map(|m| m.value.horizontal_m_s())), 1, "m/s", now));
-    lines.push(row(theme, "distance", of_motion(motion.map(|m| m.value.distance_m())), 1, "m", now));
+    lines.push(chute(model.vehicle.descent.as_ref(), theme, now));
+    let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "distance", of_motion(Motion::distance_m), 1, "m", now));
+    lines.push(row(theme, "horizontal", of_motion(Motion::horizontal_m_s), 1, "m/s", now));
     lines.push(row(theme, "tilt", tilt, 1, "deg", now));
-    lines.push(row(theme, "wind", wind_speed(descent), 1, "m/s", now));
-    lines.push(row(theme, "wind from", wind_from(descent), 0, "deg", now));
+    lines.push(row(theme, "wind", wind_speed(model.vehicle.descent.as_ref()), 1, "m/s", now));
+    lines.push(row(theme, "wind from", wind_from(model.vehicle.descent.as_ref()), 0, "deg", now));
     lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
     lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
     lines
+}
+
+/// The heights from which a burn lands.
+fn band(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
+    let known = descent.filter(|d| d.value.band_low_m.is_finite() && d.value.band_high_m.is_finite());
+    let Some(descent) = known else { return text_row(theme, "band", " ", "--", TextRole::Label, "m") };
+    let (mark, role) = age_mark(descent, now);
+    let (low_m, high_m) = (f64::from(descent.value.band_low_m), f64::from(descent.value.band_high_m));
+    text_row(theme, "band", mark, &format!("{}..{}", fixed(low_m, 0), fixed(high_m, 0)), role, "m")
 }
 
 /// Compares the height with the ignition band and the commit height, in words.

@@ -1,29 +1,59 @@
-//! The help page: the keys and the marks.
+//! The help page: the keys that work now, and the marks.
 
-use ratatui::text::Line;
+use std::time::Duration;
 
-pub fn lines() -> Vec<Line<'static>> {
-    [
-        " A               open the arming dialog (step 1);",
-        "                 then type ARM and Enter within 10 s (step 2)",
-        " S               start the countdown: then START and Enter within 10 s",
-        " D, Enter        disarm",
-        " Ctrl-X Enter    ABORT, from anywhere: Enter within 2 s, or Ctrl-X again;",
-        "                 a held key is one press. Sent until the vehicle has latched it",
-        " Space           acknowledge the shown alarm; 9 lists them, Up Down choose",
-        " 1 to 9          show a page and hold it; h holds the present one; ? this help",
-        " 0 or Esc        follow the flight again",
-        " Up Down PgUp PgDn Home End   scroll a list",
-        " Ctrl-L          draw the screen again",
-        " In a replay: Space, Left, Right, [ and ] (phases), + and - (speed), g, G",
-        " q, Ctrl-C       quit; armed or in flight only with QUIT and Enter",
-        " ~ before a value: older than 1.5 s. Commanded, acknowledged and",
-        " observed are three facts; armed is what HEARTBEAT says.",
-        " o command, # actual. The line is flown, the dots are planned. After a loss",
-        " of the link, + is the PREDICTED position, with a circle that contains it in",
-        " 19 of 20 cases. Fins: N is north, P points to the pad. * computed on ground.",
-    ]
-    .into_iter()
-    .map(Line::raw)
-    .collect()
+use ratatui::text::{Line, Span};
+
+use crate::model::Model;
+use crate::model::act::{Act, DEFINITIONS};
+use crate::model::palette::ABORT_WORDS;
+use crate::view::theme::{TextRole, Theme};
+
+/// Columns of a key.
+const KEY_COLUMNS: usize = 13;
+
+const REPLAY: [(&str, &str); 4] = [
+    ("Space", "pause, or go on"),
+    ("Left Right", "5 s back or forward"),
+    ("[ ]", "to the phase before or after; g G to the begin or end"),
+    ("+ -", "faster or slower"),
+];
+
+const MARKS: [&str; 4] = [
+    "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed",
+    "on the ground. Commanded, acknowledged and observed are three facts; armed is",
+    "what HEARTBEAT says. Without link, + is the PREDICTED position, its circle",
+    "contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.",
+];
+
+/// The actions whose keys do something now; those that show a page in one line.
+pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let line = |key: String, words: &str| {
+        Line::from(vec![
+            Span::styled(format!(" {key:<KEY_COLUMNS$}"), theme.style(TextRole::Key)),
+            Span::styled(words.to_owned(), theme.style(TextRole::Plain)),
+        ])
+    };
+    let mut lines = Vec::new();
+    if model.settings.role.why_not_command().is_none() {
+        lines.push(line("Ctrl-X Enter".to_owned(), ABORT_WORDS));
+    }
+    if model.playing.is_some() {
+        lines.extend(REPLAY.map(|(key, words)| line(key.to_owned(), words)));
+    }
+    let keys = &model.settings.keys;
+    let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
+    for definition in works.filter(|definition| !matches!(definition.act, Act::Show(_))) {
+        lines.push(line(keys.name(definition.act), definition.words));
+    }
+    let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
+        Act::Show(page) => Some(format!("{} {}", keys.name(definition.act), page.name())),
+        _ => None,
+    });
+    let pages: Vec<String> = pages.collect();
+    for part in pages.chunks(7) {
+        lines.push(line("pages".to_owned(), &part.join("  ")));
+    }
+    lines.extend(MARKS.map(|mark| Line::styled(format!(" {mark}"), theme.style(TextRole::Label))));
+    lines
 }

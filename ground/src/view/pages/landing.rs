@@ -6,35 +6,64 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::titled;
+use super::{is_roomy, titled};
 use crate::model::Model;
-use crate::model::motion::BodySpeed;
+use crate::model::motion::{BodySpeed, Motion};
 use crate::model::vehicle::Sample;
-use crate::view::number::{STALE_MARK, fixed};
+use crate::view::number::{STALE_MARK, fixed, row};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
-    actuators, big_letters, controller, draw_lines, event_list, flight, link_line, lost_position, side_view,
-    top_lines, touchdown,
+    actuators, controller, draw_lines, event_list, flight, foremost, headline, link_line, lost_position,
+    side_view, top_lines, touchdown,
 };
 
-/// Rows of the three panels at the top, with their title.
+/// Rows of the panels, with their title.
 const PANEL_ROWS: u16 = 9;
-/// Rows of the actuators, with their title.
-const ACTUATOR_ROWS: u16 = 5;
 /// Columns left of the side view at 80 columns.
 const LEFT_COLUMNS: u16 = 54;
+/// Rows of the events on a larger screen, with their title, if fewer than the second number are left.
+const EVENT_ROWS: u16 = 8;
+const TALL_ROWS: u16 = 24;
+/// Rows of the fins on a larger screen, with their title.
+const FIN_ROWS: u16 = 5;
 
-/// Draws the panels.
+/// Draws the headline, the panels, the events and the side view.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [panels, below] =
-        area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS), Constraint::Fill(1)]));
-    draw_panels(model, theme, now, frame, panels);
-    let left_columns = LEFT_COLUMNS.max(area.width * 3 / 5);
-    let [left, right] =
-        below.layout(&Layout::horizontal([Constraint::Length(left_columns), Constraint::Fill(1)]));
-    draw_left(model, theme, now, frame, left);
+    let first =
+        if model.vehicle.verdict.is_some() { foremost::verdict(model) } else { foremost::burn(model, now) };
+    let roomy = is_roomy(area);
+    let area = headline::draw(&first, theme, frame, area);
+    let (left, right) = if roomy {
+        let [panels, below] =
+            area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS + 1), Constraint::Fill(1)]));
+        let [flight, landing, actuators] = panels.layout(&Layout::horizontal([Constraint::Fill(1); 3]));
+        draw_flight(model, theme, now, frame, flight);
+        draw_touchdown(model, theme, now, frame, landing);
+        draw_actuators(model, theme, now, frame, actuators);
+        let [events, right] = below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
+        // On a middling screen the newest are enough: a change of page should not fill a slow line.
+        let rows = if events.height < TALL_ROWS { EVENT_ROWS } else { events.height };
+        (Rect { height: events.height.min(rows), ..events }, right)
+    } else {
+        let [left, right] =
+            area.layout(&Layout::horizontal([Constraint::Length(LEFT_COLUMNS), Constraint::Fill(1)]));
+        let [panels, events] =
+            left.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS), Constraint::Fill(1)]));
+        let [landing, flight] =
+            panels.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+        draw_touchdown(model, theme, now, frame, landing);
+        draw_essentials(model, theme, now, frame, flight);
+        (events, right)
+    };
+    let inside = titled("Events", theme, frame, left);
+    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &lines);
+    draw_pictures(model, theme, now, frame, right);
+}
+
+fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows = if lost_position::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
-    for (from, title, area) in side_view::pictures(model, right) {
+    for (from, title, area) in side_view::pictures(model, area) {
         let title = match from {
             side_view::Viewpoint::East => format!("{title}: {shows}"),
             side_view::Viewpoint::South => format!("{title}: flown"),
@@ -44,51 +73,49 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     }
 }
 
-fn draw_panels(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [first, second, third] =
-        area.layout(&Layout::horizontal([Constraint::Fill(27), Constraint::Fill(26), Constraint::Fill(27)]));
+/// Altitude, speeds and attitude; after the loss of the link the predicted position.
+fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if lost_position::is_lost(model, now) {
-        let inside = titled("PREDICTED, not heard", theme, frame, first);
+        let inside = titled("PREDICTED, not heard", theme, frame, area);
         draw_lines(frame, inside, &lost_position::rows(model, theme, now));
     } else {
-        let inside = titled("Flight", theme, frame, first);
-        draw_lines(frame, inside, &flight::rows(model, theme, now));
+        let inside = titled("Flight", theme, frame, area);
+        let mut rows = controller::rows(model, theme, now);
+        rows.truncate(1);
+        rows.extend(flight::rows(model, theme, now));
+        draw_lines(frame, inside, &rows);
     }
-    let inside = titled("NMPC", theme, frame, second);
-    draw_lines(frame, inside, &controller::rows(model, theme, now));
+}
+
+fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (title, rows) = touchdown::panel(model, theme, now);
-    let inside = titled(title, theme, frame, third);
+    let inside = titled(title, theme, frame, area);
     draw_lines(frame, inside, &rows);
 }
 
-fn draw_left(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [actuators, link, events] = area.layout(&Layout::vertical([
-        Constraint::Length(ACTUATOR_ROWS),
-        Constraint::Length(1),
-        Constraint::Fill(1),
-    ]));
-    if let Some(verdict) = model.vehicle.verdict {
-        draw_verdict(verdict.value.landed, theme, frame, actuators);
-    } else {
-        let [fins, gimbal] =
-            actuators.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
-        let inside = titled("Fins command|actual", theme, frame, fins);
-        draw_lines(frame, inside, &actuators::fin_rows(model, theme, now));
-        let inside = titled("Gimbal", theme, frame, gimbal);
-        draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
+/// Who steers, how upright, and the gimbal against its limit.
+fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    if lost_position::is_lost(model, now) {
+        return draw_flight(model, theme, now, frame, area);
     }
-    frame.render_widget(link_line::link(model, theme, now, usize::from(link.width)), link);
-    let inside = titled("Events", theme, frame, events);
-    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    let inside = titled("Steering", theme, frame, area);
+    let mut lines: Vec<Line> = controller::rows(model, theme, now).into_iter().take(1).collect();
+    let vehicle = &model.vehicle;
+    let tilt = vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "tilt", tilt, 2, "deg", now));
+    let motion = vehicle.best_motion();
+    lines.push(row(theme, "horizontal", motion.map(|m| m.map(Motion::horizontal_m_s)), 2, "m/s", now));
+    lines.push(row(theme, "distance", motion.map(|m| m.map(Motion::distance_m)), 1, "m", now));
+    lines.extend(actuators::gimbal_rows(model, theme, now));
     draw_lines(frame, inside, &lines);
 }
 
-fn draw_verdict(landed: bool, theme: Theme, frame: &mut Frame, area: Rect) {
-    let word = if landed { "LANDED" } else { "NOT LANDED" };
-    let role = if landed { TextRole::Good } else { TextRole::Caution };
-    let lines = big_letters::word(word).map(|line| Line::styled(format!(" {line}"), theme.style(role)));
-    let below = Rect { y: area.y + 1, height: area.height.saturating_sub(1), ..area };
-    draw_lines(frame, below, &lines);
+fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [fins, gimbal] = area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
+    let inside = titled("Fins command|actual", theme, frame, fins);
+    draw_lines(frame, inside, &actuators::fin_rows(model, theme, now));
+    let inside = titled("Gimbal", theme, frame, gimbal);
+    draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
 }
 
 /// The same content as lines, the most important first.

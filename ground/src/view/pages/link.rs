@@ -13,6 +13,7 @@ use crate::model::link::LinkReport;
 use crate::model::link_state::LinkState;
 use crate::model::uplink::refusal;
 use crate::model::vehicle::STALE_AFTER;
+use crate::view::filter;
 use crate::view::link_line::{link, percent};
 use crate::view::number::{STALE_MARK, seconds};
 use crate::view::theme::{TextRole, Theme};
@@ -57,6 +58,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
         theme.style(TextRole::Title),
     ));
+    lines.extend(filter::line(model, theme));
     lines.extend(age_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
@@ -254,5 +256,6 @@ fn ages(model: &Model, now: Duration) -> Vec<(&'static str, Option<Duration>)> {
         .iter()
         .map(|name| (*name, age(*name)))
         .chain(others.map(|(name, age)| (*name, Some(*age))))
+        .filter(|(name, _)| model.pages.lets_pass(name))
         .collect()
 }

@@ -3,6 +3,7 @@
 pub mod alarms;
 pub mod ascent;
 pub mod descent;
+pub mod flying;
 pub mod help;
 pub mod landing;
 pub mod link;
@@ -10,7 +11,10 @@ pub mod log;
 pub mod messages;
 pub mod pad;
 pub mod parameters;
+pub mod path;
+pub mod plot;
 pub mod review;
+pub mod values;
 
 use std::time::Duration;
 
@@ -31,6 +35,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         Page::Ascent => ascent::draw(model, theme, now, frame, area),
         Page::Descent => descent::draw(model, theme, now, frame, area),
         Page::Landing => landing::draw(model, theme, now, frame, area),
+        Page::Review => review::draw(model, theme, now, frame, area),
+        Page::Path => path::draw(model, theme, now, frame, area),
+        Page::Values => values::draw(model, theme, now, frame, area),
+        Page::Plot => plot::draw(model, theme, now, frame, area),
         page => {
             let inside = titled(page.name(), theme, frame, area);
             draw_lines(frame, inside, &lines(model, page, theme, now, inside));
@@ -52,7 +60,10 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Parameters => parameters::lines(model, theme, rows),
         Page::Log => log::lines(model, theme, now),
         Page::Alarms => alarms::lines(model, theme, now, columns, rows),
-        Page::Help => help::lines(),
+        Page::Path => path::lines(model, theme, now),
+        Page::Values => values::lines(model, theme, now),
+        Page::Plot => plot::lines(model, theme, now),
+        Page::Help => help::lines(model, theme, now),
     }
 }
 
@@ -63,6 +74,11 @@ pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect 
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
     inside
+}
+
+/// From this size on a page has room for more than the essentials.
+fn is_roomy(area: Rect) -> bool {
+    area.width >= 120 && area.height >= 24
 }
 
 /// This many lines from a start line on.

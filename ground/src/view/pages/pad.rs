@@ -7,42 +7,78 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::titled;
+use super::{is_roomy, titled};
 use crate::model::Model;
+use crate::model::act::Act;
 use crate::model::command::CommandKind;
 use crate::model::vehicle::{Vehicle, is_on_pad};
 use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{draw_lines, event_list, flight, link_line, next_event, top_lines};
+use crate::view::{
+    actuators, draw_lines, event_list, flight, foremost, headline, link_line, next_event, side_view,
+    top_lines,
+};
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
-/// Rows of the checks, with title and summary.
-const CHECK_ROWS: u16 = 16;
-/// Rows of the ladder, with its title.
-const LADDER_ROWS: u16 = 10;
+/// Rows of the checks, with their title.
+const CHECK_ROWS: u16 = 15;
+/// Rows of GO or NO-GO at 80 columns, with a title.
+const GO_ROWS: u16 = 5;
+/// Columns of the ladder on a larger screen.
+const LADDER_COLUMNS: u16 = 40;
 
-/// Draws checks and ladder side by side, the events below.
+/// Draws GO or NO-GO, the checks and the ladder, the events below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [upper, events] =
-        area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
-    let columns = CHECK_COLUMNS.max(area.width / 2);
-    let [left, right] = upper.layout(&Layout::horizontal([Constraint::Length(columns), Constraint::Fill(1)]));
-    let inside = titled("Arming checks", theme, frame, left);
+    let foremost = foremost::pad(model, now);
+    let (checks_area, ladder_area, events) = if is_roomy(area) {
+        let area = headline::draw(&foremost, theme, frame, area);
+        let [upper, below] =
+            area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS + 1), Constraint::Fill(1)]));
+        let [left, middle, right] = upper.layout(&Layout::horizontal([
+            Constraint::Length(CHECK_COLUMNS + 4),
+            Constraint::Length(LADDER_COLUMNS),
+            Constraint::Fill(1),
+        ]));
+        draw_now(model, theme, now, frame, right);
+        let [events, picture] = below.layout(&Layout::horizontal([Constraint::Fill(3), Constraint::Fill(2)]));
+        draw_rehearsal(model, theme, now, frame, picture);
+        (left, middle, events)
+    } else {
+        let [upper, events] =
+            area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
+        let [left, right] =
+            upper.layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
+        let [go, ladder] =
+            right.layout(&Layout::vertical([Constraint::Length(GO_ROWS), Constraint::Fill(1)]));
+        let inside = titled("Now", theme, frame, go);
+        headline::draw(&foremost, theme, frame, inside);
+        (left, ladder, events)
+    };
+    let inside = titled(&summary(model, now).0, theme, frame, checks_area);
     draw_lines(frame, inside, &checks(model, theme, now));
-    let [ladder_area, picture] =
-        right.layout(&Layout::vertical([Constraint::Length(LADDER_ROWS), Constraint::Fill(1)]));
     let inside = titled("Arming ladder", theme, frame, ladder_area);
     draw_lines(frame, inside, &ladder(model, theme, now));
-    let inside = titled("Now", theme, frame, picture);
-    let mut lines = flight::rows(model, theme, now);
-    lines.truncate(2);
-    lines.push(link_line::link(model, theme, now, usize::from(inside.width)));
-    draw_lines(frame, inside, &lines);
     let inside = titled("Events", theme, frame, events);
     let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
+}
+
+/// The state of the vehicle and of the link.
+fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = titled("Now", theme, frame, area);
+    let mut lines = flight::rows(model, theme, now);
+    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
+    lines.push(link_line::link(model, theme, now, usize::from(inside.width)));
+    draw_lines(frame, inside, &lines);
+}
+
+/// The landing that the vehicle has planned on the pad.
+fn draw_rehearsal(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = titled("Rehearsed landing: plan", theme, frame, area);
+    let seen = (side_view::FlightPart::Burn, side_view::Viewpoint::East);
+    side_view::draw(model, seen, theme, now, frame, inside);
 }
 
 /// Failing checks first, because a small screen must show them.
@@ -52,6 +88,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         Some(_) => Vec::new(),
         None => vec![top_lines::command(model, theme, now)],
     };
+    let (words, role) = summary(model, now);
+    lines.push(Line::styled(format!(" {words}"), theme.style(role)));
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
@@ -67,7 +105,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let status = model.vehicle.status.as_ref().filter(|_| !off_pad);
     let stale = status.is_some_and(|status| status.is_stale(now));
-    let mut lines: Vec<Line> = TdCheck::all()
+    TdCheck::all()
         .iter_names()
         .map(|(name, bit)| {
             let (word, role) = match status {
@@ -91,25 +129,24 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
                 Span::styled(reason, theme.style(TextRole::Caution)),
             ])
         })
-        .collect();
-    let summary = match status {
-        None if off_pad => {
-            Line::styled(" off the pad nothing is checked for arming", theme.style(TextRole::Label))
-        }
-        None => Line::styled(" the vehicle has not reported its checks", theme.style(TextRole::Caution)),
-        Some(status) if stale || status.value.checks_failed.is_empty() => {
-            top_lines::readiness(model, theme, now).unwrap_or_default()
+        .collect()
+}
+
+/// Whether the checks pass, in words.
+fn summary(model: &Model, now: Duration) -> (String, TextRole) {
+    let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
+    match model.vehicle.status.as_ref() {
+        _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
+        None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
+        Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {
+            top_lines::readiness(model, now).unwrap_or_default()
         }
         Some(status) => {
-            let count = status.value.checks_failed.iter_names().count();
-            Line::styled(
-                format!(" NO-GO: {count} of {} checks fail", lines.len()),
-                theme.style(TextRole::Alarm),
-            )
+            let failing = status.value.checks_failed.iter_names().count();
+            let all = TdCheck::all().iter_names().count();
+            (format!("NO-GO: {failing} of {all} checks fail"), TextRole::Alarm)
         }
-    };
-    lines.insert(0, summary);
-    lines
+    }
 }
 
 /// Prints the name of a bit as it is.
@@ -203,14 +240,15 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
     let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
     let counting = vehicle.countdown_s().is_some();
+    let keys = &model.settings.keys;
     let rungs = [
-        (model.link.state(now).carries(), "the vehicle is heard"),
-        (model.link.uplink.is_proven(now), "it hears us: uplink proven"),
-        (pin_out, "pin out (first inhibit)"),
-        (checked, "every check passes"),
-        (armed, "A, then ARM Enter (10 s)"),
-        (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT"),
-        (counting, "S, then START Enter (10 s)"),
+        (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
+        (model.link.uplink.is_proven(now), "it hears us: uplink proven".to_owned()),
+        (pin_out, "pin out (first inhibit)".to_owned()),
+        (checked, "every check passes".to_owned()),
+        (armed, format!("{}, then ARM Enter (10 s)", keys.name(Act::Arm))),
+        (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
+        (counting, format!("{}, then START Enter (10 s)", keys.name(Act::Start))),
     ];
     let mut lines: Vec<Line> = rungs
         .into_iter()
@@ -225,7 +263,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(match model.settings.role.why_not_command() {
         Some(why) => Line::styled(format!(" {why}"), theme.style(TextRole::Label)),
         None => Line::from(vec![
-            Span::styled(" D", theme.style(TextRole::Key)),
+            Span::styled(format!(" {}", keys.name(Act::Disarm)), theme.style(TextRole::Key)),
             Span::styled(" disarm   ", theme.style(TextRole::Label)),
             Span::styled(top_lines::ABORT_KEY, theme.style(TextRole::Key)),
             Span::styled(" ABORT", theme.style(TextRole::Label)),

@@ -4,6 +4,7 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
+use crate::view::filter;
 use crate::view::number::shortest;
 use crate::view::theme::{TextRole, Theme};
 
@@ -23,8 +24,10 @@ pub fn lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
         Span::styled("   r", theme.style(TextRole::Key)),
         Span::styled(" asks the vehicle again; read-only here", theme.style(TextRole::Label)),
     ]);
+    let head = filter::line(model, theme).unwrap_or(head);
     let list: Vec<Line> = parameters
         .iter()
+        .filter(|(name, _)| model.pages.lets_pass(name))
         .map(|(name, value)| {
             Line::from(vec![
                 Span::styled(format!("  {name:<18}"), theme.style(TextRole::Label)),

@@ -2,17 +2,48 @@
 
 use std::time::Duration;
 
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
+use super::{is_roomy, path, titled};
 use crate::model::{Model, words};
 use crate::view::number::fixed;
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{touchdown, verdict};
+use crate::view::{draw_lines, event_list, foremost, headline, touchdown, verdict};
 
 /// Columns of the predicted touchdown beside the greatest values.
 const PLAN_COLUMNS: usize = 37;
 /// Columns of the greatest values.
 const MAXIMA_COLUMNS: usize = 34;
+/// Columns of a phase with its time.
+const TIMELINE_COLUMNS: usize = 24;
+/// Rows of verdict, limits and timeline on a larger screen.
+const TABLE_ROWS: u16 = 17;
+/// Columns of them on a larger screen; the events are beside them.
+const TABLE_COLUMNS: u16 = 80;
+
+/// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let roomy = is_roomy(area);
+    let area = headline::draw(&foremost::verdict(model), theme, frame, area);
+    let columns = if roomy { TABLE_COLUMNS } else { area.width };
+    let mut lines = lines(model, theme, now, usize::from(columns));
+    if !roomy {
+        // The bar of the flight below shows the phases too.
+        lines.truncate(usize::from(area.height));
+        return draw_lines(frame, area, &lines);
+    }
+    let [table, pictures] =
+        area.layout(&Layout::vertical([Constraint::Length(TABLE_ROWS), Constraint::Fill(1)]));
+    let [left, right] =
+        table.layout(&Layout::horizontal([Constraint::Length(TABLE_COLUMNS), Constraint::Fill(1)]));
+    draw_lines(frame, left, &lines);
+    let inside = titled("Events", theme, frame, right);
+    let events = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &events);
+    path::draw(model, theme, now, frame, pictures);
+}
 
 /// The verdict, then limits and greatest values, then the timeline.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
@@ -37,12 +68,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<
         lines.extend(limits);
         lines.extend(maxima);
     }
-    lines.push(Line::styled(
-        " leg load   no data: the vehicle does not report it",
-        theme.style(TextRole::Label),
-    ));
     lines.push(Line::styled(" Timeline", theme.style(TextRole::Title)));
-    lines.extend(timeline(model, theme));
+    lines.extend(timeline(model, theme, columns));
     lines
 }
 
@@ -90,7 +117,7 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
 }
 
 /// Each phase and when it began, several on a line.
-fn timeline(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+fn timeline(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let entries: Vec<String> = model
         .history
         .timeline
@@ -100,5 +127,8 @@ fn timeline(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     if entries.is_empty() {
         return vec![Line::styled("  nothing heard", theme.style(TextRole::Label))];
     }
-    entries.chunks(3).map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain))).collect()
+    entries
+        .chunks((columns / TIMELINE_COLUMNS).max(1))
+        .map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain)))
+        .collect()
 }

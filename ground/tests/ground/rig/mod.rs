@@ -1,5 +1,6 @@
 //! A test rig: a model, a simulated clock, and a vehicle that exists only as frames.
 
+pub(crate) mod svg;
 mod telemetry;
 
 use std::time::Duration;
@@ -8,7 +9,7 @@ use ground::key::Key;
 use ground::model::key_timing::KeyTiming;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
-use ground::view::theme::Theme;
+use ground::view::theme::{Palette, Theme};
 use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
@@ -24,7 +25,7 @@ use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 
-pub(crate) const MONO: Theme = Theme { colour: false, ascii: false };
+pub(crate) const MONO: Theme = Theme { palette: Palette::None, ascii: false };
 
 pub(crate) struct Rig {
     pub(crate) model: Model,
@@ -285,7 +286,7 @@ impl Rig {
     /// The styles of the same screen, one letter per cell, with a legend of the letters that occur. Plain cells at
     /// the end of a line are left out.
     pub(crate) fn styles(&self, columns: u16, rows: u16) -> String {
-        let terminal = self.draw(columns, rows, Theme { colour: true, ascii: false });
+        let terminal = self.draw(columns, rows, Theme { palette: Palette::Sixteen, ascii: false });
         let cells = &terminal.backend().buffer().content;
         let letters: Vec<String> =
             cells.chunks(usize::from(columns)).map(|line| line.iter().map(letter).collect()).collect();

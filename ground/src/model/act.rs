@@ -1,0 +1,105 @@
+//! Everything that one key does, with its name in the settings, its usual key and its words.
+//!
+//! The abort is not among them: its keys cannot be changed. What commands the vehicle only opens a dialog.
+
+use std::time::Duration;
+
+use super::page::Page;
+use super::{Model, Role, permits};
+use crate::key::Key;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// Open the dialog that arms.
+    Arm,
+    /// Open the dialog that starts the countdown.
+    Start,
+    /// Open the dialog that disarms.
+    Disarm,
+    Acknowledge,
+    Show(Page),
+    Hold,
+    Follow,
+    Filter,
+    Palette,
+    Pin,
+    NextTheme,
+    AskParameters,
+    Redraw,
+    Quit,
+}
+
+/// An action, its name in the settings, its usual key, and what it does.
+pub struct Definition {
+    pub act: Act,
+    pub name: &'static str,
+    pub usual: Key,
+    pub words: &'static str,
+}
+
+const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -> Definition {
+    Definition { act, name, usual, words }
+}
+
+/// Every action; the most important first.
+pub const DEFINITIONS: [Definition; 26] = [
+    define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
+    define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
+    define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
+    define(Act::Acknowledge, "acknowledge", Key::Char(' '), "acknowledge the shown alarm"),
+    define(Act::Show(Page::Pad), "pad", Key::Char('1'), "page: arming checks and ladder"),
+    define(Act::Show(Page::Descent), "flight", Key::Char('2'), "page: ascent and descent"),
+    define(Act::Show(Page::Landing), "landing", Key::Char('3'), "page: the burn"),
+    define(Act::Show(Page::Review), "review", Key::Char('4'), "page: verdict, greatest values, timeline"),
+    define(Act::Show(Page::Link), "link", Key::Char('5'), "page: link rates and the age of every message"),
+    define(Act::Show(Page::Messages), "texts", Key::Char('6'), "page: events and messages"),
+    define(Act::Show(Page::Parameters), "parameters", Key::Char('7'), "page: parameters of the vehicle"),
+    define(Act::Show(Page::Log), "log", Key::Char('8'), "page: the recording"),
+    define(Act::Show(Page::Alarms), "alarms", Key::Char('9'), "page: every alarm"),
+    define(Act::Show(Page::Path), "path", Key::Char('p'), "page: the flight from two sides and from above"),
+    define(
+        Act::Show(Page::Values),
+        "values",
+        Key::Char('v'),
+        "page: every value, with the solver's residuals",
+    ),
+    define(Act::Show(Page::Plot), "plot", Key::Char('t'), "page: one number over time"),
+    define(Act::Show(Page::Help), "help", Key::Char('?'), "page: the keys that work now"),
+    define(Act::Hold, "hold", Key::Char('h'), "hold this page, or follow the flight again"),
+    define(Act::Follow, "follow", Key::Char('0'), "follow the flight again (Esc does too)"),
+    define(Act::Filter, "filter", Key::Char('/'), "show only events, messages or parameters with a text"),
+    define(Act::Palette, "palette", Key::Char(':'), "list every action; type a part of its words"),
+    define(Act::Pin, "pin", Key::Char('i'), "pin the plotted number to every page, or remove it"),
+    define(Act::NextTheme, "theme", Key::Char('c'), "colours: dark, light for sunlight, 16, none, contrast"),
+    define(Act::AskParameters, "ask", Key::Char('r'), "ask the vehicle for its parameters again"),
+    define(Act::Redraw, "redraw", Key::CtrlL, "draw the screen again"),
+    define(Act::Quit, "quit", Key::Char('q'), "quit; armed or in flight: then type QUIT and Enter"),
+];
+
+impl Act {
+    /// Whether the key would do something now.
+    pub fn works(self, model: &Model, now: Duration) -> bool {
+        let commands = model.settings.role.why_not_command().is_none();
+        match self {
+            Self::Arm => commands && permits::why_not_arm(model, now).is_none(),
+            Self::Start => commands && permits::why_not_start(model, now).is_none(),
+            Self::Disarm => commands && model.vehicle.armed().is_some_and(|armed| armed.value),
+            Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
+            Self::Follow => model.pages.held.is_some(),
+            Self::Pin => matches!(model.page(), Page::Plot),
+            Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
+            Self::Show(_)
+            | Self::Hold
+            | Self::Filter
+            | Self::Palette
+            | Self::NextTheme
+            | Self::Redraw
+            | Self::Quit => true,
+        }
+    }
+
+    /// Whether it opens a dialog that commands the vehicle.
+    pub fn opens_ladder(self) -> bool {
+        matches!(self, Self::Arm | Self::Start | Self::Disarm)
+    }
+}

@@ -1,0 +1,86 @@
+//! Every quantity over time, in a bounded number of rows: the recent past in full, the distant past in steps.
+
+use std::time::Duration;
+
+use super::flown_path::every_second;
+use super::quantity::{ALL, COUNT, Quantity};
+use super::{Model, vehicle::is_flight};
+
+/// The most rows. When they are full, every second one is dropped.
+const ROWS_MAX: usize = 1_200;
+/// How often a row is added in flight, and otherwise.
+const FLIGHT_STEP: Duration = Duration::from_millis(200);
+const CALM_STEP: Duration = Duration::from_secs(1);
+
+/// The values of one moment, in the order of [`ALL`]; NaN where a value was unknown or stale.
+type Row = [f32; COUNT];
+
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    rows: Vec<(Duration, Row)>,
+}
+
+impl Trace {
+    /// When the next row is due.
+    fn due_at(&self, in_flight: bool) -> Duration {
+        let step = if in_flight { FLIGHT_STEP } else { CALM_STEP };
+        self.rows.last().map_or(Duration::ZERO, |(at, _)| *at + step)
+    }
+
+    /// The known values of a quantity from a time to another, oldest first.
+    pub fn values(
+        &self,
+        quantity: &Quantity,
+        from: Duration,
+        to: Duration,
+    ) -> impl Iterator<Item = (Duration, f64)> {
+        let place = quantity.place();
+        let inside = self.rows.iter().filter(move |(at, _)| (from..=to).contains(at));
+        inside.map(move |(at, row)| (*at, f64::from(row[place]))).filter(|(_, value)| value.is_finite())
+    }
+
+    fn push(&mut self, at: Duration, row: Row) {
+        if self.rows.len() >= ROWS_MAX {
+            every_second(&mut self.rows);
+        }
+        self.rows.push((at, row));
+    }
+}
+
+/// Adds a row with the present values, if one is due.
+pub(crate) fn note(model: &mut Model, now: Duration) {
+    let in_flight = model.vehicle.phase().is_some_and(|phase| is_flight(phase.value));
+    if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
+        return;
+    }
+    let row = std::array::from_fn(|place| {
+        let value = ALL[place].read(model, now).filter(|sample| !sample.is_stale(now));
+        value.map_or(f32::NAN, |sample| sample.value as f32)
+    });
+    model.history.trace.push(now, row);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_trace_stays_bounded_and_keeps_the_recent_past_in_full() {
+        let mut trace = Trace::default();
+        let height = Quantity::named("height").unwrap();
+        for second in 0..20_000_u32 {
+            let mut row = [f32::NAN; COUNT];
+            row[height.place()] = second as f32;
+            trace.push(Duration::from_secs(second.into()), row);
+        }
+        assert!(trace.rows.len() <= ROWS_MAX);
+        let last = |seconds: u64| {
+            let (from, to) = (Duration::from_secs(19_999 - seconds), Duration::from_secs(19_999));
+            trace.values(height, from, to).map(|(_, value)| value).collect::<Vec<_>>()
+        };
+        assert_eq!(last(2), [19_997.0, 19_998.0, 19_999.0]);
+        assert!(trace.values(height, Duration::ZERO, Duration::from_mins(250)).count() > 1);
+        let tilt = Quantity::named("tilt").unwrap();
+        assert_eq!(trace.values(tilt, Duration::ZERO, Duration::MAX).count(), 0, "NaN is no value");
+    }
+}

@@ -1,0 +1,223 @@
+//! The palette, the filter, pinned and plotted numbers, and keys of the crew's choice.
+
+use ground::key::Key;
+use ground::model::act::{Act, DEFINITIONS};
+use ground::model::dialog::Dialog;
+use ground::model::page::Page;
+use ground::model::palette::{self, Does};
+use ground::model::quantity;
+use ground::update::{Action, Msg};
+use proptest::prelude::*;
+
+use crate::rig::{Rig, is_abort, is_arm, settings, typed};
+use crate::screens::{armed, descending, on_the_pad, powered};
+
+/// Opens the palette, types a text and presses Enter.
+fn choose(rig: &mut Rig, text: &str) {
+    rig.keys(&[typed(":"), typed(text), vec![Key::Enter]].concat());
+}
+
+#[test]
+fn the_palette_lists_every_action_with_its_key() {
+    let rig = on_the_pad();
+    let listed = palette::found(&rig.model, "");
+    for definition in &DEFINITIONS {
+        let entry = listed.iter().find(|entry| entry.does == Does::Act(definition.act)).unwrap();
+        assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.usual.name()));
+    }
+    assert!(listed.iter().any(|entry| entry.does == Does::TellAbort && entry.key == "Ctrl-X"));
+    for quantity in &quantity::ALL {
+        assert!(listed.iter().any(|entry| entry.does == Does::Plot(quantity)));
+        assert!(listed.iter().any(|entry| entry.does == Does::Pin(quantity)));
+    }
+}
+
+#[test]
+fn an_entry_is_found_by_parts_of_its_words_and_does_what_its_key_does() {
+    let mut rig = on_the_pad();
+    rig.keys(&[typed(":"), typed("two SIDES")].concat());
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains(":two SIDES_") && screen.contains("1 found"), "{screen}");
+    rig.key(Key::Enter);
+    assert_eq!(rig.model.page(), Page::Path);
+    choose(&mut rig, "colours");
+    assert!(rig.actions.contains(&Action::NextTheme));
+    rig.keys(&[typed(":"), vec![Key::Escape]].concat());
+    assert_eq!((rig.model.pages.entry.clone(), rig.model.page()), (None, Page::Path), "Esc only closes it");
+}
+
+/// The palette opens the dialog of a ladder and goes no further: the word and Enter are still to be typed.
+#[test]
+fn the_palette_opens_a_ladder_and_does_not_shorten_it() {
+    let mut rig = on_the_pad();
+    choose(&mut rig, "type ARM");
+    assert!(matches!(&rig.model.dialog, Dialog::Arm { typed, .. } if typed.is_empty()));
+    assert!(rig.take_commands().is_empty(), "nothing is sent yet");
+    rig.keys(&[typed("ARM"), vec![Key::Enter]].concat());
+    assert!(rig.take_commands().iter().any(is_arm));
+}
+
+/// A held Enter that chose an entry must not confirm what the entry opened.
+#[test]
+fn a_held_enter_confirms_nothing_that_the_palette_opened() {
+    for text in ["disarm", "type ARM", "type START", "abort"] {
+        let mut rig = armed();
+        rig.take_commands();
+        rig.keys(&[typed(":"), typed(text)].concat());
+        rig.run(0.5);
+        rig.hold(Key::Enter, 250, 30, 2);
+        assert!(rig.take_commands().is_empty(), "{text}");
+    }
+}
+
+#[test]
+fn the_palette_only_tells_how_to_abort() {
+    let mut rig = powered();
+    rig.take_commands();
+    choose(&mut rig, "abort");
+    rig.key(Key::Enter);
+    rig.run(1.0);
+    assert!(rig.take_commands().is_empty());
+    assert!(rig.events().contains("press Ctrl-X, then Enter: only these keys abort"));
+}
+
+/// Whatever is open or chosen, Ctrl-X and Enter abort.
+#[test]
+fn the_abort_works_in_the_palette_and_in_the_filter() {
+    for opened in [typed(":"), typed("/pin"), typed(":arm"), typed("t")] {
+        let mut settings = settings(false, true);
+        settings.keys = "theme=x,path=X,filter=/".parse().unwrap();
+        let mut rig = Rig::new(settings);
+        rig.run(1.0);
+        rig.keys(&opened);
+        rig.abort();
+        assert!(rig.take_commands().iter().any(is_abort), "{opened:?}");
+    }
+}
+
+proptest! {
+    /// No keys in the palette send a command without the word of its ladder.
+    #[test]
+    fn nothing_typed_into_the_palette_commands_the_vehicle(
+        keys in prop::collection::vec(prop_oneof![
+            4 => (b'a'..=b'z').prop_map(|letter| Key::Char(char::from(letter))),
+            1 => Just(Key::Enter),
+            1 => Just(Key::Char(':')),
+            1 => Just(Key::Down),
+            1 => Just(Key::Escape),
+        ], 0..40),
+    ) {
+        let mut rig = on_the_pad();
+        for key in keys {
+            // The word of a ladder ends the attempt.
+            if rig.model.dialog.word().is_some() {
+                rig.key(Key::Escape);
+            }
+            rig.key(key);
+        }
+        prop_assert!(rig.commands().iter().all(|command| !is_arm(command) && !is_abort(command)));
+    }
+}
+
+#[test]
+fn other_keys_open_the_same_ladder() {
+    let mut settings = settings(false, true);
+    settings.keys = "arm=Z,theme=w".parse().unwrap();
+    let mut rig = Rig::new(settings);
+    rig.run(1.0);
+    rig.key(Key::Char('A'));
+    assert_eq!(rig.model.dialog, Dialog::Closed, "no longer its key");
+    assert!(rig.screen(80, 24).contains("Z, then ARM Enter"), "{}", rig.screen(80, 24));
+    rig.key(Key::Char('Z'));
+    rig.key(Key::Enter);
+    assert!(rig.take_commands().is_empty(), "the word is still needed");
+    rig.keys(&[typed("ZARM"), vec![Key::Enter]].concat());
+    assert!(rig.take_commands().iter().any(is_arm));
+    rig.key(Key::Char('w'));
+    assert!(rig.actions.contains(&Action::NextTheme));
+}
+
+#[test]
+fn the_filter_shows_only_what_fits() {
+    let mut rig = on_the_pad();
+    rig.text("igniter is open");
+    rig.text("battery is full");
+    rig.keys(&typed("/IGNIT"));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("[6Texts]") && screen.contains("/IGNIT_"), "{screen}");
+    let list = |screen: &str| screen.lines().skip(4).take(17).collect::<Vec<_>>().join("\n");
+    assert!(list(&screen).contains("igniter is open") && !list(&screen).contains("disarmed"), "{screen}");
+    rig.key(Key::Enter);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("FILTERED; Esc lists all") && !list(&screen).contains("disarmed"), "{screen}");
+    rig.key(Key::Char('5'));
+    assert!(rig.screen(80, 24).contains("FILTERED"), "the ages of messages are filtered too");
+    rig.keys(&[Key::Escape, Key::Char('6')]);
+    assert!(list(&rig.screen(80, 24)).contains("disarmed"));
+}
+
+#[test]
+fn any_number_can_be_pinned_and_plotted() {
+    let mut rig = descending();
+    choose(&mut rig, "unused words");
+    assert_eq!(rig.model.pages.pinned.len(), 0);
+    choose(&mut rig, "pin wind");
+    rig.key(Key::Char('5'));
+    assert!(rig.screen(80, 24).contains(" wind 3.0 m/s"), "{}", rig.screen(80, 24));
+    for quantity in &quantity::ALL {
+        rig.model.pages.pinned.clear();
+        choose(&mut rig, &format!("plot {}", quantity.name));
+        assert_eq!((rig.model.page(), rig.model.pages.plotted), (Page::Plot, quantity));
+        rig.key(Key::Char('i'));
+        assert_eq!(rig.model.pages.pinned, [quantity]);
+    }
+    rig.key(Key::Up);
+    assert_eq!(rig.model.pages.plotted.place(), quantity::COUNT - 2);
+}
+
+#[test]
+fn the_plot_has_round_ticks() {
+    let mut rig = descending();
+    for k in 0..40_u16 {
+        rig.state(4.0, 130.0 - f32::from(k), 0.0, -10.0, 88.0);
+        rig.run(0.1);
+    }
+    choose(&mut rig, "plot height");
+    let screen = rig.screen(80, 24);
+    for tick in ["│m", "50│", "100│", "150│"] {
+        assert!(screen.contains(tick), "{tick}\n{screen}");
+    }
+}
+
+#[test]
+fn help_shows_only_the_keys_that_work_now() {
+    let mut rig = on_the_pad();
+    rig.key(Key::Char('?'));
+    let screen = rig.screen(80, 24);
+    assert!(
+        screen.contains("type ARM") && !screen.contains("type START") && !screen.contains("disarm:"),
+        "{screen}"
+    );
+    let mut rig = armed();
+    rig.key(Key::Char('?'));
+    let screen = rig.screen(80, 24);
+    assert!(
+        !screen.contains("type ARM") && screen.contains("type START") && screen.contains("disarm:"),
+        "{screen}"
+    );
+    assert!(!Act::Pin.works(&rig.model, rig.now));
+}
+
+/// Pasted text opens nothing, and closes what was open.
+#[test]
+fn a_paste_does_not_reach_the_palette() {
+    let mut rig = on_the_pad();
+    let pasted = [typed(":type ARM"), vec![Key::Enter], typed("ARM"), vec![Key::Enter]].concat();
+    rig.msg(Msg::Keys(pasted));
+    assert_eq!((rig.model.pages.entry.clone(), rig.model.dialog.clone()), (None, Dialog::Closed));
+    rig.run(1.0);
+    rig.key(Key::Char(':'));
+    rig.msg(Msg::Pasted);
+    assert_eq!(rig.model.pages.entry, None);
+    assert!(rig.take_commands().is_empty());
+}

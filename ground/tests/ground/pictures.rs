@@ -1,0 +1,285 @@
+//! Every page at three sizes and in every theme: nothing is cut, every letter can be read, colour says nothing alone.
+//!
+//! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground --test ground pictures`
+//! also writes those that the README shows, to `ground/pictures`.
+
+use std::fs;
+use std::path::Path;
+
+use ground::key::Key;
+use ground::model::page::Page;
+use ground::view::CUT_MARK;
+use ground::view::theme::{Ink, Palette, TextRole, Theme};
+use protocol::dialect::{TdBooster, TdCheck, TdChute, TdLimit, TdPhase};
+use ratatui::buffer::Buffer;
+use ratatui::style::Modifier;
+
+use crate::rig::Rig;
+use crate::rig::svg::{colours, picture, rgb};
+use crate::screens::{armed, counting, on_the_pad};
+
+const SIZES: [(u16, u16); 3] = [(80, 24), (140, 45), (200, 60)];
+
+/// The least contrast of text and of pictures, by the formula of WCAG 2.2; its strictest level asks for 7.
+fn contrast_min(palette: Palette) -> f64 {
+    if palette == Palette::Contrast { 14.0 } else { 7.0 }
+}
+
+fn no_go() -> Rig {
+    let mut rig = on_the_pad();
+    rig.checks_failed =
+        (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
+    rig.interlocks = protocol::dialect::TdInterlock::empty();
+    rig.run(1.0);
+    rig
+}
+
+/// A flight in space up to a phase.
+fn flying(until: TdPhase) -> Rig {
+    let mut rig = counting();
+    rig.limits_of_legs();
+    rig.phase = TdPhase::TD_PHASE_BOOST;
+    for k in 0..60_u16 {
+        let t = f32::from(k) * 0.1;
+        rig.countdown_ms = -100 * i32::from(k);
+        if k == 15 {
+            rig.phase = TdPhase::TD_PHASE_COAST;
+        }
+        let climb = if t < 1.5 { 45.0 * t } else { 67.5 - 9.8 * (t - 1.5) };
+        let up = if t < 1.5 { 22.5 * t * t } else { 50.6 + 67.5 * (t - 1.5) - 4.9 * (t - 1.5) * (t - 1.5) };
+        rig.state_in_space([2.0 * t, -1.5 * t, up], [2.0, -1.5, climb], (200.0, 4.0));
+        rig.actuated_fins();
+        rig.ascent(TdBooster::TD_BOOSTER_ATTACHED, 284.0, (9.0 - t).max(0.1));
+        rig.run(0.1);
+    }
+    if until == TdPhase::TD_PHASE_COAST {
+        return rig;
+    }
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.text("fins open");
+    for k in 0..90_u16 {
+        let t = f32::from(k) * 0.1;
+        rig.countdown_ms = -9_000 - 100 * i32::from(k);
+        let up = 280.0 - 21.5 * t;
+        rig.state_in_space([18.0 - 1.8 * t, -12.0 + 1.1 * t, up], [-1.8, 1.1, -21.5], (200.0, 4.0));
+        rig.actuators(0);
+        rig.descent_with(up, -21.5, TdChute::TD_CHUTE_STOWED);
+        rig.run(0.1);
+    }
+    if until == TdPhase::TD_PHASE_AERO_DESCENT {
+        return rig;
+    }
+    rig.phase = TdPhase::TD_PHASE_POWERED;
+    for k in 0..20_u16 {
+        let t = f32::from(k) * 0.1;
+        rig.countdown_ms = -18_000 - 100 * i32::from(k);
+        let up = 30.0 - 14.0 * t;
+        rig.state_in_space([1.8 - 0.6 * t, -1.1 + 0.4 * t, up], [-0.6, 0.4, -14.0], (200.0, 4.0));
+        rig.actuators(-310);
+        rig.plan(TdLimit::empty());
+        rig.run(0.1);
+    }
+    if until == TdPhase::TD_PHASE_POWERED {
+        return rig;
+    }
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.armed = false;
+    rig.verdict(true, TdLimit::empty());
+    rig.run(1.0);
+    rig
+}
+
+/// A state of each kind that a crew sees, with its name.
+fn states() -> Vec<(&'static str, Rig)> {
+    let mut lost = flying(TdPhase::TD_PHASE_AERO_DESCENT);
+    lost.speaks = false;
+    lost.run(6.0);
+    vec![
+        ("pad", on_the_pad()),
+        ("nogo", no_go()),
+        ("armed", armed()),
+        ("counting", counting()),
+        ("coast", flying(TdPhase::TD_PHASE_COAST)),
+        ("descent", flying(TdPhase::TD_PHASE_AERO_DESCENT)),
+        ("burn", flying(TdPhase::TD_PHASE_POWERED)),
+        ("landed", flying(TdPhase::TD_PHASE_TOUCHDOWN)),
+        ("lost", lost),
+    ]
+}
+
+/// Draws every page of every state at every size and passes it on with its name.
+fn every_page(mut see: impl FnMut(&str, &Rig, (u16, u16))) {
+    for (state, mut rig) in states() {
+        see(&format!("{state}-followed"), &rig, SIZES[0]);
+        for page in Page::all() {
+            rig.model.pages.hold(Some(page));
+            for size in SIZES {
+                see(&format!("{state}-{}-{}x{}", page.name().to_lowercase(), size.0, size.1), &rig, size);
+            }
+        }
+    }
+}
+
+fn drawn(rig: &Rig, (columns, rows): (u16, u16), palette: Palette) -> Buffer {
+    rig.draw(columns, rows, Theme { palette, ascii: false }).backend().buffer().clone()
+}
+
+fn rows(buffer: &Buffer) -> Vec<String> {
+    let cells = buffer.content.chunks(usize::from(buffer.area.width));
+    cells.map(|row| row.iter().map(ratatui::buffer::Cell::symbol).collect()).collect()
+}
+
+/// The ratio of the lighter to the darker luminance (WCAG 2.2, "contrast ratio").
+fn contrast(one: [u8; 3], other: [u8; 3]) -> f64 {
+    let luminance = |rgb: [u8; 3]| {
+        let [red, green, blue] = rgb.map(|part| {
+            let part = f64::from(part) / 255.0;
+            if part <= 0.04045 { part / 12.92 } else { libm::pow((part + 0.055) / 1.055, 2.4) }
+        });
+        0.2126 * red + 0.7152 * green + 0.0722 * blue
+    };
+    let (one, other) = (luminance(one), luminance(other));
+    (one.max(other) + 0.05) / (one.min(other) + 0.05)
+}
+
+#[test]
+fn no_page_cuts_what_it_shows() {
+    let mut cut = Vec::new();
+    every_page(|name, rig, size| {
+        let rows = rows(&drawn(rig, size, Palette::Dark));
+        for row in rows.iter().filter(|row| row.contains(CUT_MARK) && !row.contains("A last … is")) {
+            cut.push(format!("{name}: {row}"));
+        }
+    });
+    assert!(cut.is_empty(), "{}", cut.join("\n"));
+}
+
+/// Every theme shows the same characters, so no meaning is in a colour alone; and every letter can be read.
+#[test]
+fn every_theme_shows_the_same_text_with_enough_contrast() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
+    fs::create_dir_all(&folder).unwrap();
+    every_page(|name, rig, size| {
+        let plain = rows(&drawn(rig, size, Palette::None));
+        for palette in Palette::ALL {
+            let buffer = drawn(rig, size, palette);
+            assert_eq!(rows(&buffer), plain, "{name} {}", palette.name());
+            for cell in &buffer.content {
+                assert!(!cell.modifier.contains(Modifier::DIM), "{name} {}: dim", palette.name());
+                if matches!(palette, Palette::None | Palette::Sixteen) {
+                    assert!(rgb(cell.bg).is_none(), "{name}: the terminal's own background");
+                    continue;
+                }
+                let (fore, back) = colours(cell);
+                let found = contrast(fore, back);
+                assert!(found >= contrast_min(palette), "{name} {}: {cell:?} {found:.1}", palette.name());
+            }
+            fs::write(folder.join(format!("{name}-{}.svg", palette.name())), picture(&buffer)).unwrap();
+        }
+    });
+}
+
+/// Yellow and pale letters vanish in the sun.
+#[test]
+fn the_light_theme_is_dark_on_white_without_yellow() {
+    let theme = Theme { palette: Palette::Light, ascii: false };
+    let styles = TextRole::ALL.map(|role| theme.ground().patch(theme.style(role)));
+    let inks = Ink::ALL.map(|ink| theme.ground().fg(theme.ink(ink)));
+    assert_eq!(rgb(theme.back()), Some([255; 3]), "white");
+    for style in styles.into_iter().chain(inks) {
+        let [red, green, blue] = style.fg.and_then(rgb).unwrap();
+        let yellow = red > 80 && green > 80 && blue < red.min(green) / 2;
+        assert!(!yellow && !style.add_modifier.contains(Modifier::DIM), "{style:?}");
+        assert!(contrast([red, green, blue], style.bg.and_then(rgb).unwrap()) >= 7.0, "{style:?}");
+    }
+}
+
+/// Roles that mean different things differ without colour, or have words of their own.
+#[test]
+fn without_colour_an_alarm_still_stands_out() {
+    let theme = Theme { palette: Palette::None, ascii: false };
+    let weight = |role| theme.style(role).add_modifier;
+    assert!(weight(TextRole::Alarm).contains(Modifier::REVERSED));
+    assert_ne!(weight(TextRole::Caution), weight(TextRole::Plain));
+    assert_ne!(weight(TextRole::Stale), weight(TextRole::Plain));
+}
+
+/// On a large screen the page of every phase has something in most of its rows, to both sides of its middle.
+#[test]
+fn large_screens_are_used() {
+    for (name, rig) in states() {
+        for (columns, rows_of_screen) in &SIZES[1..] {
+            let rows = rows(&drawn(&rig, (*columns, *rows_of_screen), Palette::Dark));
+            let half = usize::from(columns / 2);
+            let used = |part: fn(&str, usize) -> String| {
+                rows.iter().filter(|row| !part(row, half).trim().is_empty()).count() as f64
+            };
+            let left = used(|row, half| row.chars().take(half).collect());
+            let right = used(|row, half| row.chars().skip(half).collect());
+            let all = f64::from(*rows_of_screen);
+            assert!(
+                left / all > 0.5 && right / all > 0.5,
+                "{name} {columns}: {left} and {right} of {all}\n{}",
+                rows.join("\n")
+            );
+        }
+    }
+}
+
+/// What must be seen first is in large letters on the page that follows the flight.
+#[test]
+fn what_must_be_seen_first_is_the_largest() {
+    for (name, rig) in states() {
+        for (size, least) in SIZES.into_iter().zip([30, 60, 70]) {
+            let buffer = drawn(&rig, size, Palette::Dark);
+            let blocks = "█▀▄▌▐▘▝▖▗▚▞▙▛▜▟";
+            let large = buffer.content.iter().filter(|cell| blocks.contains(cell.symbol())).count();
+            assert!(large >= least || name == "pad", "{name} {size:?}: {large} cells");
+        }
+    }
+}
+
+/// After a loss of the link an old height would be the most dangerous thing to show large.
+#[test]
+fn the_headline_shows_no_old_height() {
+    let mut lost = flying(TdPhase::TD_PHASE_AERO_DESCENT);
+    assert!(lost.screen(80, 24).contains("height m"));
+    lost.speaks = false;
+    lost.run(6.0);
+    for page in ['2', '3'] {
+        lost.key(Key::Char(page));
+        let screen = lost.screen(80, 24);
+        assert!(!screen.contains("height m") && screen.contains("PREDICTED m up"), "{screen}");
+    }
+}
+
+/// The pictures of the README are what the screen shows.
+#[test]
+fn regress_the_pictures_of_the_readme() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures");
+    let pictures = [
+        ("pad-light", no_go(), Palette::Light),
+        ("descent-dark", flying(TdPhase::TD_PHASE_AERO_DESCENT), Palette::Dark),
+        ("landed-contrast", flying(TdPhase::TD_PHASE_TOUCHDOWN), Palette::Contrast),
+    ];
+    for (name, rig, palette) in pictures {
+        let (path, svg) = (folder.join(format!("{name}.svg")), picture(&drawn(&rig, SIZES[0], palette)));
+        if std::env::var_os("UPDATE_PICTURES").is_some() {
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(&path, &svg).unwrap();
+        }
+        let kept = fs::read_to_string(&path).unwrap_or_default();
+        assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
+        assert!(svg.len() < 30_000, "{name}: {} bytes", svg.len());
+    }
+}
+
+/// A page that is opened by its key is the page of the picture.
+#[test]
+fn the_keys_show_these_pages() {
+    let mut rig = on_the_pad();
+    for (key, page) in [('p', Page::Path), ('v', Page::Values), ('t', Page::Plot), ('?', Page::Help)] {
+        rig.key(Key::Char(key));
+        assert_eq!(rig.model.page(), page);
+    }
+}
