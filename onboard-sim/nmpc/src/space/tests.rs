@@ -51,8 +51,8 @@ fn problem(thrust_over_weight: f64) -> SpaceProblem {
 
 /// Turns of the lean around upright while it is larger than 3 degrees.
 fn turns(states: &[State]) -> f64 {
-    let leaning = states.iter().filter(|state| state[6].hypot(state[7]) > 3.0_f64.to_radians());
-    let towards: Vec<f64> = leaning.map(|state| state[7].atan2(state[6])).collect();
+    let leaning = states.iter().filter(|state| libm::hypot(state[6], state[7]) > 3.0_f64.to_radians());
+    let towards: Vec<f64> = leaning.map(|state| libm::atan2(state[7], state[6])).collect();
     let changes = towards.windows(2).map(|pair| (pair[1] - pair[0] + 1.5 * TAU).rem_euclid(TAU) - 0.5 * TAU);
     changes.sum::<f64>() / TAU
 }
@@ -89,7 +89,7 @@ fn intervals_lead_where_the_equations_of_motion_do() {
         for (k, input) in inputs.enumerate() {
             state = interval::end(&finer, k, &state, &input);
         }
-        let nose = [state[6].sin(), state[6].cos() * state[7].sin()];
+        let nose = [libm::sin(state[6]), libm::cos(state[6]) * libm::sin(state[7])];
         let found = [&state[..6], &nose[..]].concat();
         found.iter().zip(&flown).map(|(found, flown)| (found - flown).abs()).fold(0.0, f64::max)
     };
@@ -105,13 +105,13 @@ fn flown(model: &SpaceProblem, inputs: &[[f64; INPUTS]]) -> [f64; 8] {
     let [x, y, z, vx, vy, vz, p, r, ..] = model.initial;
     let mut place = [x, y, z];
     let mut velocity = [vx, vy, vz];
-    let mut nose = [p.sin(), p.cos() * r.sin(), p.cos() * r.cos()];
+    let mut nose = [libm::sin(p), libm::cos(p) * libm::sin(r), libm::cos(p) * libm::cos(r)];
     let mut turning = [0.0; 3];
     let size = |v: &[f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     for (push, input) in model.pushes.iter().zip(inputs) {
         let step_s = model.step_s / STEPS as f64;
         for _ in 0..STEPS {
-            let (sin_p, cos_p) = (nose[0], nose[1].hypot(nose[2]));
+            let (sin_p, cos_p) = (nose[0], libm::hypot(nose[1], nose[2]));
             let (sin_r, cos_r) = (nose[1] / cos_p, nose[2] / cos_p);
             let e_p = [cos_p, -sin_p * sin_r, -sin_p * cos_r];
             let e_r = [0.0, cos_r, -sin_r];
@@ -183,6 +183,7 @@ fn the_rest_of_a_plan_is_optimal_and_a_disturbed_one_soon_is() {
 
 #[test]
 fn derivatives_are_those_of_differences() {
+    const CHANGE: f64 = 1e-6;
     let model = problem(1.6);
     let state = [0.3, 0.2, 9.0, 2.0, -1.5, -6.0, 0.5, -0.4, 0.9, -1.1];
     let input = [0.03, -0.05, 0.4];
@@ -212,7 +213,6 @@ fn derivatives_are_those_of_differences() {
         interval::pulled(&mut out, &costate);
         out
     };
-    const CHANGE: f64 = 1e-6;
     let mut both = [0.0; STATES + INPUTS];
     both[..STATES].copy_from_slice(&state);
     both[STATES..].copy_from_slice(&input);
