@@ -11,7 +11,7 @@ use replay::info::info;
 use replay::log::{Clock, Entry, FlightLog, Recording};
 
 use crate::command_line::{replay, run};
-use crate::simulated::{MK2_WITH_FRAMES, Simulated, WITH_FRAMES};
+use crate::simulated::{Simulated, WITH_FRAMES, with_frames};
 
 /// The station was started this long before the vehicle, ns.
 const EARLIER_NS: u64 = 3_000_000_000;
@@ -52,6 +52,9 @@ fn heard(flight: &Simulated) -> PathBuf {
 }
 
 static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
+/// A rocket from apogee with telemetry to no receiver.
+static MK2_WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frames("mk2"));
+
 static GROUND_MK2: LazyLock<PathBuf> = LazyLock::new(|| heard(&MK2_WITH_FRAMES));
 
 /// The verdict that was heard is the vehicle's own, to the precision of a message.

@@ -31,18 +31,14 @@ pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("pa
 pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 1, &[]));
 
 /// The nominal landing with telemetry to no receiver, so that its log has raw frames.
-pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
-    let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
-    simulate("paper-calibrated", 1, &[link])
-});
+pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frames("paper-calibrated"));
 
-/// A rocket from apogee with telemetry to no receiver.
-pub(crate) static MK2_WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| {
+/// A landing with telemetry to no receiver.
+pub(crate) fn with_frames(profile: &str) -> Simulated {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
-    simulate("mk2", 1, &[link])
-});
+    simulate(profile, 1, &[link])
+}
 
 impl Simulated {
     pub(crate) fn recording(&self) -> Recording {

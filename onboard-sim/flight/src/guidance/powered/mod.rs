@@ -7,6 +7,9 @@
 //! across the plane for the velocity there and the wind. The fins open and close with the place in the
 //! [band of feasible heights](crate::guidance::vertical): high in the band too much impulse is left, so they close.
 //!
+//! A mission with `[powered.space]` plans in `space` instead: the nose may lean in any direction, and the plan has the
+//! fins as well.
+//!
 //! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s of the planar controller.
 
 mod digest;
