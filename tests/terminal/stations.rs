@@ -40,7 +40,8 @@ fn ground_without_arguments_beside_a_station_is_the_demonstration_and_reports_th
     let bare = ground(station.pad.folder.path(), &["--log", "none"]);
     let mut demonstration = Terminal::start(&bare, (140, 45), false);
     demonstration.wait_for("a station runs: pid ");
-    demonstration.wait_for("`ground attach` shows it");
+    // On a narrower list the words "shows it" are on the next line.
+    demonstration.wait_for("`ground attach`");
     demonstration.wait_for("GO: every arming check passes");
     demonstration.type_until(b"AARM\r", " ARMED ");
     demonstration.type_until(b"SSTART\r", "START  commanded");
