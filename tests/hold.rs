@@ -43,7 +43,8 @@ fn wait_for_uplink(ground: &mut BareGround, wanted: impl Fn(&TD_UPLINK_DATA) -> 
 /// a new start command.
 #[test]
 fn a_silent_uplink_holds_the_countdown() {
-    for profile in ["paper-calibrated", "mk2"] {
+    // The last one hangs below a drone.
+    for profile in ["paper-calibrated", "mk2", "vlr"] {
         let mut flight = Countdown::of(profile);
         let heard = wait_for_uplink(&mut flight.ground, |_| true);
         assert_eq!((heard.target_system, heard.target_component, heard.commands), (255, 190, 1));

@@ -1,0 +1,60 @@
+//! What the flight computer detects on the way up, it detects from sensors.
+
+use std::time::Duration;
+
+use flight::computer::pilot::Sensed;
+use flight::computer::{Computer, Feeling, Input, Output};
+use flight::estimation::estimator::Measurements;
+use flight::rules::phase::Phase;
+use flight::vehicle::profile::StartPoint;
+use sim::outside::{Outside, Watch};
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+
+/// The frames of a flight without requests.
+struct Frames(Vec<Input<'static>>);
+
+impl Watch for Frames {
+    fn now(&mut self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn decided(&mut self, input: &Input<'_>, _: &Output, _: &Computer) {
+        assert!(input.requests.is_empty() && input.rehearsed.is_none());
+        self.0.push(Input { requests: &[], rehearsed: None, ..*input });
+    }
+}
+
+/// The phases that a computer passes through.
+fn phases(mut computer: Computer, frames: impl Iterator<Item = Input<'static>>) -> Vec<Phase> {
+    let mut phases = Vec::new();
+    for frame in frames {
+        computer.step(&frame);
+        let phase = computer.mode().phase;
+        if phases.last() != Some(&phase) {
+            phases.push(phase);
+        }
+    }
+    phases
+}
+
+/// The same flight a second time, with all but the sensors as it was: the sensors say that the vehicle stands.
+#[test]
+fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
+    let recipe = Recipe::built_in("mk2", "field").unwrap().starting_at(StartPoint::Pad).unwrap();
+    let mut sortie = Sortie::new(&recipe, 0).unwrap();
+    let computer = sortie.computer().clone();
+    let mut frames = Frames(Vec::new());
+    while sortie.computer().mode().phase.before_apogee() {
+        sortie.step_with(&Outside::NOBODY, &mut frames);
+    }
+    let frames = frames.0;
+    let flown = phases(computer.clone(), frames.iter().copied());
+    assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::AeroDescent]), "{flown:?}");
+    let Feeling::InSpace(Sensed::Measured(standing)) = frames[0].feeling else { panic!("measured") };
+    let standing = Measurements { gnss: None, ..standing };
+    let stood =
+        frames.iter().map(|frame| Input { feeling: Feeling::InSpace(Sensed::Measured(standing)), ..*frame });
+    let told = phases(computer, stood);
+    assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::AeroDescent), "{told:?}");
+}
