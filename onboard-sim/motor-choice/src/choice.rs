@@ -7,6 +7,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 
 use crate::frame::{Ballast, Frame};
 use crate::height::Fall;
+use crate::mission_text::start_height_m;
 use crate::search;
 use crate::window::{Onset, Window};
 
@@ -195,7 +196,7 @@ pub fn usual_limits(mission: &Mission, frame: &Frame, curve: &ThrustCurve, balla
     Limits {
         masses_kg: ballast_kg.map(|ballast_kg| without_kg + ballast_kg),
         ballast_station_m: frame.cg_station_m(),
-        start: StartHeight::AtMost(mission.start.height_m),
+        start: StartHeight::AtMost(start_height_m(mission)),
         tube_m: frame.tube_m(),
     }
 }

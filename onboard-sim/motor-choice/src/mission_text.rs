@@ -1,6 +1,8 @@
 //! The text of a mission with another motor, mass and height of the start.
 
 use flight::vehicle::airframe::Mass;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
 use toml::{Table, Value};
 
 /// What is different.
@@ -26,6 +28,12 @@ pub enum MissionTextError {
     Missing(&'static str),
     #[error("the mission cannot be written")]
     Write(#[from] toml::ser::Error),
+}
+
+/// Height of the centre of gravity above the pad at which a mission's flight begins, m: at apogee, or where a drone lets go.
+pub fn start_height_m(mission: &Mission) -> f64 {
+    let dropped = mission.drop.filter(|_| mission.start.at == StartPoint::Drone);
+    dropped.map_or(mission.start.height_m, |drop| drop.height_m)
 }
 
 /// The changed text of a mission. Its airframe is a table in it, and its motor a text, so it needs no other file.
@@ -62,8 +70,10 @@ pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, Miss
     mission.insert("airframe".to_owned(), Value::Table(airframe));
     mission.insert("name".to_owned(), Value::String(changes.name.to_owned()));
     mission.insert("summary".to_owned(), Value::String(changes.summary.to_owned()));
-    let start = mission.get_mut("start").and_then(Value::as_table_mut);
-    let start = start.ok_or(MissionTextError::Missing("start"))?;
+    let at = mission.get("start").and_then(|start| start.get("at")).and_then(Value::as_str);
+    let section = if at == Some(StartPoint::Drone.name()) { "drop" } else { "start" };
+    let start = mission.get_mut(section).and_then(Value::as_table_mut);
+    let start = start.ok_or(MissionTextError::Missing(section))?;
     start.insert("height_m".to_owned(), Value::Float(changes.start_height_m));
     Ok(toml::to_string_pretty(&mission)?)
 }
@@ -87,13 +97,13 @@ mod tests {
                 summary: &mission.summary,
                 motor: &mission.airframe.motor,
                 mass: mission.airframe.mass,
-                start_height_m: mission.start.height_m,
+                start_height_m: start_height_m(&mission),
             };
             let again = changed(text, &changes).unwrap();
             assert_eq!(vehicles::mission::from_toml(&again, name).unwrap(), mission);
             let moved = changed(&again, &Changes { start_height_m: 77.5, ..changes }).unwrap();
             let moved = vehicles::mission::from_toml(&moved, name).unwrap();
-            assert!((moved.start.height_m - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
+            assert!((start_height_m(&moved) - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
         }
     }
 

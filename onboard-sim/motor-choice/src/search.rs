@@ -3,6 +3,8 @@
 //! A lighter vehicle stands a weaker motor, a heavier one a stronger one. So the scatter that it stands rises with the mass
 //! up to one mass and falls beyond it, and a grid with a golden section around its best place finds that mass.
 
+use flight::vehicle::profile::StartPoint;
+
 use crate::choice::{Choice, Obstacle, Pairing, StartHeight, Weighed};
 use crate::height::Fall;
 use crate::window::Onset;
@@ -12,6 +14,9 @@ const SPEED_SHARES: [f64; 5] = [0.75, 0.85, 0.92, 0.95, 0.97];
 /// Shortest fall from the start to the first thrust, as the time that the landing controller takes over before the
 /// ignition and this for opening the fins and steering, s.
 const STEERING_S: f64 = 2.0;
+/// Falls from the release of a drop to the first thrust, s. The fall is felt after 0.1 s, and the fins are open 0.4 s after
+/// the release; 2.4 s are a fall of 28 m.
+const DROPS_S: [f64; 8] = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.4];
 /// Factor between neighbours of the grid of masses.
 const MASS_STEP: f64 = 1.03;
 /// Masses looked at in all, as shares of the mission's own.
@@ -67,6 +72,9 @@ fn grid(least_kg: f64, most_kg: f64) -> Vec<f64> {
 fn speeds_m_s(pairing: &Pairing<'_>, fall: &Fall, onset: &Onset<'_>) -> Vec<f64> {
     match pairing.limits.start {
         StartHeight::Exactly(start_m) => vec![agreed_m_s(fall, onset, start_m)],
+        StartHeight::AtMost(_) if pairing.mission.start.at == StartPoint::Drone => {
+            DROPS_S.map(|fallen_s| fall.speed_after_m_s(fallen_s)).to_vec()
+        }
         StartHeight::AtMost(_) => {
             let least_m_s = fall.speed_after_m_s(pairing.mission.ignition.arm_before_s + STEERING_S);
             let shares = SPEED_SHARES.map(|share| share * fall.terminal_m_s);

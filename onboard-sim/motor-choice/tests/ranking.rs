@@ -8,9 +8,10 @@ use flight::guidance::vertical::Column;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::mission::Mission;
-use motor_choice::choice::{Choice, Obstacle, Refusal, StartHeight, choose, usual_limits};
+use motor_choice::choice::{Choice, Limits, Obstacle, Refusal, StartHeight, choose, usual_limits};
 use motor_choice::flown::Weather;
 use motor_choice::frame::Frame;
+use motor_choice::mission_text::start_height_m;
 use motor_choice::ranking::{Ranked, Request, rank};
 use motor_choice::source::{self, Candidate, SourceError};
 use motor_choice::{picture, table};
@@ -34,6 +35,25 @@ fn val_mk2_the_best_mass_and_height_are_those_of_the_mission() {
     assert!((choice.mass.loaded_kg - 3.10).abs() < 0.06, "{choice:?}");
     assert!((choice.start_height_m - 300.0).abs() < 20.0, "{choice:?}");
     assert!(choice.window.scatter > 1.0, "{choice:?}");
+}
+
+/// A drop is short: the thrust begins a second or two after the release. The missions' masses were found by flights.
+#[test]
+fn val_vlr_drops_land_on_their_motors_from_their_height() {
+    for (name, motor) in [("vlr", "F13-RCT"), ("vlr-f16", "F16-RCJ")] {
+        let dropped = mission(name);
+        let from_m = start_height_m(&dropped);
+        let frame = Frame::of(&dropped).unwrap();
+        let curve = vehicles::motors::builtin(motor).unwrap();
+        let usual = usual_limits(&dropped, &frame, &curve, [-0.2, 0.2]);
+        let choose = |start| choose(&dropped, &frame, &curve, &Limits { start, ..usual }).unwrap();
+        let own_kg = dropped.airframe.mass.loaded_kg;
+        let exactly = choose(StartHeight::Exactly(from_m));
+        assert!((exactly.mass.loaded_kg - own_kg).abs() < 0.06, "{exactly:?}");
+        let lower = choose(StartHeight::AtMost(from_m));
+        assert!(lower.start_height_m <= from_m && lower.start_height_m > 15.0, "{lower:?}");
+        assert!((lower.window.scatter - exactly.window.scatter).abs() < 0.05, "{lower:?} {exactly:?}");
+    }
 }
 
 #[test]

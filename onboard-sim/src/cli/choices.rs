@@ -6,8 +6,10 @@ use std::str::FromStr;
 
 use clap::Args;
 use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
 use motor_choice::choice::StartHeight;
 use motor_choice::flown::Weather;
+use motor_choice::mission_text::start_height_m;
 use motor_choice::source::{self, Found};
 use sim::dispersion::{self, Dispersion};
 
@@ -32,11 +34,11 @@ pub(super) struct Choices {
     /// Widest motor that fits, mm. By default the diameter of the mission's own motor.
     #[arg(long, value_name = "MM")]
     tube: Option<f64>,
-    /// Height of the centre of gravity at which the flight begins (apogee, or the drop), m. By default the best one up to
-    /// --highest.
+    /// Height of the centre of gravity at which the flight begins, m. By default the best apogee up to --highest, or the
+    /// drop of the mission.
     #[arg(long, value_name = "M")]
     height: Option<f64>,
-    /// Highest start, m. By default that of the mission.
+    /// Highest start, m: the best one up to this. By default the apogee of the mission.
     #[arg(long, value_name = "M", conflicts_with = "height")]
     highest: Option<f64>,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
@@ -139,10 +141,15 @@ impl Choices {
                 );
             }
         }
-        Ok(self.height.map_or_else(
-            || StartHeight::AtMost(self.highest.unwrap_or(mission.start.height_m)),
-            StartHeight::Exactly,
-        ))
+        let own_m = start_height_m(mission);
+        // A drone can hang anywhere, so a drop begins where the mission says.
+        let own =
+            if mission.start.at == StartPoint::Drone { StartHeight::Exactly } else { StartHeight::AtMost };
+        Ok(match (self.height, self.highest) {
+            (Some(height_m), _) => StartHeight::Exactly(height_m),
+            (None, Some(highest_m)) => StartHeight::AtMost(highest_m),
+            (None, None) => own(own_m),
+        })
     }
 
     pub(super) fn jobs(&self) -> usize {
