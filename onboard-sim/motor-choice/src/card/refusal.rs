@@ -94,6 +94,9 @@ fn bound(order: &Order<'_>, frame: &Frame, limits: &Limits) -> String {
         mission.airframe.mass = mass;
         mission.motor_curve = curve.clone();
         mission.start.height_m = *height_m;
+        if let Some(drop) = &mut mission.drop {
+            drop.height_m = *height_m;
+        }
         if let Some(window) = certified_window(&mission) {
             return format!(
                 "a controller that knows everything lands {mass_kg:.3} kg from {height_m:.0} m if it commands the \
