@@ -6,12 +6,9 @@ use core::f64::consts::PI;
 
 use stages::{Condition, InputRange, Model, Settings};
 
+use crate::Problem;
 use crate::intervals::Blocks;
 use crate::rollout;
-use crate::{LANDING_MISS, Problem};
-
-/// Barrier of a cold solve's first iteration.
-const FIRST_BARRIER: f64 = 1e3;
 
 /// Bends of the cold guesses' pitch, in amplitudes. Those after the first two are only tried if the first two do not
 /// land.
@@ -52,15 +49,7 @@ impl Model<6, 1> for Problem {
 
     #[inline]
     fn settings(&self) -> Settings {
-        Settings {
-            max_iterations: self.solver.max_iterations,
-            tolerance: self.solver.kkt_tolerance,
-            price: self.solver.terminal_penalty,
-            first_barrier: FIRST_BARRIER,
-            guesses: NARROW_BENDS,
-            spare_guesses: BENDS.len() - NARROW_BENDS,
-            acceptable_miss: LANDING_MISS,
-        }
+        self.solver.settings(NARROW_BENDS, BENDS.len() - NARROW_BENDS)
     }
 
     /// States on the straight line from the start to the target, the pitch bent by `amplitude sin(m pi k / N)`. The

@@ -4,7 +4,9 @@ use alloc::vec::Vec;
 
 use serde::Deserialize;
 pub use stages::Condition;
+use stages::Settings;
 
+use crate::LANDING_MISS;
 use crate::dynamics::{PlanarModel, PlanarState};
 
 /// The box in which a planned trajectory ends, in addition to height and distance.
@@ -43,6 +45,24 @@ pub struct SolverLimits {
     pub guess_amplitude_rad: f64,
     /// Half-waves of the bent initial guesses over the horizon.
     pub guess_half_waves: u32,
+}
+
+/// Barrier of a cold solve's first iteration.
+const FIRST_BARRIER: f64 = 1e3;
+
+impl SolverLimits {
+    /// The solver's settings for a model with so many guesses.
+    pub(crate) fn settings(&self, guesses: usize, spare_guesses: usize) -> Settings {
+        Settings {
+            max_iterations: self.max_iterations,
+            tolerance: self.kkt_tolerance,
+            price: self.terminal_penalty,
+            first_barrier: FIRST_BARRIER,
+            guesses,
+            spare_guesses,
+            acceptable_miss: LANDING_MISS,
+        }
+    }
 }
 
 /// One landing problem: from a state now, through intervals of held gimbal angle, to the ground.

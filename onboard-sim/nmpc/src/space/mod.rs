@@ -29,6 +29,7 @@ use alloc::vec::Vec;
 use crate::problem::SolverLimits;
 
 pub use model::last_multipliers;
+pub use nose::Nose;
 pub use stages::{Outcome, Start, Status};
 
 /// Number of states and inputs.

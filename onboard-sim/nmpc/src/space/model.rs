@@ -7,10 +7,6 @@ use core::f64::consts::TAU;
 use stages::{Condition, DenseIntervals, InputRange, Model, Settings};
 
 use super::{INPUTS, STATES, SpaceProblem, State, interval};
-use crate::LANDING_MISS;
-
-/// Barrier of a cold solve's first iteration.
-const FIRST_BARRIER: f64 = 1e3;
 
 /// Opening of the fins that costs nothing: with it they can brake more or less than planned.
 const HALF_OPEN: f64 = 0.5;
@@ -116,15 +112,7 @@ impl Model<STATES, INPUTS> for SpaceProblem {
     }
 
     fn settings(&self) -> Settings {
-        Settings {
-            max_iterations: self.solver.max_iterations,
-            tolerance: self.solver.kkt_tolerance,
-            price: self.solver.terminal_penalty,
-            first_barrier: FIRST_BARRIER,
-            guesses: TURNING,
-            spare_guesses: TURNS.len() - TURNING,
-            acceptable_miss: LANDING_MISS,
-        }
+        self.solver.settings(TURNING, TURNS.len() - TURNING)
     }
 
     /// Positions and velocities on the straight line to rest at the target, and a lean of one size that turns around.

@@ -16,18 +16,19 @@ pub(super) fn times(f: f64, a: &Vector) -> Vector {
 }
 
 /// The nose and its derivatives by the leans.
-pub(super) struct Nose {
-    pub(super) sin_p: f64,
-    pub(super) cos_p: f64,
-    pub(super) n: Vector,
-    pub(super) e_p: Vector,
-    pub(super) e_r: Vector,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nose {
+    pub sin_p: f64,
+    pub cos_p: f64,
+    pub n: [f64; 3],
+    pub e_p: [f64; 3],
+    pub e_r: [f64; 3],
     /// Derivative of `e_r` by `r`.
-    pub(super) m: Vector,
+    pub m: [f64; 3],
 }
 
 impl Nose {
-    pub(super) fn at(p: f64, r: f64) -> Self {
+    pub fn at(p: f64, r: f64) -> Self {
         let (sin_p, cos_p) = libm::sincos(p);
         let (sin_r, cos_r) = libm::sincos(r);
         Self {

@@ -3,6 +3,7 @@ use std::f64::consts::TAU;
 use stages::{Dense, Hessian, Status};
 
 use super::{Drag, End, INPUTS, Push, STATES, SpaceProblem, SpaceWorkspace, Start, State, Weights, interval};
+use crate::paper;
 use crate::problem::SolverLimits;
 
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -37,15 +38,7 @@ fn problem(thrust_over_weight: f64) -> SpaceProblem {
         floor_rise_m_s: 0.4,
         guess_lean_rad: 0.5,
         guess_towards_rad: 0.6,
-        solver: SolverLimits {
-            max_iterations: 200,
-            max_iterations_after_miss: 10,
-            kkt_tolerance: 1e-6,
-            terminal_penalty: 1000.0,
-            qp_max_iterations: 60,
-            guess_amplitude_rad: 0.3,
-            guess_half_waves: 2,
-        },
+        solver: SolverLimits { max_iterations: 200, ..paper::problem(paper::start(), 1).solver },
     }
 }
 

@@ -391,27 +391,33 @@ impl Pilot {
     }
 
     fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
-        let column = self.known.column(situation.density_kg_m3, self.known.mission.fin_soft_tilt_deg);
         let state = &estimate.state;
-        let height_m = state.position_m.z - self.known.feet_below_cg_m(&situation.mass);
+        if self.known.mission.powered.space.is_some() {
+            let fins_m2 = self.known.largest_fin_drag_area_m2();
+            let situated = self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2);
+            self.powered.plan(time_s, state, &situated, None);
+        } else {
+            let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
+            self.powered.plan(time_s, state, &preferred, fallback.as_ref());
+        }
+        if self.powered.fin_share(time_s).is_none() {
+            self.fin_share = self.fin_share_of_band(estimate, situation);
+        }
+    }
+
+    /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
+    fn fin_share_of_band(&self, estimate: &Estimate, situation: &Burning) -> f64 {
+        let column = self.known.column(situation.density_kg_m3, self.known.mission.fin_soft_tilt_deg);
         let sigmas = self.known.mission.fin_sigmas;
         let [weak, strong] =
             [-sigmas, sigmas].map(|sigmas| self.known.doubted_burn(situation.burning_s, sigmas));
-        self.fin_share = column.fin_share(
+        column.fin_share(
             [&weak, &strong],
             situation.burning_s,
-            state.velocity_m_s.z,
-            height_m,
+            estimate.state.velocity_m_s.z,
+            estimate.state.position_m.z - self.known.feet_below_cg_m(&situation.mass),
             self.known.mission.fin_place,
-        );
-        if self.known.mission.powered.space.is_some() {
-            let fins_m2 = self.known.largest_fin_drag_area_m2();
-            let situation = self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2);
-            self.powered.plan(time_s, state, &situation, None);
-            return;
-        }
-        let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
-        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
+        )
     }
 
     fn gimbal(

@@ -191,13 +191,7 @@ impl PoweredGuidance {
         let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
         let along_m_s = state.velocity_m_s.dot(&plane.along);
         let settings = &self.settings;
-        let carried_until_s =
-            situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
-        // Late in the burn the end waits only for the ground, not for the thrust to fall.
-        let to_ground_s = initial.z_m.max(0.0) / 2.0;
-        let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
-        let latest_s = (carried_until_s + settings.latest_after_s - situation.burning_s)
-            .max(earliest_s + to_ground_s.min(0.4));
+        let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, initial.z_m)?;
         let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);

@@ -42,6 +42,19 @@ impl PoweredSituation<'_> {
         self.mass_at_ignition_kg - self.burn.burnt_kg(self.burning_s)
     }
 
+    /// The earliest and the latest end of a plan from a height of the feet, m; times from now, s. `None` if the thrust never
+    /// carries the vehicle.
+    pub(super) fn ends_s(&self, latest_after_s: f64, height_m: f64) -> Option<(f64, f64)> {
+        let carried_until_s =
+            self.burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2)?;
+        let earliest_s = (carried_until_s - self.burning_s).max(0.05);
+        // Late in the burn the end waits only for the ground, not for the thrust to fall.
+        let to_ground_s = height_m.max(0.0) / 2.0;
+        let latest_s =
+            (carried_until_s + latest_after_s - self.burning_s).max(earliest_s + to_ground_s.min(0.4));
+        Some((earliest_s, latest_s))
+    }
+
     pub(super) fn model(&self) -> PlanarModel {
         let mass_kg = self.mass_kg();
         let per_m = |area_m2: f64| 0.5 * self.air_density_kg_m3 * area_m2 / mass_kg;

@@ -122,13 +122,8 @@ impl SpaceGuidance {
         settings: &PoweredSettings,
         space: &SpaceSettings,
     ) -> Option<Outcome> {
-        let carried_until_s =
-            situation.burn.falls_through_weight_s(situation.mass_at_ignition_kg, situation.gravity_m_s2)?;
-        // Late in the burn the end waits only for the ground, not for the thrust to fall.
-        let to_ground_s = (state.position_m.z - situation.feet_below_cg_m).max(0.0) / 2.0;
-        let earliest_s = (carried_until_s - situation.burning_s).max(0.05);
-        let latest_s = (carried_until_s + settings.latest_after_s - situation.burning_s)
-            .max(earliest_s + to_ground_s.min(0.4));
+        let height_m = state.position_m.z - situation.feet_below_cg_m;
+        let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, height_m)?;
         let mut final_time_s = self.left_s(time_s).unwrap_or(earliest_s).clamp(earliest_s, latest_s);
         let intervals =
             (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);

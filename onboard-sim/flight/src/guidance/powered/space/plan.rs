@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use nalgebra::Vector3;
-use nmpc::space::{INPUTS, STATES, SpaceProblem, SpaceWorkspace, Start, State, last_multipliers};
+use nmpc::space::{INPUTS, Nose, STATES, SpaceProblem, SpaceWorkspace, Start, State, last_multipliers};
 
 use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
@@ -136,12 +136,8 @@ impl SpacePlan {
         let a_r = (turning * input[1] + 2.0 * pd * rd * sin_p) / cos_p;
         let (p, r) = (state[6] + t * (state[8] + 0.5 * t * a_p), state[7] + t * (state[9] + 0.5 * t * a_r));
         let (pd, rd) = (state[8] + t * a_p, state[9] + t * a_r);
-        let (sin_p, cos_p) = libm::sincos(p);
-        let (sin_r, cos_r) = libm::sincos(r);
-        let nose = Vector3::new(sin_p, cos_p * sin_r, cos_p * cos_r);
-        let e_p = Vector3::new(cos_p, -sin_p * sin_r, -sin_p * cos_r);
-        let e_r = Vector3::new(0.0, cos_r, -sin_r);
-        let inwards = Vector3::new(0.0, -sin_r, -cos_r);
+        let Nose { sin_p, cos_p, n, e_p, e_r, m } = Nose::at(p, r);
+        let [nose, e_p, e_r, inwards] = [n, e_p, e_r, m].map(Vector3::from);
         let moving = e_p * pd + e_r * (cos_p * rd);
         let speeding = e_p * a_p + e_r * (cos_p * a_r - 2.0 * pd * rd * sin_p) - nose * (pd * pd)
             + inwards * (cos_p * rd * rd);
