@@ -1,6 +1,7 @@
 //! How a flight ended, from all that its log says.
 
 use flight::rules::phase::Phase;
+use protocol::dialect::TdInterlock;
 
 use super::VerdictFacts;
 use crate::log::Entry;
@@ -11,8 +12,11 @@ const REFUSED: &str = "REFUSED: ";
 const ASKED_ABORT: u32 = 4;
 /// The answer of a frame that accepts a request.
 const ACCEPTED: u32 = 0;
-/// The bit of a latched abort among the interlocks of telemetry.
-const ABORT_LATCHED: u32 = 8;
+
+/// Whether an abort is latched, in the interlocks of telemetry.
+fn has_latched_abort(interlocks: u32) -> bool {
+    interlocks & u32::from(TdInterlock::TD_INTERLOCK_ABORT_LATCHED.bits()) != 0
+}
 
 /// Follows what decides how a flight ended.
 #[derive(Debug, Default)]
@@ -38,7 +42,7 @@ impl EndingTracker {
             Entry::Tick(tick) => tick.input.phase,
             Entry::Truth(truth) => truth.phase,
             Entry::Telemetry(telemetry) => {
-                self.aborted |= telemetry.interlocks.is_some_and(|bits| bits & ABORT_LATCHED != 0);
+                self.aborted |= telemetry.interlocks.is_some_and(has_latched_abort);
                 let Some(phase) = telemetry.phase else { return };
                 phase
             }
