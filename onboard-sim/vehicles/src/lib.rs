@@ -15,4 +15,5 @@ pub mod airframe;
 pub mod mission;
 pub mod motors;
 pub mod profile;
+mod ranges;
 pub mod thrust_curve;

@@ -30,7 +30,7 @@ pub enum ProfileError {
         /// Where the text came from (a path or a built-in's name).
         origin: String,
         /// The key, with its section.
-        key: &'static str,
+        key: String,
         found: String,
         /// The accepted range, in words.
         required: &'static str,
