@@ -29,7 +29,10 @@ enum Command {
     /// Exit codes: 0 landed inside every limit (from apogee: the limits of the legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     Fly(cli::fly::FlyArguments),
-    /// Map where a landing inside the touchdown limits exists, over two quantities.
+    /// Map where a vehicle lands, over two quantities.
+    ///
+    /// A profile: where a plan exists that ends inside the touchdown limits, one solve for each cell. A mission: where its
+    /// own guidance lands, one simulated flight for each cell, or with `--ask attainable` where a clairvoyant could.
     Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     Campaign(cli::campaign::CampaignArguments),

@@ -3,11 +3,11 @@
 use super::{Axis, Finding, Map};
 use crate::figure::{CellAxis, Cells, FigureError, cells_svg};
 
-/// The map as SVG.
+/// The map as SVG, below a title.
 ///
 /// # Errors
 /// An axis is not finite.
-pub fn svg(map: &Map, profile_name: &str) -> Result<String, FigureError> {
+pub fn svg(map: &Map, title: &str) -> Result<String, FigureError> {
     let axis = |axis: Axis| CellAxis {
         label: axis.quantity.label().to_owned(),
         first: axis.from,
@@ -16,6 +16,5 @@ pub fn svg(map: &Map, profile_name: &str) -> Result<String, FigureError> {
     };
     let cells: Vec<usize> = map.cells.iter().map(|cell| cell.finding as usize).collect();
     let kinds = Finding::ALL.map(|finding| (finding.name(), finding.colour()));
-    let title = format!("Where {profile_name} can land");
-    cells_svg(&title, &Cells { x: axis(map.x), y: axis(map.y), kinds: &kinds, cells: &cells })
+    cells_svg(title, &Cells { x: axis(map.x), y: axis(map.y), kinds: &kinds, cells: &cells })
 }
