@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::Args;
 use onboard_sim::paper;
 use onboard_sim::paper::figures::{figures, stability_figures};
+use onboard_sim::paper::passive::{CG_STATION_M, HEAVY_TAIL_STATION_M};
 use onboard_sim::paper::stability::Stability;
 
 use super::output::write_folder;
@@ -32,8 +33,9 @@ pub(crate) fn run(arguments: &PaperArguments) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if arguments.stability {
         let jobs = std::thread::available_parallelism().map_or(1, usize::from);
-        let stability = Stability::new(jobs)?;
-        paper::write_stability(&mut out, &stability)?;
+        let stability = Stability::new(CG_STATION_M, jobs)?;
+        let heavy_tail = Stability::new(HEAVY_TAIL_STATION_M, jobs)?;
+        paper::write_stability(&mut out, &stability, &heavy_tail)?;
         return written(arguments, || stability_figures(&stability));
     }
     let experiments = paper::experiments()?;

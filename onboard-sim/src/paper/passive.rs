@@ -14,6 +14,9 @@ use super::PaperError;
 pub const HEIGHT_M: f64 = 300.0;
 /// Centre of gravity above the nozzle (Table 1: `X_CG - X_THR`), m.
 pub const CG_STATION_M: f64 = 0.52;
+/// The same by the other reading of "25 % of the rocket's length, as the engine represents the large majority of the total
+/// mass": a quarter of the length from the nozzle, m. Table 1 has it a quarter from the nose.
+pub const HEAVY_TAIL_STATION_M: f64 = 0.175;
 /// Sea level, kg/m^3, and standard gravity, m/s^2.
 const DENSITY_KG_M3: f64 = 1.225;
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -54,6 +57,13 @@ impl Vehicle {
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;
         let motor = vehicles::motors::builtin(&airframe.motor)?;
         Ok(Self { airframe, motor })
+    }
+
+    /// The same vehicle with its centre of gravity at another station, m above the nozzle.
+    #[must_use]
+    pub fn with_cg_at(mut self, station_m: f64) -> Self {
+        self.airframe.mass.loaded_cg_station_m = station_m;
+        self
     }
 
     /// Its airframe.
@@ -127,7 +137,9 @@ mod tests {
         let fall = vehicle.fall(FRAC_PI_2, start, |_| false).unwrap();
         let (first, last) = (fall[0], fall[fall.len() - 1]);
         assert!((first.angle_to_wind_rad.to_degrees() - 5.0_f64.sqrt()).abs() < 1e-6, "{first:?}");
-        assert!(last.angle_to_wind_rad < 0.3 * first.angle_to_wind_rad, "{last:?}");
+        let late = fall.iter().filter(|now| now.time_s > last.time_s - 2.0);
+        let worst_rad = late.map(|now| now.angle_to_wind_rad).fold(0.0, f64::max);
+        assert!(worst_rad < 0.4 * first.angle_to_wind_rad, "{worst_rad}");
         // 39.4 m/s by hand from the drag areas of Eq. 3 and 8.
         let terminal_m_s = vehicle.terminal_speed_m_s(FRAC_PI_2);
         assert!((terminal_m_s - 39.4).abs() < 0.05, "{terminal_m_s}");

@@ -8,7 +8,7 @@ use campaign::work::in_parallel;
 use world::balance::Balance;
 
 use super::PaperError;
-use super::passive::{CG_STATION_M, Moment, Vehicle};
+use super::passive::{Moment, Vehicle};
 
 /// Directions of the tilt about the body's axis, degrees.
 pub const ROLLS_DEG: [f64; 4] = [0.0, 45.0, 90.0, 135.0];
@@ -57,6 +57,8 @@ impl Fate {
 /// The map and the margins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stability {
+    /// Centre of gravity, m above the nozzle.
+    pub cg_station_m: f64,
     /// Row by row: a row for each of [`OPENINGS_DEG`], a column for each of [`TILTS_DEG`].
     pub fates: Vec<Fate>,
     /// Centre of pressure above the centre of gravity, m, positive is stable: for each of [`OPENINGS_DEG`] and
@@ -65,21 +67,28 @@ pub struct Stability {
 }
 
 impl Stability {
-    /// Flies every cell on `jobs` threads.
+    /// Flies every cell of a vehicle with this centre of gravity, m above the nozzle, on `jobs` threads.
     ///
     /// # Errors
     /// The vehicle cannot be built, or a thread not be started.
-    pub fn new(jobs: usize) -> Result<Self, PaperError> {
-        let vehicle = Vehicle::new()?;
+    pub fn new(cg_station_m: f64, jobs: usize) -> Result<Self, PaperError> {
+        let vehicle = Vehicle::new()?.with_cg_at(cg_station_m);
         let cells: Vec<(f64, f64)> =
             OPENINGS_DEG.iter().flat_map(|opening| TILTS_DEG.iter().map(|tilt| (*opening, *tilt))).collect();
         let fly = |(opening_deg, tilt_deg): &(f64, f64)| fate(&vehicle, *opening_deg, *tilt_deg);
         let fates = in_parallel(&cells, jobs, fly, &|_| ())?.into_iter().collect::<Result<_, _>>()?;
         let balance = Balance::new(vehicle.airframe());
         let margins_m = OPENINGS_DEG
-            .map(|opening_deg| ANGLES_DEG.map(|angle_deg| margin_m(&balance, opening_deg, angle_deg)))
+            .map(|opening_deg| {
+                ANGLES_DEG.map(|angle_deg| margin_m(&balance, opening_deg, angle_deg, cg_station_m))
+            })
             .to_vec();
-        Ok(Self { fates, margins_m })
+        Ok(Self { cg_station_m, fates, margins_m })
+    }
+
+    /// Number of cells with this fate.
+    pub fn count(&self, fate: Fate) -> usize {
+        self.fates.iter().filter(|found| **found == fate).count()
     }
 
     /// The fate from a tilt with an opening, each by its place.
@@ -106,10 +115,10 @@ fn fate(vehicle: &Vehicle, opening_deg: f64, tilt_deg: f64) -> Result<Fate, Pape
 
 /// Least and most over the direction, m. The couple of the lifts goes as the cosine of twice the direction, so its
 /// extremes are in the two planes of symmetry.
-fn margin_m(balance: &Balance, opening_deg: f64, angle_deg: f64) -> [f64; 2] {
+fn margin_m(balance: &Balance, opening_deg: f64, angle_deg: f64, cg_station_m: f64) -> [f64; 2] {
     let of = |roll_deg: f64| {
         let across = balance.across(opening_deg.to_radians(), angle_deg.to_radians(), roll_deg.to_radians());
-        across.map_or(f64::NAN, |across| across.centre_of_pressure_m - CG_STATION_M)
+        across.map_or(f64::NAN, |across| across.centre_of_pressure_m - cg_station_m)
     };
     let (one, other) = (of(0.0), of(90.0));
     [one.min(other), one.max(other)]
@@ -117,6 +126,7 @@ fn margin_m(balance: &Balance, opening_deg: f64, angle_deg: f64) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::passive::{CG_STATION_M, HEAVY_TAIL_STATION_M};
     use super::*;
 
     fn place(values: &[f64], value: f64) -> usize {
@@ -128,7 +138,7 @@ mod tests {
     /// `C_c D L (0.52 - 0.35) sin^2 a`, changes its sign at 11.5 degrees in one plane and at 20.9 in the other.
     #[test]
     fn val_hand_the_static_margin_explains_where_the_paper_s_vehicle_flips() {
-        let stability = Stability::new(2).unwrap();
+        let stability = Stability::new(CG_STATION_M, 2).unwrap();
         let open = OPENINGS_DEG.len() - 1;
         for (angle, [least_m, most_m]) in ANGLES_DEG.iter().zip(stability.margins_m[open]) {
             assert_eq!(least_m > 0.0, *angle < 11.5, "{angle} deg: {least_m}");
@@ -144,6 +154,16 @@ mod tests {
         }
         for [least_m, most_m] in stability.margins_m[0] {
             assert!((least_m + 0.17).abs() < 1e-9 && (most_m + 0.17).abs() < 1e-9);
+        }
+    }
+
+    /// By hand: the middle of the body, where the air pushes at least, is 0.175 m above this centre of gravity.
+    #[test]
+    fn val_hand_with_a_heavy_tail_every_fall_settles() {
+        let stability = Stability::new(HEAVY_TAIL_STATION_M, 2).unwrap();
+        assert_eq!(stability.count(Fate::Settles), stability.fates.len());
+        for [least_m, _] in stability.margins_m.iter().flatten() {
+            assert!(*least_m > 0.175 - 1e-9, "{least_m}");
         }
     }
 }

@@ -2,17 +2,23 @@
 
 use std::io::{self, Write};
 
-use super::passive::{CG_STATION_M, HEIGHT_M};
+use super::passive::HEIGHT_M;
 use super::stability::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
 
-/// Writes the map, the highest opening first, and the static margins.
+/// Writes the map, the highest opening first, and the static margins; and what becomes of the same vehicle with a heavy
+/// tail.
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn write_stability(out: &mut impl Write, stability: &Stability) -> io::Result<()> {
+pub fn write_stability(
+    out: &mut impl Write,
+    stability: &Stability,
+    heavy_tail: &Stability,
+) -> io::Result<()> {
     writeln!(
         out,
-        "The paper's vehicle (centre of gravity {CG_STATION_M} m above the nozzle) falling passively from rest at {HEIGHT_M} m,"
+        "The paper's vehicle (centre of gravity {} m above the nozzle) falling passively from rest at {HEIGHT_M} m,",
+        stability.cg_station_m
     )?;
     writeln!(
         out,
@@ -27,14 +33,13 @@ pub fn write_stability(out: &mut impl Write, stability: &Stability) -> io::Resul
     }
     let ticks: String = TILTS_DEG.iter().map(|tilt_deg| format!("{tilt_deg:>3}")).collect();
     writeln!(out, "{:>8}  {ticks}  tilt at the start, deg", "")?;
-    let cells = |fate| stability.fates.iter().filter(|found| **found == fate).count();
+    let cells = stability.fates.len();
     writeln!(
         out,
-        "{} of {} cells settle, {} depend on the direction, {} flip",
-        cells(Fate::Settles),
-        stability.fates.len(),
-        cells(Fate::DependsOnRoll),
-        cells(Fate::Flips)
+        "{} of {cells} cells settle, {} depend on the direction, {} flip",
+        stability.count(Fate::Settles),
+        stability.count(Fate::DependsOnRoll),
+        stability.count(Fate::Flips)
     )?;
     writeln!(out)?;
     writeln!(
@@ -54,5 +59,17 @@ pub fn write_stability(out: &mut impl Write, stability: &Stability) -> io::Resul
         out,
         "The fins' force across the axis grows with the sine of the angle, the body's, which acts at its middle, 0.17 m"
     )?;
-    writeln!(out, "below the centre of gravity, with its square: beyond some angle the body wins.")
+    writeln!(out, "below the centre of gravity, with its square: beyond some angle the body wins.")?;
+    writeln!(out)?;
+    writeln!(
+        out,
+        "With the centre of gravity {} m above the nozzle, a quarter of the length from the tail instead of the nose, every",
+        heavy_tail.cg_station_m
+    )?;
+    writeln!(
+        out,
+        "margin is {:.0} mm larger: {} of {cells} cells settle.",
+        1e3 * (stability.cg_station_m - heavy_tail.cg_station_m),
+        heavy_tail.count(Fate::Settles)
+    )
 }
