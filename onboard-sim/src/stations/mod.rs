@@ -5,6 +5,7 @@
 //! accepted from that station, and why the last frame from anybody was refused. Pure: times are vehicle times, s.
 
 use flight::rules::arming::Uplink;
+use flight::rules::operator::Operator;
 use mavlink::MessageData as _;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
 use protocol::frame::Frame;
@@ -45,7 +46,7 @@ pub struct Stations {
     known: Vec<Station>,
     refused: Option<Refused>,
     refused_count: u16,
-    armed_by: Option<Address>,
+    commander: Option<(Address, Option<Operator>)>,
     tell_at_s: f64,
 }
 
@@ -76,7 +77,7 @@ impl Stations {
     fn replaceable(&self, time_s: f64) -> Option<usize> {
         let proven = |station: &Station| {
             station.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= PROVEN_FOR_S)
-                || self.armed_by == Some(station.address)
+                || self.armed_by() == Some(station.address)
         };
         self.known.iter().position(|station| !proven(station))
     }
@@ -108,14 +109,19 @@ impl Stations {
         latest_s.map_or(Uplink::NeverHeard, |at_s| Uplink::Heard { age_s: time_s - at_s })
     }
 
-    /// Sets the station that armed the vehicle, if any.
-    pub fn set_armed_by(&mut self, address: Option<Address>) {
-        self.armed_by = address;
+    /// Sets the station that armed the vehicle or has taken command, if any, and its operator.
+    pub fn set_commander(&mut self, commander: Option<(Address, Option<Operator>)>) {
+        self.commander = commander;
     }
 
-    /// The station that armed the vehicle.
+    /// The station that armed the vehicle or has taken command, and its operator.
+    pub fn commander(&self) -> Option<(Address, Option<Operator>)> {
+        self.commander
+    }
+
+    /// The station that armed the vehicle or has taken command.
     pub fn armed_by(&self) -> Option<Address> {
-        self.armed_by
+        self.commander.map(|(address, _)| address)
     }
 
     /// The uplink reports that are due: one for each known station, or one for everybody while there is none.
@@ -145,7 +151,7 @@ impl Stations {
             refused_count: self.refused_count,
             target_system: to.system_id,
             target_component: to.component_id,
-            commands: u8::from(self.armed_by == Some(to)),
+            commands: u8::from(self.armed_by() == Some(to)),
             refusal: refused.map_or(TdFrameRefusal::TD_FRAME_REFUSAL_NONE, |refused| refusal(refused.why)),
             refused_system: from.system_id,
             refused_component: from.component_id,

@@ -219,13 +219,16 @@ fn intervals_can_be_set_within_the_budget_and_read_back() {
     assert!(words.contains("budget is 2000"), "{words}");
     wire.endpoint.on_command(
         0,
-        &CommandRequest {
-            source: GROUND,
-            target: VEHICLE,
-            command: 512,
-            params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
-            confirmation: 0,
-        },
+        (
+            &CommandRequest {
+                source: GROUND,
+                target: VEHICLE,
+                command: 512,
+                params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
+                confirmation: 0,
+            },
+            None,
+        ),
         &wire.vehicle,
     );
     let interval = wire.run(0.5).iter().find_map(|frame| match frame.decode() {
@@ -245,10 +248,10 @@ fn every_phase_has_a_name_for_other_people_s_clients() {
         params: [AVAILABLE_MODES_DATA::ID as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     // A second request while the first still waits is refused for now, so that the queue stays bounded.
     for _ in 0..3 {
-        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     }
     // They use the room that telemetry leaves.
     let sent = wire.run(8.0);
@@ -293,7 +296,7 @@ fn a_flood_of_requests_does_not_silence_telemetry() {
             params: [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     }
     wire.run(2.0);
     assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 18);

@@ -86,7 +86,7 @@ impl Airborne {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(0, &request, &self.rocket);
+        self.endpoint.on_command(0, (&request, None), &self.rocket);
         let sent = self.run(0.3);
         let found = sent
             .iter()
