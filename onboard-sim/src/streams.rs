@@ -79,7 +79,9 @@ impl Standard {
 pub const STANDARD: [Standard; 24] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
-    standard::<TD_CREW_DATA>("RATE_CREW", 2.0).of_crew(),
+    // More often whenever something changes.
+    standard::<TD_CREW_DATA>("RATE_CREW", 1.0).of_crew(),
+    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 0.5).of_crew(),
     standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 10.0).cut_to(32),
@@ -93,8 +95,6 @@ pub const STANDARD: [Standard; 24] = [
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.2),
-    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 1.0).of_crew(),
     // For other clients, off until requested: the messages above already have this data.
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
@@ -104,13 +104,16 @@ pub const STANDARD: [Standard; 24] = [
     // Without its extensions, which are not known here.
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
 ];
 
 /// The periodic messages of the rocket from apogee, in the same order.
 pub const FROM_APOGEE: [Standard; 28] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
-    standard::<TD_CREW_DATA>("RATE_CREW", 2.0).of_crew(),
+    // More often whenever something changes.
+    standard::<TD_CREW_DATA>("RATE_CREW", 1.0).of_crew(),
+    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 0.5).of_crew(),
     standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
@@ -127,8 +130,6 @@ pub const FROM_APOGEE: [Standard; 28] = [
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.2),
-    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 1.0).of_crew(),
     // Off until requested.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0),
@@ -140,6 +141,7 @@ pub const FROM_APOGEE: [Standard; 28] = [
     // Without its extensions, which are not known here.
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
 ];
 
 #[derive(Debug, Clone, Copy)]
@@ -211,7 +213,9 @@ impl Streams {
     }
 
     fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64, crew: bool) -> Self {
-        let streams = messages.iter().enumerate().map(|(place, standard)| {
+        let mut place = 0;
+        let streams = messages.iter().map(|standard| {
+            place += usize::from(crew || !standard.of_crew);
             let rate_max_hz = if is_vital(standard.message_id) { f64::INFINITY } else { rate_max_hz };
             let sent = standard.rate_hz > 0.0 && (crew || !standard.of_crew);
             let interval_s = sent.then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
@@ -221,7 +225,7 @@ impl Streams {
                 default_interval_s: interval_s,
                 interval_s,
                 // Spread in time, so that the slow messages are not all due at the same instant.
-                due_s: 0.02 * place as f64,
+                due_s: 0.02 * (place - 1) as f64,
                 sent_s: f64::NEG_INFINITY,
             }
         });

@@ -23,7 +23,8 @@ use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::PING_DATA;
 use protocol::dialect::{
     AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
-    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
+    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
@@ -131,7 +132,7 @@ impl VehicleEndpoint {
     /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
     pub fn sending_to_crew(standard: &'static [Standard], operators: &[Operator]) -> Self {
         let endpoint = Self::over(Streams::with_crew(standard), SIGNATURE_LEN);
-        Self { operators: operators.to_vec(), ..endpoint }
+        Self { operators: operators.to_vec(), stations: Stations::of_a_crew(), ..endpoint }
     }
 
     fn over(streams: Streams, signature_len: usize) -> Self {
@@ -203,6 +204,7 @@ impl VehicleEndpoint {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
             streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
+            streams.hurry(TD_MISSION_DATA::ID);
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if self.us.accepts(request.target) {

@@ -14,6 +14,8 @@ use protocol::signing::Rejection;
 
 /// Most stations remembered: the crew's, a spare one and an observer's. Each costs a message twice a second.
 pub const MAX_STATIONS: usize = 3;
+/// The same with operators. No more than [`MAX_STATIONS`] are told at once: of more, each in turn.
+const MAX_STATIONS_OF_A_CREW: usize = 6;
 
 /// Interval of the uplink report to every known station, s.
 const TELL_EVERY_S: f64 = 0.5;
@@ -41,16 +43,42 @@ struct Refused {
 }
 
 /// All known stations.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Stations {
+    most: usize,
     known: Vec<Station>,
+    /// The known station that is told next.
+    next: usize,
     refused: Option<Refused>,
     refused_count: u16,
     commander: Option<(Address, Option<Operator>)>,
     tell_at_s: f64,
 }
 
+impl Default for Stations {
+    fn default() -> Self {
+        Self::at_most(MAX_STATIONS)
+    }
+}
+
 impl Stations {
+    /// No stations yet, of a vehicle with operators.
+    pub fn of_a_crew() -> Self {
+        Self::at_most(MAX_STATIONS_OF_A_CREW)
+    }
+
+    fn at_most(most: usize) -> Self {
+        Self {
+            most,
+            known: Vec::new(),
+            next: 0,
+            refused: None,
+            refused_count: 0,
+            commander: None,
+            tell_at_s: 0.0,
+        }
+    }
+
     /// Notes an accepted frame.
     pub fn accepted(&mut self, frame: &Frame, time_s: f64) {
         // A radio's own report is accepted unsigned, from any address: it does not prove a station.
@@ -59,7 +87,7 @@ impl Stations {
         }
         let address = frame.source();
         if self.station(address).is_none() {
-            if self.known.len() >= MAX_STATIONS {
+            if self.known.len() >= self.most {
                 let Some(leaving) = self.replaceable(time_s) else { return };
                 self.known.remove(leaving);
             }
@@ -124,7 +152,8 @@ impl Stations {
         self.commander.map(|(address, _)| address)
     }
 
-    /// The uplink reports that are due: one for each known station, or one for everybody while there is none.
+    /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`], or one for everybody
+    /// while there is none.
     pub fn due(&mut self, time_s: f64) -> Vec<MavMessage> {
         if time_s < self.tell_at_s {
             return Vec::new();
@@ -134,7 +163,10 @@ impl Stations {
         if self.known.is_empty() {
             return vec![self.message(EVERYBODY, None, time_s)];
         }
-        let known = self.known.iter();
+        let told = self.known.len().min(MAX_STATIONS);
+        let first = self.next % self.known.len();
+        self.next = first + told;
+        let known = self.known.iter().cycle().skip(first).take(told);
         known.map(|station| self.message(station.address, Some(station.accepted_at_s), time_s)).collect()
     }
 

@@ -14,12 +14,15 @@ pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage
     match message_id {
         TD_CREW_DATA::ID => snapshot.crew.as_ref().map(|crew| state(crew, snapshot.time_s)),
         TD_OPERATOR_DATA::ID => snapshot.crew.as_ref().and_then(|crew| operator(crew, snapshot.time_s)),
-        TD_MISSION_DATA::ID => Some(MavMessage::TD_MISSION(TD_MISSION_DATA {
-            hash: snapshot.mission.hash.0,
-            name: characters(&snapshot.mission.name),
-        })),
+        // It matters before the flight only, and there it costs no position.
+        TD_MISSION_DATA::ID => snapshot.phase.on_pad().then(|| mission(snapshot)),
         _ => None,
     }
+}
+
+fn mission(snapshot: &Snapshot) -> MavMessage {
+    let name = characters(&snapshot.mission.name);
+    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name })
 }
 
 fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
@@ -49,10 +52,13 @@ fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
     })
 }
 
-/// One operator a second, in turn.
+/// Operators per second.
+const TURNS_PER_S: f64 = 0.5;
+
+/// Each operator in turn.
 fn operator(crew: &CrewFacts, time_s: f64) -> Option<MavMessage> {
     let count = crew.operators.len().max(1);
-    let operator = crew.operators.get(time_s as usize % count)?;
+    let operator = crew.operators.get((TURNS_PER_S * time_s) as usize % count)?;
     let role = match operator.role {
         Role::Observer => TdRole::TD_ROLE_OBSERVER,
         Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,

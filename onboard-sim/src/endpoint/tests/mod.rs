@@ -119,14 +119,15 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_kept() {
-    assert!(Streams::of(&STANDARD).fit(), "{} B/s", Streams::of(&STANDARD).bytes_s());
+    let streams = Streams::of(&STANDARD);
+    assert!(streams.fit(), "{} B/s", streams.bytes_s());
     let mut wire = Wire::new();
     let sent = wire.run(10.0);
     for standard in &STANDARD {
         if standard.message_id == TD_LANDING_VERDICT_DATA::ID {
             continue;
         }
-        let expected = 10.0 * standard.rate_hz;
+        let expected = 10.0 * streams.rate_hz(standard.message_id);
         let found = count(&sent, standard.message_id) as f64;
         assert!((found - expected).abs() <= 1.0, "message {}: {found} of {expected}", standard.message_id);
     }
@@ -361,6 +362,7 @@ proptest! {
 }
 
 mod budget;
+mod crew;
 mod links;
 mod manners;
 mod questions;

@@ -98,7 +98,8 @@ impl Airborne {
 
 #[test]
 fn its_standard_rates_fit_the_radio_signed_or_not() {
-    for streams in [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE)] {
+    let all = [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE), Streams::with_crew(&FROM_APOGEE)];
+    for streams in all {
         assert!(streams.fit(), "{} B/s", streams.bytes_s());
         assert!(streams.rate_hz(LOCAL_POSITION_NED_DATA::ID) >= 3.0);
     }
