@@ -119,7 +119,8 @@ const LEGACY_REQUESTS: [(u16, u32); 3] =
 pub fn mav_result(ending: Ending) -> MavResult {
     match ending {
         Ending::Accepted => MavResult::MAV_RESULT_ACCEPTED,
-        Ending::NotNow => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+        // Other ground stations take it for the refusal that it is for them.
+        Ending::NotNow | Ending::Asked => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
         Ending::Denied => MavResult::MAV_RESULT_DENIED,
         Ending::Failed => MavResult::MAV_RESULT_FAILED,
     }

@@ -357,17 +357,18 @@ impl VehicleEndpoint {
             }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(link, message_id, of, vehicle),
         };
-        self.acknowledge(link, request, result);
+        self.acknowledge(link, request, (result, 0));
         if let Some(reason) = reason {
             self.say(Severity::Warning, &reason);
         }
     }
 
     /// Answers a command. Repeated refusals to one station are not answered every time.
-    fn acknowledge(&mut self, link: usize, request: &CommandRequest, result: MavResult) {
+    fn acknowledge(&mut self, link: usize, request: &CommandRequest, (result, detail): (MavResult, i32)) {
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
         if !refused || self.refusals.may_answer(request.source, self.now_s) {
-            self.lane(link).answer(Answer::Command(CommandAnswer::to(request, result)));
+            let answer = CommandAnswer { detail, ..CommandAnswer::to(request, result) };
+            self.lane(link).answer(Answer::Command(answer));
         }
     }
 

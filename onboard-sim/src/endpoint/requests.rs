@@ -101,7 +101,9 @@ impl VehicleEndpoint {
             if request.asked == Asked::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
             } else {
-                self.acknowledge(link, &command, result);
+                let asked = vehicle.computer().crew().two_person.waiting(vehicle.time_s());
+                let asked = asked.filter(|_| answer.ending == Ending::Asked);
+                self.acknowledge(link, &command, (result, asked.map_or(0, |ask| i32::from(ask.number))));
             }
         }
     }

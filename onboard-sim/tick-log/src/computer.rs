@@ -149,6 +149,7 @@ fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
         Ending::NotNow => 1,
         Ending::Denied => 2,
         Ending::Failed => 3,
+        Ending::Asked => 4,
     };
     v1::ComputerOutput {
         gimbal_rad: output.commands.gimbal_rad.to_vec(),

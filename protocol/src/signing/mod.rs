@@ -185,6 +185,12 @@ impl Signing {
         }
     }
 
+    /// Checks what the vehicle sends with this key, the one that all share.
+    #[must_use]
+    pub fn checking_with(self, shared: Key) -> Self {
+        Self { shared, ..self }
+    }
+
     /// Signs with an operator's key from now on; what the vehicle sends is still checked with the shared one.
     #[must_use]
     pub fn as_operator(self, number: u8, key: Key) -> Self {

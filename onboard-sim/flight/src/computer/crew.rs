@@ -86,6 +86,8 @@ pub enum Ending {
     Denied,
     /// Understood, but impossible.
     Failed,
+    /// Noted: a second person has to confirm it.
+    Asked,
 }
 
 /// The answer to a request, with the reason if it was not accepted.

@@ -95,7 +95,7 @@ impl Computer {
                 if waited != Some(ask) {
                     self.table.say(Severity::Notice, reason.clone());
                 }
-                Err(Answer { ending: Ending::NotNow, reason: Some(reason) })
+                Err(Answer { ending: Ending::Asked, reason: Some(reason) })
             }
             Reply::Refused(refusal) => Err(self.deny(asked, why_no_agreement(refusal, act, time_s))),
         }
