@@ -142,6 +142,7 @@ fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
 pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting | Acknowledgement::InProgress => ("-", TextRole::Caution),
+        Acknowledgement::Asked => ("asked", TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER", TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("ok", TextRole::Good),
         Acknowledgement::Answered(_) => ("REFUSED", TextRole::Alarm),
@@ -166,6 +167,7 @@ pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Lin
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
+        Acknowledgement::Asked => ("asked, awaits another role".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),

@@ -83,7 +83,8 @@ impl Flown {
             let mut requests = Vec::new();
             while let Some(reached) = crew.next_if(|reached| reached.frame <= frame) {
                 requests.extend(reached.request);
-                let commander = reached.commander_age_s.map(|age_s| Commander { station: (255, 190), age_s });
+                let commander =
+                    reached.commander_age_s.map(|age_s| Commander { station: (255, 190), age_s, by: None });
                 vehicle.set_uplink(reached.uplink, commander);
                 vehicle.set_pin_out(reached.pin_out);
             }
@@ -334,7 +335,7 @@ fn any_crew() -> impl Strategy<Value = Vec<Reached>> {
     );
     let one = one.prop_map(|(frame, asked, uplink, commander_age_s, pin_out, station)| Reached {
         frame,
-        request: asked.map(|asked| Request { asked, uplink, station }),
+        request: asked.map(|asked| Request { asked, uplink, station, by: None, confirms: None }),
         uplink,
         commander_age_s,
         pin_out,

@@ -238,7 +238,7 @@ impl Rig {
     }
 
     pub(crate) fn answer_to(&mut self, target: Address, command: MavCmd, result: u8) {
-        let answer = CommandAnswer { command: command as u16, result, progress: 0, target };
+        let answer = CommandAnswer { command: command as u16, result, progress: 0, detail: 0, target };
         let frame: Option<Frame> = answer.encode(&mut self.encoder);
         if let Some(frame) = frame {
             self.msg(Msg::Frame(frame));
