@@ -2,6 +2,10 @@
 //!
 //! A mission contains its airframe as a table, or names a built-in airframe.
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::{String, ToString as _};
+
 use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::airframe::BadValue;
 use flight::vehicle::drop::Drop;

@@ -1,5 +1,6 @@
 //! Range checks of a parsed profile: one line for each key.
 
+use alloc::string::{String, ToString as _};
 use core::fmt::Display;
 
 use flight::guidance::controller::MAX_HORIZON_STEPS;
