@@ -16,6 +16,7 @@
 //! * [`tick`](mod@tick): solves one recorded tick again.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
+//! * [`frames`]: a flight as the frames that a board reads.
 //! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
 //! * [`print`](mod@print): prints reports as text for people, JSON for programs and JUnit XML for build servers.
@@ -24,6 +25,7 @@ pub mod compare;
 pub mod controller;
 pub mod evaluate;
 pub mod export;
+pub mod frames;
 pub mod gate;
 pub mod import;
 pub mod info;

@@ -1,13 +1,15 @@
 //! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit. Both
 //! vehicles use the same records.
 
+use alloc::vec::Vec;
+
 use flight::computer::crew::{Answer, Asked, Ending, People, Request};
 use flight::computer::pilot::Sensed;
 use flight::computer::plane::PlaneSensed;
 use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
-use protocol::log::computer_v1 as v1;
+use log_records::computer_v1 as v1;
 
 use crate::pilot::{
     PilotLogError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
@@ -45,8 +47,7 @@ pub fn frame_to_log(
     if rehearsed_before {
         input.rehearsed = None;
     }
-    let phase = u32::from(computer.mode().phase.index());
-    v1::ComputerFrame { input, output: output_to_log(output, phase), state_digest: computer.digest() }
+    v1::ComputerFrame { input, output: output_to_log(output, computer), state_digest: computer.digest() }
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
@@ -143,7 +144,8 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
     Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
 }
 
-fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
+/// A frame's output as a record; `computer` has just flown it.
+pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
     let ended = |answer: &Answer| match answer.ending {
         Ending::Accepted => 0,
         Ending::NotNow => 1,
@@ -158,7 +160,7 @@ fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
         parachute: output.commands.parachute,
         released: output.released,
         planned: output.planned,
-        phase,
+        phase: u32::from(computer.mode().phase.index()),
         answers: output.answers.iter().map(ended).collect(),
         ignite_booster: output.commands.booster.ignite.then_some(true),
         separate_booster: output.commands.booster.separate.then_some(true),
@@ -399,7 +401,7 @@ mod tests {
         let error =
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
-        let both = v1::ComputerInput { known: Some(protocol::log::flight_v1::Estimate::default()), ..input };
+        let both = v1::ComputerInput { known: Some(log_records::flight_v1::Estimate::default()), ..input };
         assert_eq!(input_from_log(&both).unwrap_err(), PilotLogError::Sensed { frame: 7 });
     }
 }

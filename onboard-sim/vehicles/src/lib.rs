@@ -9,6 +9,10 @@
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
 //! * [`profile`]: profiles of planar landings, from TOML.
 
+#![no_std]
+
+extern crate alloc;
+
 // The unit tests of `flight` compile these files as one of their own modules, so paths here start with `super` or
 // `flight`.
 pub mod airframe;

@@ -1,5 +1,8 @@
 //! Range checks of what a file says: one line for each key.
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::{String, ToString as _};
 use core::fmt::Display;
 
 use flight::vehicle::airframe;

@@ -4,6 +4,7 @@ mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod frames;
 mod gate;
 mod import;
 mod info;
@@ -90,6 +91,8 @@ enum Question {
     Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
     Export(export::Ask),
+    /// Writes a flight as the frames that `board fly` reads, and the answers that it should give.
+    Frames(frames::Ask),
     /// Converts a ground station's .tlog to a flight log: telemetry only, nothing can be re-executed.
     Import(import::Ask),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
@@ -140,6 +143,7 @@ impl Cli {
             Question::Compare(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
+            Question::Frames(ask) => ask.run(),
             Question::Import(ask) => ask.run(),
             Question::Recover(ask) => ask.run(),
         }

@@ -4,6 +4,10 @@
 
 mod validate;
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::{String, ToString as _};
+
 use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;

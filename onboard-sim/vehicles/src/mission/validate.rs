@@ -1,5 +1,7 @@
 //! Range checks of a parsed mission: one line for each key.
 
+use alloc::format;
+
 use flight::control::aim::AimGains;
 use flight::guidance::descent::DescentGains;
 use flight::guidance::ignition::IgnitionSettings;

@@ -4,6 +4,9 @@
 
 mod validate;
 
+use alloc::borrow::ToOwned as _;
+use alloc::string::{String, ToString as _};
+
 use flight::vehicle::profile::Profile;
 
 /// The built-in profiles: name and TOML text.
