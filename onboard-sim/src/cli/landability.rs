@@ -127,7 +127,12 @@ fn asked(arguments: &LandabilityArguments, loaded: &LoadedFlight) -> [&'static s
     }
 }
 
-fn finish(arguments: &LandabilityArguments, map: &Map, name: &str, asked: &str) -> anyhow::Result<ExitCode> {
+fn finish(
+    arguments: &LandabilityArguments,
+    map: &Map,
+    name: &str,
+    [asked, how]: [&str; 2],
+) -> anyhow::Result<ExitCode> {
     let mut stdout = std::io::stdout().lock();
     writeln!(stdout, "{name}: {asked} ({how})").context("standard output")?;
     map.write_table(&mut stdout)?;
