@@ -62,7 +62,7 @@ pub(crate) struct LandabilityArguments {
 enum Ask {
     /// Does the mission's own guidance land, inside the limits of the legs? One simulated flight for each cell.
     Flown,
-    /// Could a clairvoyant land? An upper bound in vertical motion alone, some hundred times cheaper.
+    /// Could a clairvoyant land? An upper bound in vertical motion alone, some forty times cheaper.
     Attainable,
 }
 
@@ -79,6 +79,10 @@ pub(crate) fn run(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> 
             landability::map(&loaded.profile, axes, jobs, &|done| show(done, cells(axes), "cells"))?
         }
         LoadedFlight::InSpace(flight) => {
+            anyhow::ensure!(
+                arguments.y.is_some() || !matches!(arguments.ask, Ask::Attainable),
+                "--ask attainable needs --y, as in ignition-height=40:90:26: its bound knows no wind"
+            );
             let axes = axes(arguments, SPACE)?;
             let recipe = recipe(arguments, &flight.recipe)?;
             let question = match arguments.ask {
@@ -127,7 +131,12 @@ fn asked(arguments: &LandabilityArguments, loaded: &LoadedFlight) -> [&'static s
     }
 }
 
-fn finish(arguments: &LandabilityArguments, map: &Map, name: &str, asked: &str) -> anyhow::Result<ExitCode> {
+fn finish(
+    arguments: &LandabilityArguments,
+    map: &Map,
+    name: &str,
+    [asked, how]: [&str; 2],
+) -> anyhow::Result<ExitCode> {
     let mut stdout = std::io::stdout().lock();
     writeln!(stdout, "{name}: {asked} ({how})").context("standard output")?;
     map.write_table(&mut stdout)?;

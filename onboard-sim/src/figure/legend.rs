@@ -10,6 +10,8 @@ const SAMPLE_PX: i32 = 26;
 const GAP_PX: i32 = 18;
 const LEFT_PX: i32 = 16;
 const ROW_PX: i32 = 24;
+/// Letters of a name that count.
+const LONGEST: i32 = 1000;
 
 /// Names at their places.
 pub(super) struct Legend {
@@ -23,8 +25,9 @@ impl Legend {
     pub(super) fn new(names: Vec<String>, width_px: u32) -> Self {
         let (mut left_px, mut row) = (LEFT_PX, 0);
         let mut place = |name: &String| {
-            let entry_px = SAMPLE_PX + LETTER_PX * name.chars().count() as i32 + GAP_PX;
-            if left_px > LEFT_PX && left_px + entry_px > width_px as i32 {
+            let letters = i32::try_from(name.chars().count()).unwrap_or(LONGEST).min(LONGEST);
+            let entry_px = SAMPLE_PX + LETTER_PX * letters + GAP_PX;
+            if left_px > LEFT_PX && left_px + entry_px > width_px.cast_signed() {
                 (left_px, row) = (LEFT_PX, row + 1);
             }
             let place = (left_px, row * ROW_PX + ROW_PX / 2);

@@ -31,7 +31,7 @@ pub fn write_stability(
         let signs: String = signs.flat_map(|sign| [' ', ' ', sign]).collect();
         writeln!(out, "{opening_deg:>8} |{signs}")?;
     }
-    let ticks: String = TILTS_DEG.iter().map(|tilt_deg| format!("{tilt_deg:>3}")).collect();
+    let ticks = TILTS_DEG.map(|tilt_deg| format!("{tilt_deg:>3}")).concat();
     writeln!(out, "{:>8}  {ticks}  tilt at the start, deg", "")?;
     let cells = stability.fates.len();
     writeln!(
@@ -46,14 +46,13 @@ pub fn write_stability(
         out,
         "Static margin: centre of pressure above the centre of gravity, mm (above 0: stable); worst and best plane"
     )?;
-    let angles: String =
-        ANGLES_DEG.iter().map(|angle_deg| format!("{:>14}", format!("{angle_deg} deg"))).collect();
+    let angles = ANGLES_DEG.map(|angle_deg| format!("{:>14}", format!("{angle_deg} deg"))).concat();
     writeln!(out, "fins deg {angles}  to the wind")?;
     for (opening_deg, margins_m) in OPENINGS_DEG.iter().zip(&stability.margins_m).rev() {
         let margins = margins_m.iter().map(|[least_m, most_m]| {
             format!("{:>14}", format!("{:+.0} {:+.0}", 1e3 * least_m, 1e3 * most_m))
         });
-        writeln!(out, "{opening_deg:>8} {}", margins.collect::<String>())?;
+        writeln!(out, "{opening_deg:>8} {}", margins.collect::<Vec<_>>().concat())?;
     }
     writeln!(
         out,

@@ -55,7 +55,8 @@ fn write_objective(out: &mut impl Write, objective: &Objective) -> io::Result<()
         writeln!(out, "{name:<56} {row}   1 : {:.2} : {:.2}", ratio(1), ratio(2))
     };
     writeln!(out)?;
-    let weights: String = objective.weights.iter().map(|p| format!("{:>12}", format!("P = {p}"))).collect();
+    let weights = objective.weights.iter().map(|p| format!("{:>12}", format!("P = {p}")));
+    let weights = weights.collect::<Vec<_>>().concat();
     writeln!(out, "{:<56} {weights}   ratios 0.5 : 1 : 2", "J of Table 3")?;
     line(out, "the paper", &objective.paper)?;
     line(out, "Eq. 28 at the paper's own final states", &objective.at_paper_finals)?;
