@@ -1,0 +1,319 @@
+//! Along the nose: drag of body and fins, thrust, burn time, shape of the curve, ignition, and what the exhaust takes
+//! away of the drag.
+//!
+//! The accelerometer feels `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B` and on the fins `F`
+//! as the airframe's data have them at the estimated speed, and the mass `m` of the data. While the vehicle falls there
+//! is no `T`, and the fins' changing openings tell `F` from `B`; then `d_b` and `d_f` are known when the motor is lit.
+//! All is fitted at once, over the fall and the burn.
+//!
+//! The accelerometer cannot tell a stronger motor from a lighter vehicle: every scale is per mass of the data.
+//!
+//! The largest error is the wind along the nose, which nothing on board measures: it is a process with the spectrum of
+//! vertical gusts (MIL-F-8785C, section 3.7.3.4) and an intensity that the same samples tell.
+
+use flight::computer::FRAME_S;
+use flight::estimation::estimator::VehicleNow;
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::Air;
+use nalgebra::{Matrix2, Vector2};
+
+use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
+use super::least_squares::{Prior, Solution, solve, solve_from};
+use super::trace::{Frame, Trace};
+use super::whiten::{NoiseStep, Whitener, lowest};
+
+/// Below this speed the air force is not worth its errors, m/s.
+const SLOWEST_M_S: f64 = 5.0;
+/// Frames before the reported contact that are left out: a switch may be 10 ms late, and the feet push before it.
+const FRAMES_BEFORE_CONTACT: usize = 4;
+/// Fewer frames of fall (half a second) tell nothing of the drag.
+const FEWEST_FRAMES: usize = 100;
+/// Standard deviation of an accelerometer's scale: 0.1 % is what hobby units are calibrated to. Nothing on board shows it,
+/// and it goes into every scale.
+pub(super) const ACCELEROMETER_SCALE_SIGMA: f64 = 0.001;
+
+pub(super) const BODY: usize = 0;
+pub(super) const FINS: usize = 1;
+pub(super) const BIAS: usize = 2;
+pub(super) const IMPULSE: usize = 3;
+pub(super) const BURN_TIME: usize = 4;
+pub(super) const DELAY: usize = 5;
+pub(super) const SHAPE: usize = 6;
+pub(super) const BODY_LOSS: usize = SHAPE + SHAPE_TERMS;
+pub(super) const FIN_LOSS: usize = BODY_LOSS + 1;
+
+/// A frame of the fall or the burn.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    end_s: f64,
+    felt_m_s2: f64,
+    /// Air force along the nose on body and fins by the airframe's data, N.
+    body_n: f64,
+    fins_n: f64,
+    /// Air force along the nose for a metre per second of wind upwards, N s/m.
+    by_updraught: f64,
+    /// Way through the air since the frame before, as a fraction of the length of vertical gusts; `None` after a gap.
+    way: Option<f64>,
+    /// The cosine of the angle between thrust and nose.
+    thrust_along: f64,
+}
+
+/// What was found along the nose.
+#[derive(Debug, Clone)]
+pub(super) struct Along {
+    pub(super) solution: Solution,
+    pub(super) priors: Vec<Prior>,
+    /// Fraction of the air force that is the body's, on average over the fall.
+    pub(super) body_share: f64,
+    /// Standard deviation of the wind along the vertical, m/s.
+    pub(super) updraught_m_s: f64,
+    /// When the igniter was fired, s.
+    pub(super) commanded_s: Option<f64>,
+    /// How long the thrust was seen, s.
+    pub(super) burn_seen_s: f64,
+}
+
+impl Along {
+    pub(super) fn begins_s(&self) -> Option<f64> {
+        self.commanded_s.map(|at_s| at_s + self.solution.values[DELAY])
+    }
+
+    pub(super) fn burn<'a>(&self, trace: &'a Trace) -> Burn<'a> {
+        burn_of(trace, &self.solution.values)
+    }
+}
+
+fn burn_of<'a>(trace: &'a Trace, values: &[f64]) -> Burn<'a> {
+    Burn {
+        curve: &trace.mission.motor_curve,
+        impulse_scale: values[IMPULSE],
+        // A trial of the iteration may be far off.
+        burn_time_scale: values[BURN_TIME].max(0.2),
+        shape: core::array::from_fn(|k| values[SHAPE + k]),
+    }
+}
+
+/// The frames of the fall and the burn: from the first fast one after apogee until the contact.
+pub(super) fn falling(trace: &Trace) -> &[Frame] {
+    let falls = |frame: &Frame| {
+        !frame.phase.before_apogee() && !frame.parachute && !frame.booster_attached && !frame.contact
+    };
+    let fast = |frame: &Frame| falls(frame) && frame.believed.state.velocity_m_s.norm() > SLOWEST_M_S;
+    let frames = &trace.frames;
+    let Some(first) = frames.iter().position(fast) else { return &[] };
+    let length = frames[first..].iter().take_while(|frame| falls(frame)).count();
+    &frames[first..first + length.saturating_sub(FRAMES_BEFORE_CONTACT)]
+}
+
+/// When the igniter was fired, s.
+pub(super) fn commanded_s(trace: &Trace) -> Option<f64> {
+    trace.frames.iter().find(|frame| frame.ignite && !frame.booster_attached).map(|frame| frame.time_s)
+}
+
+/// Whether a frame follows another without a gap.
+pub(super) fn follows(before: &Frame, frame: &Frame) -> bool {
+    frame.time_s - before.time_s < 1.5 * FRAME_S
+}
+
+fn samples(trace: &Trace, frames: &[Frame], thrust_along: &dyn Fn(f64) -> f64) -> Vec<Sample> {
+    let mission = &trace.mission;
+    let mass_model = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
+    let mass = mass_model.at(0.0);
+    let pairs = frames.first().map(|first| (first, first)).into_iter();
+    let pairs = pairs.chain(frames.windows(2).map(|pair| (&pair[0], &pair[1])));
+    let sampled = pairs.map(|(before, frame)| {
+        let near = follows(before, frame) && before.time_s < frame.time_s;
+        let before = if near { before } else { frame };
+        let in_body = |frame: &Frame| {
+            let state = &frame.believed.state;
+            state.world_from_body.inverse_transform_vector(&frame.believed.velocity_through_air_m_s())
+        };
+        let through_air = 0.5 * (in_body(before) + in_body(frame));
+        let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
+        let state = &frame.believed.state;
+        let height_m = state.position_m.z;
+        let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
+        let vehicle = VehicleNow::of(&mission.airframe, &mass, density, fins_rad, false, 0.0);
+        let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
+        let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
+        let rate = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
+        let up = state.world_from_body.inverse_transform_vector(&nalgebra::Vector3::z());
+        let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;
+        Sample {
+            end_s: frame.time_s,
+            felt_m_s2: frame.measured.imu.specific_force_m_s2.x,
+            body_n: body.air_force_n(&through_air, &rate).x,
+            fins_n: fins.air_force_n(&through_air, &rate).x,
+            by_updraught: 0.5 * (in_updraught(1.0) - in_updraught(-1.0)),
+            way: near.then(|| through_air.norm() * FRAME_S / gust_length_m(height_m)),
+            thrust_along: thrust_along(frame.time_s),
+        }
+    });
+    sampled.collect()
+}
+
+/// Length of vertical gusts: the height, between 10 and 1,000 ft.
+fn gust_length_m(height_m: f64) -> f64 {
+    height_m.clamp(3.048, 304.8)
+}
+
+/// Vertical gusts of unit intensity: two equal lags in a row, over a fraction of the length.
+pub(super) fn gust_step(way: Option<f64>, by_gust: f64, white: f64) -> NoiseStep {
+    const ROOT_3: f64 = 1.732_050_807_568_877_2;
+    let stationary = Matrix2::new(0.5, 0.25, 0.25, 0.25);
+    let share = way.unwrap_or(0.0);
+    let decay = libm::exp(-share);
+    let transition = Matrix2::new(decay, 0.0, decay * share, decay);
+    NoiseStep {
+        transition,
+        process: stationary - transition * stationary * transition.transpose(),
+        begins: way.is_none().then_some(stationary),
+        seen: Vector2::new(ROOT_3, 1.0 - ROOT_3) * by_gust,
+        white,
+    }
+}
+
+/// Variance of the noise of each sample from the third differences of the series, which hardly see a smooth motion: that of
+/// a difference is 20 times that of a sample.
+pub(super) fn white_variance(values: &[f64]) -> Option<f64> {
+    let thirds: Vec<f64> =
+        values.windows(4).map(|four| four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).collect();
+    if thirds.is_empty() {
+        return None;
+    }
+    // Steps of fins and igniter are outliers: the median of the squares is 0.4549 of the variance of normal numbers.
+    let mut squares: Vec<f64> = thirds.iter().map(|third| third * third).collect();
+    squares.sort_by(f64::total_cmp);
+    let median = squares[squares.len() / 2];
+    (median > 0.0).then_some(median / (0.454_936 * 20.0))
+}
+
+/// Fits fall and burn; `None` if the flight has too little of a fall, with the reason.
+pub(super) fn fit_along(
+    trace: &Trace,
+    thrust_along: &dyn Fn(f64) -> f64,
+) -> Result<Along, &'static str> {
+    let frames = falling(trace);
+    let commanded_s = commanded_s(trace);
+    let samples = samples(trace, frames, thrust_along);
+    let fallen = samples.partition_point(|sample| commanded_s.is_none_or(|at_s| sample.end_s <= at_s));
+    if fallen < FEWEST_FRAMES {
+        return Err("the flight has less than half a second of free fall above 5 m/s");
+    }
+    let mission = &trace.mission;
+    let propellant_kg = mission.motor_curve.propellant_mass_kg();
+    let mass_model = MassModel::new(&mission.airframe.mass, propellant_kg);
+    let loaded_kg = mass_model.at(0.0).mass_kg;
+    let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.felt_m_s2).collect::<Vec<_>>();
+    let quiet = white_variance(&felt(&samples[..fallen])).ok_or("the accelerometer's samples do not change")?;
+    let shaken = white_variance(&felt(&samples[fallen..])).unwrap_or(quiet).max(quiet);
+    let at_ignition = &frames[fallen.min(frames.len()) - 1].believed;
+    let bias = Prior {
+        mean: at_ignition.accelerometer_bias_m_s2.x,
+        sigma: at_ignition.sigmas.accelerometer_bias_m_s2.x.max(1e-4),
+    };
+    let wide = Prior { mean: 1.0, sigma: 0.5 };
+    let of_fall = [wide, wide, bias];
+
+    // The intensity of the gusts: the most likely one, with the drag's uncertainty integrated out.
+    let noises = |samples: &[Sample], updraught_m_s: f64| {
+        let steps: Vec<NoiseStep> = samples
+            .iter()
+            .enumerate()
+            .map(|(place, sample)| {
+                let by_gust = sample.by_updraught * updraught_m_s / loaded_kg;
+                gust_step(sample.way.filter(|_| place > 0), by_gust, if place < fallen { quiet } else { shaken })
+            })
+            .collect();
+        Whitener::new(steps.into_iter())
+    };
+    let fall = &samples[..fallen];
+    let of_drag = |values: &[f64]| -> Vec<f64> {
+        let missed = fall.iter().map(|sample| {
+            sample.felt_m_s2
+                - values[BIAS]
+                - (values[BODY] * sample.body_n + values[FINS] * sample.fins_n) / loaded_kg
+        });
+        missed.collect()
+    };
+    let surprise = |logarithm: f64| {
+        let whitener = noises(fall, libm::exp(logarithm));
+        let Some(found) = solve(&of_fall, |values| whitener.apply(&of_drag(values))) else {
+            return f64::INFINITY;
+        };
+        let uncertain = found.covariance.determinant();
+        whitener.surprise(&of_drag(&found.values)) - libm::log(uncertain.max(f64::MIN_POSITIVE))
+    };
+    let updraught_m_s = libm::exp(lowest(libm::log(0.02), libm::log(4.0), 14, surprise));
+    let sum = |value: fn(&Sample) -> f64| fall.iter().map(value).sum::<f64>();
+    let (body_n, fins_n) = (sum(|sample| sample.body_n), sum(|sample| sample.fins_n));
+    let body_share = if body_n + fins_n > 0.0 { body_n / (body_n + fins_n) } else { 0.5 };
+    let found = |solution, priors, burn_seen_s| Along {
+        solution,
+        priors,
+        body_share,
+        updraught_m_s,
+        commanded_s,
+        burn_seen_s,
+    };
+
+    let Some(lit_s) = commanded_s.and_then(|at_s| thrust_seen_s(&samples[fallen..], at_s, loaded_kg, mission))
+    else {
+        let whitener = noises(fall, updraught_m_s);
+        let solution = solve(&of_fall, |values| whitener.apply(&of_drag(values))).ok_or(NOT_SOLVED)?;
+        return Ok(found(solution, of_fall.to_vec(), 0.0));
+    };
+    let commanded = commanded_s.unwrap_or(lit_s);
+    let mut priors = of_fall.to_vec();
+    priors.extend([wide, wide, Prior { mean: mission.ignition.delay_s, sigma: 1.0 }]);
+    // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
+    let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
+    priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
+    // Nobody has data for a jet against the wind: the body may lose all or nothing; the fins sit outside the jet.
+    priors.push(Prior { mean: mission.exhaust.body_loss, sigma: 0.5 });
+    priors.push(Prior { mean: mission.exhaust.fin_loss, sigma: 0.05 });
+    let whitener = noises(&samples, updraught_m_s);
+    let model = |values: &[f64]| -> Vec<f64> {
+        let burn = burn_of(trace, values);
+        let begins_s = commanded + values[DELAY];
+        let missed = samples.iter().map(|sample| {
+            let to_s = sample.end_s - begins_s;
+            let lit = to_s > 0.0;
+            let mass_kg = if lit { mass_model.at(burn.burnt_kg(to_s - 0.5 * FRAME_S)).mass_kg } else { loaded_kg };
+            let thrust_n = if lit { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
+            let (body, fins) = if thrust_n > 0.0 {
+                (1.0 - values[BODY_LOSS], 1.0 - values[FIN_LOSS])
+            } else {
+                (1.0, 1.0)
+            };
+            let air_n = values[BODY] * body * sample.body_n + values[FINS] * fins * sample.fins_n;
+            sample.felt_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
+        });
+        whitener.apply(&missed.collect::<Vec<_>>())
+    };
+    let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    start[DELAY] = lit_s - commanded;
+    let solution = solve_from(&start, &priors, model).ok_or(NOT_SOLVED)?;
+    let burn_seen_s = samples.last().map_or(0.0, |last| last.end_s - commanded - solution.values[DELAY]);
+    Ok(found(solution, priors, burn_seen_s))
+}
+
+const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples";
+
+/// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over what was felt when the
+/// igniter was fired, for three frames. `None` if they do not, or if the burn is not seen for half a second.
+fn thrust_seen_s(
+    samples: &[Sample],
+    commanded_s: f64,
+    mass_kg: f64,
+    mission: &flight::vehicle::mission::Mission,
+) -> Option<f64> {
+    const SEEN_FRAMES: usize = 100;
+    let rise_m_s2 = 0.1 * mission.motor_curve.peak_thrust_n() / mass_kg;
+    let before = samples.first()?.felt_m_s2;
+    let first = samples
+        .windows(3)
+        .position(|three| three.iter().all(|sample| sample.felt_m_s2 > before + rise_m_s2))?;
+    let seen = samples.len() - first >= SEEN_FRAMES;
+    seen.then(|| (samples[first].end_s - FRAME_S).max(commanded_s))
+}
