@@ -127,7 +127,13 @@ fn main() -> anyhow::Result<()> {
                     Some(found) => {
                         let held = (found.low..=found.high).contains(&true_value);
                         if std::env::var("SHOW").is_ok_and(|shown| shown == name) {
-                            writeln!(stderr, "{number} {true_value} {found:?}")?;
+                            let other = |name: &str| fit.get(name).map_or(f64::NAN, |found| found.value);
+                            writeln!(
+                                stderr,
+                                "{number} truth {true_value:.5} err {:.5} sigma {:.5} wind {:.2} updraught {:.3}",
+                                found.value - true_value, found.sigma,
+                                libm::hypot(other("wind_x"), other("wind_y")), other("updraught_rms"),
+                            )?;
                         }
                         tally.errors.push((found.value - true_value, found.sigma, held));
                     }

@@ -14,6 +14,7 @@
 //!   that changes the verdict.
 //! * [`gate`]: holds a directory of flights against a baseline.
 //! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals.
+//! * [`learn`](mod@learn): what all flights so far tell of a lot, an airframe and a site, and GO or NO-GO.
 //! * [`tick`](mod@tick): solves one recorded tick again.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
@@ -29,6 +30,7 @@ pub mod fit;
 pub mod gate;
 pub mod import;
 pub mod info;
+pub mod learn;
 pub mod log;
 pub mod output;
 pub mod print;

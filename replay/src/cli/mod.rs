@@ -4,9 +4,11 @@ mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod fit;
 mod gate;
 mod import;
 mod info;
+mod learn;
 mod recover;
 mod refly;
 mod report;
@@ -38,7 +40,8 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
-///      gate: some flight got worse, lands no longer, diverged or is missing
+///      gate: some flight got worse, lands no longer, diverged or is missing;
+///      learn: NO-GO
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
@@ -94,6 +97,18 @@ enum Question {
     Import(import::Ask),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
     Recover(recover::Ask),
+    /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
+    ///
+    /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
+    /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is
+    /// compared with its motor's certified curve.
+    Fit(fit::Ask),
+    /// Learns a motor lot, an airframe and a site from all flights so far, and says GO or NO-GO for the next one.
+    ///
+    /// The prior is a set of dispersions; each burn moves it. The day's flights are simulated with motors that the lot may
+    /// have, and the landing rate gets an interval. GO (exit code 0) if the probability of a rate below the limit is at most
+    /// the risk that is taken, NO-GO (exit code 1) if not.
+    Learn(learn::Ask),
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
     Tick(tick::Ask),
 }
@@ -133,6 +148,8 @@ impl Cli {
             Question::Verify(ask) => ask.run(),
             Question::Evaluate(ask) => ask.run(),
             Question::Refly(ask) => ask.run(),
+            Question::Fit(ask) => ask.run(),
+            Question::Learn(ask) => ask.run(),
             Question::Tick(ask) => ask.run(),
             Question::Sweep(ask) => ask.run(),
             Question::Bisect(ask) => ask.run(),

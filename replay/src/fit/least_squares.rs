@@ -18,8 +18,6 @@ pub(super) struct Solution {
     pub(super) values: Vec<f64>,
     /// Of the posterior, from data and prior.
     pub(super) covariance: DMatrix<f64>,
-    /// Mean square of the whitened residuals: 1 if the noises are what they were taken for.
-    pub(super) mean_square: f64,
 }
 
 const ROUNDS: usize = 25;
@@ -86,8 +84,48 @@ pub(super) fn solve_from(
         }
     }
     let covariance = information.cholesky()?.inverse();
-    let mean_square = now.iter().map(|whitened| whitened * whitened).sum::<f64>() / now.len().max(1) as f64;
-    Some(Solution { values, covariance, mean_square })
+    Some(Solution { values, covariance })
+}
+
+/// Widens a solution where its residuals say that the model is wrong.
+///
+/// Residuals that are independent, and as large as they were taken for, push the parameters as hard as the covariance says.
+/// How hard they do push is summed over blocks of neighbours, within which they may be correlated (the sandwich covariance:
+/// H. White, Econometrica 50, 1982; K.-Y. Liang and S. Zeger, Biometrika 73, 1986). Where that gives a larger deviation, it
+/// counts; the correction for few blocks is the usual one.
+pub(super) fn inflate(
+    solution: &mut Solution,
+    priors: &[Prior],
+    residuals: impl Fn(&[f64]) -> Vec<f64>,
+    block: usize,
+) {
+    let now = residuals(&solution.values);
+    let jacobian = derivatives(&solution.values, priors, &residuals, now.len());
+    let count = priors.len();
+    let mut pushed = DMatrix::zeros(count, count);
+    let mut blocks = 0_u32;
+    for from in (0..now.len()).step_by(block.max(1)) {
+        let rows = block.min(now.len() - from);
+        let push = jacobian.rows(from, rows).tr_mul(&DVector::from_column_slice(&now[from..from + rows]));
+        pushed += &push * push.transpose();
+        blocks += 1;
+    }
+    if blocks as usize <= count {
+        return;
+    }
+    pushed *= f64::from(blocks) / (f64::from(blocks) - count as f64);
+    for (place, prior) in priors.iter().enumerate() {
+        pushed[(place, place)] += 1.0 / (prior.sigma * prior.sigma);
+    }
+    let sandwich = &solution.covariance * pushed * &solution.covariance;
+    let wider: Vec<f64> = (0..count)
+        .map(|place| libm::sqrt((sandwich[(place, place)] / solution.covariance[(place, place)]).max(1.0)))
+        .collect();
+    for row in 0..count {
+        for column in 0..count {
+            solution.covariance[(row, column)] *= wider[row] * wider[column];
+        }
+    }
 }
 
 /// Central differences.
@@ -137,6 +175,19 @@ mod tests {
         let found = solve(&[Prior { mean: 0.0, sigma: 2.0 }], |values| vec![values[0] - 3.0]).unwrap();
         assert!((found.values[0] - 2.4).abs() < 1e-9);
         assert!((found.covariance[(0, 0)] - 0.8).abs() < 1e-9);
+    }
+
+    /// A mean of 40 samples that come in pairs of equal ones, +1 and -1 in turn: as independent numbers they have a
+    /// variance of 1 / 40, as 20 pairs one of 1 / 20; few blocks add 20 / 19.
+    #[test]
+    fn val_hand_correlated_residuals_widen_the_interval() {
+        let prior = [Prior { mean: 0.0, sigma: 1e6 }];
+        let samples: Vec<f64> = (0..40).map(|k| if (k / 2) % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let residuals = |mean: &[f64]| samples.iter().map(|sample| mean[0] - sample).collect::<Vec<_>>();
+        let mut found = solve(&prior, residuals).unwrap();
+        assert!((found.covariance[(0, 0)] - 1.0 / 40.0).abs() < 1e-9);
+        inflate(&mut found, &prior, residuals, 2);
+        assert!((found.covariance[(0, 0)] - 20.0 / 19.0 / 20.0).abs() < 1e-9, "{:?}", found.covariance);
     }
 
     #[test]

@@ -10,14 +10,19 @@
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its models.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`sensors`]: noises and biases.
+//! * [`stand`]: a burn on a test stand.
+//! * [`pooled`](mod@pooled): several flights together. [`patch`]: the mission with what was found.
 //! * [`least_squares`] and [`whiten`]: most likely values, where the noise is a slow disturbance.
 
 mod air_moment;
 mod along;
 mod burn;
 mod least_squares;
+mod patch;
+mod pooled;
 mod sensors;
 mod servo;
+mod stand;
 mod trace;
 mod turning;
 mod whiten;
@@ -27,6 +32,9 @@ use serde::{Deserialize, Serialize};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
 use self::least_squares::{Prior, Solution};
+pub use self::patch::patched;
+pub use self::pooled::{Pooled, pooled};
+pub use self::stand::{StandError, fit_stand, read_stand};
 pub use self::trace::{Frame, Trace, TraceError};
 use self::turning::Turning;
 
@@ -160,14 +168,8 @@ fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Turning, &'static s
 }
 
 fn drag(fit: &mut Fit, along: &Along) {
-    let Along { solution, priors, body_share, .. } = along;
-    let shares = [*body_share, 1.0 - body_share];
-    let total: f64 = (0..2).map(|place| shares[place] * solution.values[place]).sum();
-    let variance: f64 = (0..2)
-        .flat_map(|row| (0..2).map(move |column| (row, column)))
-        .map(|(row, column)| shares[row] * shares[column] * solution.covariance[(row, column)])
-        .sum();
-    let sigma = libm::hypot(libm::sqrt(variance), ACCELEROMETER_SCALE_SIGMA * total);
+    let Along { solution, priors, .. } = along;
+    let (total, sigma) = along.drag();
     fit.found.push(Parameter::normal("drag_scale", "", total, sigma));
     for (place, name) in [(along::BODY, "body_drag_scale"), (along::FINS, "fin_drag_scale")] {
         let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_scale is the sum";

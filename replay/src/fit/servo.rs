@@ -12,11 +12,12 @@ pub(super) struct ServoModel {
     pub(super) limit_rad: f64,
 }
 
-/// Parts of a frame, each with one rate.
-pub(super) const PARTS: usize = 4;
+/// Parts of a frame, of a millisecond each. In a part the angle is the one that it ends with, as in the simulated vehicle,
+/// whose delay is defined so; a delay between two angles' means would be half a millisecond shorter.
+pub(super) const PARTS: usize = 5;
 
 impl ServoModel {
-    /// The load's angles, rad: of every frame the means over its parts and the angle at its end. `commands_rad[k]` is given
+    /// The load's angles, rad: of every frame those of its parts and the angle at its end. `commands_rad[k]` is given
     /// at the end of frame `k`; before the first the servo rests at zero.
     pub(super) fn angles_rad(&self, commands_rad: &[f64], frame_s: f64) -> Vec<([f64; PARTS], f64)> {
         let delay = (self.delay_s.max(0.0)) / frame_s;
@@ -36,14 +37,13 @@ impl ServoModel {
                 let parts = core::array::from_fn(|part| {
                     let from = part as f64 / PARTS as f64;
                     let of_older = ((late - from) * PARTS as f64).clamp(0.0, 1.0);
-                    let before_rad = load_rad;
                     for (command_rad, share) in [(older, of_older), (newer, 1.0 - of_older)] {
                         let wanted_rad = command_rad.clamp(-self.limit_rad, self.limit_rad);
                         let most_rad = self.rate_rad_s.max(0.0) * part_s * share;
                         horn_rad += (wanted_rad - horn_rad).clamp(-most_rad, most_rad);
                         load_rad = load_rad.clamp(horn_rad - half_play_rad, horn_rad + half_play_rad);
                     }
-                    0.5 * (before_rad + load_rad)
+                    load_rad
                 });
                 (parts, load_rad)
             })

@@ -15,8 +15,8 @@ use flight::vehicle::atmosphere::Air;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::air_moment::air_moment_n_m;
-use super::along::{Along, FINS, falling, follows, white_variance};
-use super::least_squares::{Prior, Solution, solve_from};
+use super::along::{Along, BLOCK, FINS, IMPULSE, falling, follows, white_variance};
+use super::least_squares::{Prior, Solution, inflate, solve_from};
 use super::servo::{PARTS, ServoModel};
 use super::trace::Trace;
 use super::whiten::{NoiseStep, Whitener, lowest};
@@ -34,6 +34,7 @@ const FEEDBACK_RAD: f64 = 0.001_745;
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
+const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
 /// What was found across the nose.
 #[derive(Debug, Clone)]
@@ -93,22 +94,28 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
     let white = 0.5 * (white[0] + white[1]);
     let mut values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
     let mut rest = Rest { sigma_rad_s2: 1.0, lasts_s: 0.3 };
-    let mut solution = None;
-    for _ in 0..3 {
+    let whitened = |rest: Rest| {
+        let (model, reported_rad) = (&model, &reported_rad);
         let whitener = rest.whitener(&samples, white);
-        let residuals = |values: &[f64]| {
+        move |values: &[f64]| {
             let [pitch, yaw] = model.missed(values);
             let mut all = whitener.apply(&pitch);
             all.extend(whitener.apply(&yaw));
-            all.extend(model.feedback(values, &reported_rad));
+            all.extend(model.feedback(values, reported_rad));
             all
-        };
-        let found = solve_from(&values, &priors, residuals).ok_or("the model of the gimbal does not fit")?;
-        values.clone_from(&found.values);
+        }
+    };
+    for _ in 0..2 {
+        let found = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+        values = found.values;
         rest = rest.most_likely(&samples, white, &model.missed(&values));
-        solution = Some(found);
     }
-    let solution = solution.ok_or("the model of the gimbal does not fit")?;
+    let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+    inflate(&mut solution, &priors, whitened(rest), BLOCK);
+    // The gain is that of thrust times arm over inertia, and the thrust has its own error.
+    let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
+        / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
+    solution.covariance[(GAIN, GAIN)] += of_thrust * solution.values[GAIN] * solution.values[GAIN];
     Ok(Turning { solution, priors: priors.to_vec(), reported })
 }
 
@@ -187,8 +194,9 @@ impl Model<'_> {
                         0.0
                     };
                     let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
-                    mean_rad_s += (rate_rad_s + 0.5 * by_rad_s) / PARTS as f64;
                     rate_rad_s += by_rad_s;
+                    // As the simulated unit, which adds up the rates at the end of each millisecond.
+                    mean_rad_s += rate_rad_s / PARTS as f64;
                 }
                 sample.felt_rad_s[axis] - mean_rad_s
             });

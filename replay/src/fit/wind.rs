@@ -14,7 +14,7 @@ use world::wind::gusts::GustScales;
 use world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
 
 use super::Parameter;
-use super::along::{Along, BODY, FINS, falling};
+use super::along::{Along, falling};
 use super::least_squares::{Prior, solve};
 use super::trace::{Frame, Trace};
 use super::whiten::{NoiseStep, Whitener};
@@ -117,8 +117,7 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
     let middle = &frames[frames.len() / 2];
     let density =
         Air::at_height_m(middle.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
-    let values = &along.solution.values;
-    let total = along.body_share * values[BODY] + (1.0 - along.body_share) * values[FINS];
+    let (total, _) = along.drag();
     let of = |frame: &Frame| {
         let vehicle = VehicleNow::of(&mission.airframe, &mass, density * total, frame.fins_rad, false, 0.0);
         (vehicle, frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s)

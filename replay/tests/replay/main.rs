@@ -13,6 +13,7 @@ mod damage;
 mod damage_told;
 mod divergence;
 mod earlier_releases;
+mod fit;
 mod flown;
 mod foreign;
 mod from_apogee;
