@@ -107,9 +107,8 @@ fn main() -> anyhow::Result<()> {
                     if number >= flights {
                         return;
                     }
-                    let one = flown(recipe, number).and_then(|(trace, flight)| {
-                        Ok((number, fit(&trace), truth(recipe, &flight)?))
-                    });
+                    let one = flown(recipe, number)
+                        .and_then(|(trace, flight)| Ok((number, fit(&trace), truth(recipe, &flight)?)));
                     if results.send(one).is_err() {
                         return;
                     }
@@ -131,8 +130,10 @@ fn main() -> anyhow::Result<()> {
                             writeln!(
                                 stderr,
                                 "{number} truth {true_value:.5} err {:.5} sigma {:.5} wind {:.2} updraught {:.3}",
-                                found.value - true_value, found.sigma,
-                                libm::hypot(other("wind_x"), other("wind_y")), other("updraught_rms"),
+                                found.value - true_value,
+                                found.sigma,
+                                libm::hypot(other("wind_x"), other("wind_y")),
+                                other("updraught_rms"),
                             )?;
                         }
                         tally.errors.push((found.value - true_value, found.sigma, held));
@@ -146,7 +147,16 @@ fn main() -> anyhow::Result<()> {
     writeln!(
         stdout,
         "{:<26} {:>5} {:>7} {:>15} {:>10} {:>10} {:>10} {:>6} {:>6} {:>6}",
-        "parameter", "found", "held %", "95 % interval", "mean err", "rms err", "med sigma", "z mean", "z rms", "lacks"
+        "parameter",
+        "found",
+        "held %",
+        "95 % interval",
+        "mean err",
+        "rms err",
+        "med sigma",
+        "z mean",
+        "z rms",
+        "lacks"
     )?;
     for (name, Tally { errors, not_found }) in tallies {
         let count = errors.len();

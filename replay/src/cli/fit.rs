@@ -1,16 +1,14 @@
 //! `replay fit`.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use replay::fit::{Fit, Trace, fit, fit_stand, patched, pooled, read_stand};
-use replay::output::{Destination, NewFile, Overwrite};
 use replay::print::{FitReport, print_fit, print_json};
 
-use super::{Answer, answer, say, warn_of_damage};
+use super::{Answer, answer, refuse_existing, say, warn_of_damage, write_new};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -32,6 +30,9 @@ impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         if self.write_mission.is_some() && (self.files.len() != 1 || is_table(&self.files[0])) {
             bail!("--write-mission takes the log of one flight: its mission is changed");
+        }
+        if let Some(path) = &self.write_mission {
+            refuse_existing(path)?;
         }
         let (mut fits, mut refused) = (Vec::new(), false);
         for file in &self.files {
@@ -68,12 +69,7 @@ impl Ask {
         let found = fit(&trace);
         if let Some(path) = &self.write_mission {
             let text = patched(&trace.mission_toml, &found).context("the mission with what was found")?;
-            NewFile::create(Destination { path, overwrite: Overwrite::Never }, file)
-                .and_then(|mut new| {
-                    new.write_all(text.as_bytes())?;
-                    new.commit()
-                })
-                .with_context(|| format!("{}: cannot be written", path.display()))?;
+            write_new(path, &text)?;
             say(&format!("{}: --profile of `onboard-sim fly` and `campaign` takes it", path.display()));
         }
         Ok(found)

@@ -1,25 +1,24 @@
 //! `replay learn`.
 
-use std::io::Write as _;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 use replay::fit::{Fit, Trace, fit};
 use replay::learn::{self, learn};
-use replay::output::{Destination, NewFile, Overwrite};
 use replay::print::{print_json, print_learn};
 use serde::Deserialize;
 
-use super::{Answer, answer, say, warn_of_damage};
+use super::{Answer, answer, refuse_existing, say, warn_of_damage, write_new};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
     /// Logs of vehicles (MCAP), or answers of `replay fit --json`, of one vehicle with one motor lot.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Mission of the next flight: built-in or TOML file [default: that of the first log].
+    /// Mission of the next flight: built-in or TOML file [default: that of the first log]. Scales of fits over other data of
+    /// the same vehicle and motor are converted.
     #[arg(long, value_name = "NAME|FILE")]
     mission: Option<String>,
     /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
@@ -48,6 +47,9 @@ pub(super) struct Ask {
     json: bool,
 }
 
+/// The files of the day.
+const FILES: [&str; 2] = ["mission.toml", "dispersion.toml"];
+
 /// An answer of `replay fit --json`.
 #[derive(Deserialize)]
 struct Fits {
@@ -59,11 +61,14 @@ impl Ask {
         for (name, share) in [("--limit", self.limit), ("--risk", self.risk)] {
             ensure!((0.0..=1.0).contains(&share), "{name} {share}: must be 0 to 1");
         }
+        if let Some(out) = &self.out {
+            FILES.iter().try_for_each(|name| refuse_existing(&out.join(name)))?;
+        }
         let (mut fits, mut flown) = (Vec::new(), None);
         for file in &self.files {
             if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
-                let text =
-                    std::fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
+                let text = std::fs::read_to_string(file)
+                    .with_context(|| format!("{}: cannot be read", file.display()))?;
                 let read: Fits = serde_json::from_str(&text)
                     .with_context(|| format!("{}: is no answer of `replay fit --json`", file.display()))?;
                 fits.extend(read.fits);
@@ -97,27 +102,16 @@ impl Ask {
         )?;
         if let Some(out) = &self.out {
             std::fs::create_dir_all(out).with_context(|| format!("{}: cannot be made", out.display()))?;
-            write_new(&out.join("mission.toml"), &learnt.day.mission_toml)?;
-            write_new(&out.join("dispersion.toml"), &learnt.day.dispersion_toml)?;
+            write_new(&out.join(FILES[0]), &learnt.day.mission_toml)?;
+            write_new(&out.join(FILES[1]), &learnt.day.dispersion_toml)?;
             let out = out.display();
             say(&format!(
                 "onboard-sim campaign --profile {out}/mission.toml --dispersion {out}/dispersion.toml --out day"
             ));
         }
-        answer(|output| {
-            if self.json { print_json(&learnt, output) } else { print_learn(&learnt, output) }
-        })?;
+        answer(|output| if self.json { print_json(&learnt, output) } else { print_learn(&learnt, output) })?;
         Ok(Answer::Compared { within: learnt.go })
     }
-}
-
-fn write_new(path: &Path, text: &str) -> Result<()> {
-    NewFile::create(Destination { path, overwrite: Overwrite::Never }, Path::new(""))
-        .and_then(|mut file| {
-            file.write_all(text.as_bytes())?;
-            file.commit()
-        })
-        .with_context(|| format!("{}: cannot be written", path.display()))
 }
 
 /// The text of a built-in, or of a file.

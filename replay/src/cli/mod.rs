@@ -18,13 +18,15 @@ mod tick;
 mod verify;
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use clap::{Parser, Subcommand};
 use replay::info::Completeness;
 use replay::log::{Cut, Gap, Recording};
+use replay::output::{Destination, NewFile, Overwrite};
 use replay::verify::Verification;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
@@ -170,6 +172,27 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
     }
+}
+
+/// Writes a new file; an existing one is kept.
+fn write_new(path: &Path, text: &str) -> Result<()> {
+    refuse_existing(path)?;
+    NewFile::create(Destination { path, overwrite: Overwrite::Never }, Path::new(""))
+        .and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.commit()
+        })
+        .with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Refuses a path where a file is, before the work for it is done.
+fn refuse_existing(path: &Path) -> Result<()> {
+    ensure!(
+        path.symlink_metadata().is_err(),
+        "{}: exists already, and nothing is overwritten",
+        path.display()
+    );
+    Ok(())
 }
 
 /// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second

@@ -25,6 +25,7 @@ use super::whiten::{NoiseStep, Whitener, lowest};
 /// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known yet. From 5 m/s on, 4 of 60
 /// `field` flights have an error of the drag of 4 to 13 %, from 15 m/s on one has 6 %.
 const SLOWEST_M_S: f64 = 15.0;
+const SLOWEST_OF_DROP_M_S: f64 = 5.0;
 /// Samples whose residuals may be correlated by errors of the model: a quarter of a second.
 pub(super) const BLOCK: usize = 50;
 /// Frames before the reported contact that are left out: a switch may be 10 ms late, and the feet push before it.
@@ -111,16 +112,23 @@ fn burn_of<'a>(trace: &'a Trace, values: &[f64]) -> Burn<'a> {
     }
 }
 
-/// The frames of the fall and the burn: from the first fast one after apogee until the contact.
+/// The frames of the fall and the burn: from the first fast one after apogee until the contact. A vehicle that is dropped and
+/// lit soon counts from a lower speed on.
 pub(super) fn falling(trace: &Trace) -> &[Frame] {
-    let falls = |frame: &Frame| {
-        !frame.phase.before_apogee() && !frame.parachute && !frame.booster_attached && !frame.contact
+    let from = |speed_m_s: f64| -> &[Frame] {
+        let falls = |frame: &Frame| {
+            !frame.phase.before_apogee() && !frame.parachute && !frame.booster_attached && !frame.contact
+        };
+        let fast = |frame: &Frame| falls(frame) && frame.believed.state.velocity_m_s.norm() > speed_m_s;
+        let frames = &trace.frames;
+        let Some(first) = frames.iter().position(fast) else { return &[] };
+        let length = frames[first..].iter().take_while(|frame| falls(frame)).count();
+        &frames[first..first + length.saturating_sub(FRAMES_BEFORE_CONTACT)]
     };
-    let fast = |frame: &Frame| falls(frame) && frame.believed.state.velocity_m_s.norm() > SLOWEST_M_S;
-    let frames = &trace.frames;
-    let Some(first) = frames.iter().position(fast) else { return &[] };
-    let length = frames[first..].iter().take_while(|frame| falls(frame)).count();
-    &frames[first..first + length.saturating_sub(FRAMES_BEFORE_CONTACT)]
+    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
+    let fast = from(SLOWEST_M_S);
+    let long = fast.get(FEWEST_FRAMES).is_some_and(|frame| frame.time_s <= lit_s);
+    if long { fast } else { from(SLOWEST_OF_DROP_M_S) }
 }
 
 /// When the igniter was fired, s.
@@ -206,68 +214,117 @@ pub(super) fn white_variance(values: &[f64]) -> Option<f64> {
     (median > 0.0).then_some(median / (0.454_936 * 20.0))
 }
 
-/// Fits fall and burn; `None` if the flight has too little of a fall, with the reason.
-pub(super) fn fit_along(
-    trace: &Trace,
-    thrust_along: &dyn Fn(f64) -> f64,
-) -> Result<Along, &'static str> {
-    let frames = falling(trace);
-    let commanded_s = commanded_s(trace);
-    let samples = samples(trace, frames, thrust_along);
-    let fallen = samples.partition_point(|sample| commanded_s.is_none_or(|at_s| sample.end_s <= at_s));
-    if fallen < FEWEST_FRAMES {
-        return Err("the flight has less than half a second of free fall above 15 m/s");
+/// The samples with what the fits of them share.
+struct Series<'a> {
+    trace: &'a Trace,
+    samples: Vec<Sample>,
+    /// How many of them are before the igniter was fired.
+    fallen: usize,
+    commanded_s: Option<f64>,
+    mass_model: MassModel,
+    loaded_kg: f64,
+    /// Variances of the accelerometer's noise in fall and burn.
+    quiet: f64,
+    shaken: f64,
+}
+
+impl<'a> Series<'a> {
+    fn new(trace: &'a Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Self, &'static str> {
+        let commanded_s = commanded_s(trace);
+        let samples = samples(trace, falling(trace), thrust_along);
+        let fallen = samples.partition_point(|sample| commanded_s.is_none_or(|at_s| sample.end_s <= at_s));
+        if fallen < FEWEST_FRAMES {
+            return Err("the flight has less than half a second of free fall");
+        }
+        let propellant_kg = trace.mission.motor_curve.propellant_mass_kg();
+        let mass_model = MassModel::new(&trace.mission.airframe.mass, propellant_kg);
+        let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.felt_m_s2).collect::<Vec<_>>();
+        let quiet =
+            white_variance(&felt(&samples[..fallen])).ok_or("the accelerometer's samples do not change")?;
+        let shaken = white_variance(&felt(&samples[fallen..])).unwrap_or(quiet).max(quiet);
+        let loaded_kg = mass_model.at(0.0).mass_kg;
+        Ok(Self { trace, samples, fallen, commanded_s, mass_model, loaded_kg, quiet, shaken })
     }
+
+    fn fall(&self) -> &[Sample] {
+        &self.samples[..self.fallen]
+    }
+
+    /// The noises of the first samples in gusts of an intensity, m/s.
+    fn noises(&self, count: usize, updraught_m_s: f64) -> Whitener {
+        let steps: Vec<NoiseStep> = self.samples[..count]
+            .iter()
+            .enumerate()
+            .map(|(place, sample)| {
+                let by_gust = sample.by_updraught * updraught_m_s / self.loaded_kg;
+                let white = if place < self.fallen { self.quiet } else { self.shaken };
+                gust_step(sample.way.filter(|_| place > 0), by_gust, white)
+            })
+            .collect();
+        Whitener::new(steps.into_iter())
+    }
+
+    /// What the drag leaves of the fall's samples.
+    fn missed_in_fall(&self, values: &[f64]) -> Vec<f64> {
+        let missed = self.fall().iter().map(|sample| {
+            let air_n = values[BODY] * sample.body_n + values[FINS] * sample.fins_n;
+            sample.felt_m_s2 - values[BIAS] - air_n / self.loaded_kg
+        });
+        missed.collect()
+    }
+
+    /// What drag and thrust leave of all samples.
+    fn missed(&self, values: &[f64]) -> Vec<f64> {
+        let burn = burn_of(self.trace, values);
+        let begins_s = self.commanded_s.unwrap_or(f64::INFINITY) + values[DELAY];
+        let missed = self.samples.iter().map(|sample| {
+            let to_s = sample.end_s - begins_s;
+            let (mut thrust_n, mut mass_kg) = (0.0, self.loaded_kg);
+            if to_s > 0.0 {
+                thrust_n = burn.mean_n(to_s - FRAME_S, to_s);
+                mass_kg = self.mass_model.at(burn.burnt_kg(to_s - 0.5 * FRAME_S)).mass_kg;
+            }
+            let (body, fins) =
+                if thrust_n > 0.0 { (1.0 - values[BODY_LOSS], 1.0 - values[FIN_LOSS]) } else { (1.0, 1.0) };
+            let air_n = values[BODY] * body * sample.body_n + values[FINS] * fins * sample.fins_n;
+            sample.felt_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
+        });
+        missed.collect()
+    }
+
+    /// The most likely intensity of the gusts, m/s, with the drag's uncertainty integrated out.
+    fn updraught_m_s(&self, of_fall: &[Prior]) -> f64 {
+        let surprise = |logarithm: f64| {
+            let whitener = self.noises(self.fallen, libm::exp(logarithm));
+            let Some(found) = solve(of_fall, |values| whitener.apply(&self.missed_in_fall(values))) else {
+                return f64::INFINITY;
+            };
+            let uncertain = found.covariance.determinant();
+            whitener.surprise(&self.missed_in_fall(&found.values))
+                - libm::log(uncertain.max(f64::MIN_POSITIVE))
+        };
+        libm::exp(lowest(libm::log(0.02), libm::log(4.0), 14, surprise))
+    }
+}
+
+/// Fits fall and burn; an error is the reason why the flight tells nothing.
+pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, &'static str> {
+    let series = Series::new(trace, thrust_along)?;
     let mission = &trace.mission;
-    let propellant_kg = mission.motor_curve.propellant_mass_kg();
-    let mass_model = MassModel::new(&mission.airframe.mass, propellant_kg);
-    let loaded_kg = mass_model.at(0.0).mass_kg;
-    let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.felt_m_s2).collect::<Vec<_>>();
-    let quiet = white_variance(&felt(&samples[..fallen])).ok_or("the accelerometer's samples do not change")?;
-    let shaken = white_variance(&felt(&samples[fallen..])).unwrap_or(quiet).max(quiet);
-    let at_ignition = &frames[fallen.min(frames.len()) - 1].believed;
+    let at_ignition = &falling(trace)[series.fallen - 1].believed;
     let bias = Prior {
         mean: at_ignition.accelerometer_bias_m_s2.x,
         sigma: at_ignition.sigmas.accelerometer_bias_m_s2.x.max(1e-4),
     };
     let wide = Prior { mean: 1.0, sigma: 0.5 };
-    let of_fall = [wide, wide, bias];
-
-    // The intensity of the gusts: the most likely one, with the drag's uncertainty integrated out.
-    let noises = |samples: &[Sample], updraught_m_s: f64| {
-        let steps: Vec<NoiseStep> = samples
-            .iter()
-            .enumerate()
-            .map(|(place, sample)| {
-                let by_gust = sample.by_updraught * updraught_m_s / loaded_kg;
-                gust_step(sample.way.filter(|_| place > 0), by_gust, if place < fallen { quiet } else { shaken })
-            })
-            .collect();
-        Whitener::new(steps.into_iter())
-    };
-    let fall = &samples[..fallen];
-    let of_drag = |values: &[f64]| -> Vec<f64> {
-        let missed = fall.iter().map(|sample| {
-            sample.felt_m_s2
-                - values[BIAS]
-                - (values[BODY] * sample.body_n + values[FINS] * sample.fins_n) / loaded_kg
-        });
-        missed.collect()
-    };
-    let surprise = |logarithm: f64| {
-        let whitener = noises(fall, libm::exp(logarithm));
-        let Some(found) = solve(&of_fall, |values| whitener.apply(&of_drag(values))) else {
-            return f64::INFINITY;
-        };
-        let uncertain = found.covariance.determinant();
-        whitener.surprise(&of_drag(&found.values)) - libm::log(uncertain.max(f64::MIN_POSITIVE))
-    };
-    let updraught_m_s = libm::exp(lowest(libm::log(0.02), libm::log(4.0), 14, surprise));
-    let sum = |value: fn(&Sample) -> f64| fall.iter().map(value).sum::<f64>();
+    let mut priors = vec![wide, wide, bias];
+    let updraught_m_s = series.updraught_m_s(&priors);
+    let sum = |value: fn(&Sample) -> f64| series.fall().iter().map(value).sum::<f64>();
     let (body_n, fins_n) = (sum(|sample| sample.body_n), sum(|sample| sample.fins_n));
     let body_share = if body_n + fins_n > 0.0 { body_n / (body_n + fins_n) } else { 0.5 };
     let speed_share =
         at_ignition.sigmas.velocity_m_s.z / at_ignition.state.velocity_m_s.norm().max(SLOWEST_M_S);
+    let commanded_s = series.commanded_s;
     let found = |solution, priors, burn_seen_s| Along {
         solution,
         priors,
@@ -277,17 +334,16 @@ pub(super) fn fit_along(
         burn_seen_s,
         speed_share,
     };
-
-    let Some(lit_s) = commanded_s.and_then(|at_s| thrust_seen_s(&samples[fallen..], at_s, loaded_kg, mission))
-    else {
-        let whitener = noises(fall, updraught_m_s);
-        let residuals = |values: &[f64]| whitener.apply(&of_drag(values));
-        let mut solution = solve(&of_fall, residuals).ok_or(NOT_SOLVED)?;
-        inflate(&mut solution, &of_fall, residuals, BLOCK);
-        return Ok(found(solution, of_fall.to_vec(), 0.0));
+    let lit = commanded_s.and_then(|at_s| {
+        Some((at_s, thrust_seen_s(&series.samples[series.fallen..], at_s, series.loaded_kg, mission)?))
+    });
+    let Some((commanded_s, lit_s)) = lit else {
+        let whitener = series.noises(series.fallen, updraught_m_s);
+        let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
+        let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
+        inflate(&mut solution, &priors, residuals, BLOCK);
+        return Ok(found(solution, priors, 0.0));
     };
-    let commanded = commanded_s.unwrap_or(lit_s);
-    let mut priors = of_fall.to_vec();
     priors.extend([wide, wide, Prior { mean: mission.ignition.delay_s, sigma: 1.0 }]);
     // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
     let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
@@ -295,30 +351,14 @@ pub(super) fn fit_along(
     // Nobody has data for a jet against the wind: the body may lose all or nothing; the fins sit outside the jet.
     priors.push(Prior { mean: mission.exhaust.body_loss, sigma: 0.5 });
     priors.push(Prior { mean: mission.exhaust.fin_loss, sigma: 0.05 });
-    let whitener = noises(&samples, updraught_m_s);
-    let model = |values: &[f64]| -> Vec<f64> {
-        let burn = burn_of(trace, values);
-        let begins_s = commanded + values[DELAY];
-        let missed = samples.iter().map(|sample| {
-            let to_s = sample.end_s - begins_s;
-            let lit = to_s > 0.0;
-            let mass_kg = if lit { mass_model.at(burn.burnt_kg(to_s - 0.5 * FRAME_S)).mass_kg } else { loaded_kg };
-            let thrust_n = if lit { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
-            let (body, fins) = if thrust_n > 0.0 {
-                (1.0 - values[BODY_LOSS], 1.0 - values[FIN_LOSS])
-            } else {
-                (1.0, 1.0)
-            };
-            let air_n = values[BODY] * body * sample.body_n + values[FINS] * fins * sample.fins_n;
-            sample.felt_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
-        });
-        whitener.apply(&missed.collect::<Vec<_>>())
-    };
+    let whitener = series.noises(series.samples.len(), updraught_m_s);
+    let residuals = |values: &[f64]| whitener.apply(&series.missed(values));
     let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
-    start[DELAY] = lit_s - commanded;
-    let mut solution = solve_from(&start, &priors, model).ok_or(NOT_SOLVED)?;
-    inflate(&mut solution, &priors, model, BLOCK);
-    let burn_seen_s = samples.last().map_or(0.0, |last| last.end_s - commanded - solution.values[DELAY]);
+    start[DELAY] = lit_s - commanded_s;
+    let mut solution = solve_from(&start, &priors, residuals).ok_or(NOT_SOLVED)?;
+    inflate(&mut solution, &priors, residuals, BLOCK);
+    let burn_seen_s =
+        series.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);
     Ok(found(solution, priors, burn_seen_s))
 }
 

@@ -13,6 +13,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 pub(super) const SHAPE_TERMS: usize = 5;
 
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "the burn time is called so")]
 pub(super) struct Burn<'a> {
     pub(super) curve: &'a ThrustCurve,
     pub(super) impulse_scale: f64,
@@ -61,9 +62,9 @@ mod tests {
     /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down; 10 % more impulse in twice the time.
     #[test]
     fn val_hand_a_scaled_trapezium() {
-        let curve =
-            vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
-        let burn = Burn { curve: &curve, impulse_scale: 1.1, burn_time_scale: 2.0, shape: [0.0; SHAPE_TERMS] };
+        let curve = vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
+        let burn =
+            Burn { curve: &curve, impulse_scale: 1.1, burn_time_scale: 2.0, shape: [0.0; SHAPE_TERMS] };
         // From 2 to 6 s it is level: 40 N of the file, 1.1 / 2 of it.
         assert!((burn.mean_n(3.0, 3.5) - 22.0).abs() < 1e-9);
         assert!((burn.mean_n(0.0, 8.0) - 1.1 * 120.0 / 8.0).abs() < 1e-9);

@@ -20,7 +20,7 @@ pub(super) struct Solution {
     pub(super) covariance: DMatrix<f64>,
 }
 
-const ROUNDS: usize = 25;
+const ROUNDS: usize = 40;
 /// Step of a derivative, as a fraction of the prior's standard deviation.
 const STEP: f64 = 1e-3;
 /// The iteration ends when no parameter moves by more than this fraction of its standard deviation.
@@ -79,7 +79,8 @@ pub(super) fn solve_from(
             }
             damping *= 10.0;
         }
-        if moved_by < SMALL {
+        // A step that damping has made small is no sign of the end.
+        if moved_by < SMALL && (damping < 1e-2 || damping >= MOST_DAMPING) {
             break;
         }
     }

@@ -28,6 +28,7 @@ mod turning;
 mod whiten;
 mod wind;
 
+use flight::vehicle::mission::Mission;
 use serde::{Deserialize, Serialize};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
@@ -75,6 +76,30 @@ pub struct NotFound {
     pub reason: String,
 }
 
+/// The data that the scales of a fit are over, so that fits over other data can be put together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Basis {
+    pub impulse_n_s: f64,
+    pub burn_time_s: f64,
+    /// Drag area with open fins, m^2; 0 on a test stand.
+    pub drag_area_m2: f64,
+    /// Mass with the motor full, which thrust and drag are per, kg; 0 on a test stand.
+    pub loaded_kg: f64,
+}
+
+impl Basis {
+    /// The data of a mission.
+    pub fn of(mission: &Mission) -> Self {
+        let (curve, airframe) = (&mission.motor_curve, &mission.airframe);
+        Self {
+            impulse_n_s: curve.total_impulse_n_s(),
+            burn_time_s: curve.burn_time_s(),
+            drag_area_m2: airframe.drag_area_m2(airframe.fins.open_rad()),
+            loaded_kg: airframe.mass.loaded_kg,
+        }
+    }
+}
+
 /// What one flight tells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
@@ -84,6 +109,8 @@ pub struct Fit {
     pub mission: String,
     /// The landing motor's name.
     pub motor: String,
+    /// The data of mission and motor.
+    pub basis: Basis,
     pub found: Vec<Parameter>,
     pub not_found: Vec<NotFound>,
     /// Why the log could not be read to its end, if so.
@@ -91,6 +118,27 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// The same fit over other data: every scale times what the data differ by.
+    #[must_use]
+    pub fn over(&self, other: &Basis) -> Self {
+        let own = &self.basis;
+        let per_mass = if own.loaded_kg > 0.0 { other.loaded_kg / own.loaded_kg } else { 1.0 };
+        let mut fit = Self { basis: *other, ..self.clone() };
+        for parameter in &mut fit.found {
+            let factor = match parameter.name.as_str() {
+                "thrust_scale" => own.impulse_n_s / other.impulse_n_s * per_mass,
+                "burn_time_scale" => own.burn_time_s / other.burn_time_s,
+                "drag_scale" | "body_drag_scale" | "fin_drag_scale" => {
+                    own.drag_area_m2 / other.drag_area_m2 * per_mass
+                }
+                _ => continue,
+            };
+            let Parameter { value, sigma, low, high, .. } = parameter;
+            [value, sigma, low, high].into_iter().for_each(|number| *number *= factor);
+        }
+        fit
+    }
+
     /// The parameter of a name.
     pub fn get(&self, name: &str) -> Option<&Parameter> {
         self.found.iter().find(|parameter| parameter.name == name)
@@ -126,6 +174,7 @@ pub fn fit(trace: &Trace) -> Fit {
         source: trace.name.clone(),
         mission: trace.mission.name.clone(),
         motor: trace.mission.motor_curve.name().to_owned(),
+        basis: Basis::of(&trace.mission),
         found: Vec::new(),
         not_found: Vec::new(),
         damage: trace.damage.clone(),
@@ -141,7 +190,8 @@ pub fn fit(trace: &Trace) -> Fit {
             }
         }
         Err(reason) => {
-            for name in ["drag_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"] {
+            for name in ["drag_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
+            {
                 fit.lacks(name, reason);
             }
         }
@@ -185,7 +235,8 @@ fn motor(fit: &mut Fit, along: &Along) {
         } else {
             "no thrust was seen after the igniter was fired"
         };
-        for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"] {
+        for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
+        {
             fit.lacks(name, reason);
         }
         return;
@@ -235,5 +286,30 @@ fn gimbal(fit: &mut Fit, turning: Result<Turning, &'static str>) {
             }
         }
         Err(reason) => names.iter().for_each(|(_, name, ..)| fit.lacks(name, reason)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2 % more than 100 N s for 3 kg are, over 110 N s for 3.3 kg, 1.02 100 / 110 1.1.
+    #[test]
+    fn val_hand_a_scale_over_other_data() {
+        let basis = Basis { impulse_n_s: 100.0, burn_time_s: 5.0, drag_area_m2: 0.03, loaded_kg: 3.0 };
+        let fit = Fit {
+            source: String::new(),
+            mission: String::new(),
+            motor: String::new(),
+            basis,
+            found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
+            not_found: Vec::new(),
+            damage: None,
+        };
+        let other = Basis { impulse_n_s: 110.0, loaded_kg: 3.3, ..basis };
+        let found = &fit.over(&other).found[0];
+        assert!((found.value - 1.02).abs() < 1e-12, "the two cancel: {found:?}");
+        let heavier = Basis { loaded_kg: 3.3, ..basis };
+        assert!((fit.over(&heavier).found[0].sigma - 0.011).abs() < 1e-12);
     }
 }

@@ -23,7 +23,8 @@ pub fn patched(mission_toml: &str, fit: &Fit) -> Result<String, SettingError> {
     };
     // Where the two cannot be told apart, both have the scale of the sum.
     let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
-    let (body, fins) = if apart { ("body_drag_scale", "fin_drag_scale") } else { ("drag_scale", "drag_scale") };
+    let (body, fins) =
+        if apart { ("body_drag_scale", "fin_drag_scale") } else { ("drag_scale", "drag_scale") };
     let (along, open) = (airframe.body.axial_drag_coefficient, airframe.fins.drag_coefficient);
     change("airframe.body.axial_drag_coefficient", &|scale| along * scale, body);
     change("airframe.fins.drag_coefficient", &|scale| open * scale, fins);

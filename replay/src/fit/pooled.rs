@@ -29,10 +29,13 @@ pub fn pooled(fits: &[Fit]) -> Vec<Pooled> {
             names.push(&parameter.name);
         }
     }
-    names.into_iter().filter_map(|name| pool(fits.iter().filter_map(|fit| fit.get(name)).collect())).collect()
+    names
+        .into_iter()
+        .filter_map(|name| pool(&fits.iter().filter_map(|fit| fit.get(name)).collect::<Vec<_>>()))
+        .collect()
 }
 
-fn pool(values: Vec<&Parameter>) -> Option<Pooled> {
+fn pool(values: &[&Parameter]) -> Option<Pooled> {
     let first = *values.first()?;
     let count = values.len() as f64;
     if values.len() < 2 || values.iter().any(|value| value.sigma.is_nan() || value.sigma <= 0.0) {
@@ -52,12 +55,17 @@ fn pool(values: Vec<&Parameter>) -> Option<Pooled> {
     let (mean, sum, _, spread) = weighted(variance);
     let sigma = libm::sqrt((spread / (count - 1.0)).max(1.0) / sum);
     let reach = StudentsT::new(0.0, 1.0, count - 1.0).ok()?.inverse_cdf(0.975) * sigma;
-    let mean = Parameter { low: mean - reach, high: mean + reach, ..Parameter::normal(&first.name, &first.unit, mean, sigma) };
+    let mean = Parameter {
+        low: mean - reach,
+        high: mean + reach,
+        ..Parameter::normal(&first.name, &first.unit, mean, sigma)
+    };
     Some(Pooled { mean, flights: values.len(), scatter: libm::sqrt(variance) })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Basis;
     use super::*;
 
     fn fits(values: &[(f64, f64)]) -> Vec<Fit> {
@@ -65,6 +73,7 @@ mod tests {
             source: String::new(),
             mission: String::new(),
             motor: String::new(),
+            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
             not_found: Vec::new(),
             damage: None,
@@ -88,6 +97,8 @@ mod tests {
     fn one_flight_is_not_pooled_and_equal_flights_do_not_scatter() {
         assert!(pooled(&fits(&[(1.0, 0.1)])).is_empty());
         let found = pooled(&fits(&[(1.0, 0.1), (1.0, 0.1)]));
-        assert!(found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12);
+        assert!(
+            found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12
+        );
     }
 }

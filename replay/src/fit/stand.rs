@@ -5,7 +5,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use super::along::white_variance;
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
 use super::least_squares::{Prior, inflate, solve_from};
-use super::{Fit, Named};
+use super::{Basis, Fit, Named};
 
 /// Most rows: an hour at 1 kHz.
 const ROWS_MAX: usize = 3_600_000;
@@ -27,11 +27,7 @@ const SHAPE: usize = 4;
 pub enum StandError {
     /// A row is wrong.
     #[error("line {line}: {found}; {required}")]
-    Row {
-        line: u64,
-        found: String,
-        required: &'static str,
-    },
+    Row { line: u64, found: String, required: &'static str },
     /// It is no table of this kind.
     #[error("{0}")]
     Table(String),
@@ -136,12 +132,17 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
     let unsolved = || StandError::Table("does not fit the curve".to_owned());
     let mut solution = solve_from(&start, &priors, residuals).ok_or_else(unsolved)?;
     inflate(&mut solution, &priors, residuals, rows.len().div_ceil(BLOCKS));
-    solution.covariance[(IMPULSE, IMPULSE)] +=
-        libm::pow(CALIBRATION_SIGMA * solution.values[IMPULSE], 2.0);
+    solution.covariance[(IMPULSE, IMPULSE)] += libm::pow(CALIBRATION_SIGMA * solution.values[IMPULSE], 2.0);
     let mut fit = Fit {
         source: source.to_owned(),
         mission: String::new(),
         motor: curve.name().to_owned(),
+        basis: Basis {
+            impulse_n_s: curve.total_impulse_n_s(),
+            burn_time_s: curve.burn_time_s(),
+            drag_area_m2: 0.0,
+            loaded_kg: 0.0,
+        },
         found: Vec::new(),
         not_found: Vec::new(),
         damage: None,

@@ -93,7 +93,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
     let white = [0, 1].map(|axis| white_variance(&felt(axis)).unwrap_or(1e-6));
     let white = 0.5 * (white[0] + white[1]);
     let mut values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
-    let mut rest = Rest { sigma_rad_s2: 1.0, lasts_s: 0.3 };
+    let mut rest = Rest { sigma_rad_s2: 1.0, lasts_s: 0.3, rough: 0.01 };
     let whitened = |rest: Rest| {
         let (model, reported_rad) = (&model, &reported_rad);
         let whitener = rest.whitener(&samples, white);
@@ -124,6 +124,8 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
 struct Rest {
     sigma_rad_s2: f64,
     lasts_s: f64,
+    /// Density of what has no memory, rad/s^2/sqrt(Hz).
+    rough: f64,
 }
 
 impl Rest {
@@ -132,7 +134,12 @@ impl Rest {
         let variance = self.sigma_rad_s2 * self.sigma_rad_s2;
         let steps = samples.iter().map(|sample| NoiseStep {
             transition: Matrix2::new(1.0, FRAME_S, 0.0, kept),
-            process: Matrix2::new(0.0, 0.0, 0.0, variance * (1.0 - kept * kept)),
+            process: Matrix2::new(
+                self.rough * self.rough * FRAME_S,
+                0.0,
+                0.0,
+                variance * (1.0 - kept * kept),
+            ),
             // The rate at the beginning, and the gyro's bias with it, is free.
             begins: sample.begins.then(|| Matrix2::new(1.0, 0.0, 0.0, variance)),
             // The gyro has the mean over the frame.
@@ -157,6 +164,9 @@ impl Rest {
             let of_time = |logarithm: f64| Self { lasts_s: libm::exp(logarithm), ..rest };
             let lasts_s = libm::exp(lowest(libm::log(0.02), libm::log(5.0), 14, |at| surprise(of_time(at))));
             rest = Self { lasts_s, ..rest };
+            let of_rough = |logarithm: f64| Self { rough: libm::exp(logarithm), ..rest };
+            let rough = libm::exp(lowest(libm::log(1e-4), libm::log(1.0), 14, |at| surprise(of_rough(at))));
+            rest = Self { rough, ..rest };
         }
         rest
     }
@@ -181,15 +191,18 @@ impl Model<'_> {
 
     /// The gyro's samples about y and z less the model's.
     fn missed(&self, values: &[f64]) -> [Vec<f64>; 2] {
+        let both = [0, 1].map(|axis| self.angles_rad(values, axis));
         [0, 1].map(|axis| {
             let offset_rad = values[[PITCH, YAW][axis]];
             let part_s = FRAME_S / PARTS as f64;
             let mut rate_rad_s = 0.0;
-            let missed = self.samples.iter().zip(self.angles_rad(values, axis)).map(|(sample, (parts_rad, _))| {
+            let missed = self.samples.iter().enumerate().map(|(place, sample)| {
+                // The thrust turns about the pitch axis inside what the yaw axis leaves.
+                let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
                 let mut mean_rad_s = 0.0;
-                for angle_rad in parts_rad {
+                for angle_rad in both[axis][place].0 {
                     let turn = if sample.burning {
-                        -sample.by_gimbal_rad_s2 * libm::sin(values[GAIN] * angle_rad + offset_rad)
+                        -sample.by_gimbal_rad_s2 * left * libm::sin(values[GAIN] * angle_rad + offset_rad)
                     } else {
                         0.0
                     };
@@ -266,4 +279,3 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
     });
     samples.collect()
 }
-

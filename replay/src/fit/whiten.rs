@@ -23,7 +23,7 @@ pub(super) struct NoiseStep {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Gain {
+struct Prediction {
     transition: Matrix2<f64>,
     begins: bool,
     seen: Vector2<f64>,
@@ -34,13 +34,13 @@ struct Gain {
 /// The filter of a series of samples.
 #[derive(Debug, Clone)]
 pub(super) struct Whitener {
-    gains: Vec<Gain>,
+    steps: Vec<Prediction>,
 }
 
 impl Whitener {
     pub(super) fn new(steps: impl Iterator<Item = NoiseStep>) -> Self {
         let mut covariance = Matrix2::zeros();
-        let gains = steps.map(|step| {
+        let predictions = steps.map(|step| {
             covariance = match step.begins {
                 Some(begins) => begins,
                 None => step.transition * covariance * step.transition.transpose() + step.process,
@@ -49,15 +49,21 @@ impl Whitener {
             let variance = step.seen.dot(&spread) + step.white;
             let gain = spread / variance;
             covariance -= gain * spread.transpose();
-            Gain { transition: step.transition, begins: step.begins.is_some(), seen: step.seen, gain, variance }
+            Prediction {
+                transition: step.transition,
+                begins: step.begins.is_some(),
+                seen: step.seen,
+                gain,
+                variance,
+            }
         });
-        Self { gains: gains.collect() }
+        Self { steps: predictions.collect() }
     }
 
     /// The innovations of residuals, in units of their standard deviations.
     pub(super) fn apply(&self, residuals: &[f64]) -> Vec<f64> {
         let mut state = Vector2::zeros();
-        self.gains
+        self.steps
             .iter()
             .zip(residuals)
             .map(|(step, residual)| {
@@ -71,7 +77,7 @@ impl Whitener {
 
     /// Twice the negative logarithm of the likelihood of residuals, without its constant.
     pub(super) fn surprise(&self, residuals: &[f64]) -> f64 {
-        let logarithms: f64 = self.gains.iter().map(|step| libm::log(step.variance)).sum();
+        let logarithms: f64 = self.steps.iter().map(|step| libm::log(step.variance)).sum();
         logarithms + self.apply(residuals).iter().map(|innovation| innovation * innovation).sum::<f64>()
     }
 }

@@ -50,7 +50,9 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
         .filter_map(|chunk| sample(trace, along, chunk))
         .collect();
     if samples.len() < FEWEST {
-        return Err("the fall is slower than 15 m/s, or shorter than a second above that: too little air across the nose");
+        return Err(
+            "the fall is slower than 15 m/s, or shorter than a second above that: too little air across the nose",
+        );
     }
     let mean_by_height: Vec<f64> = samples
         .iter()
@@ -115,8 +117,7 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
     let mission = &trace.mission;
     let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg()).at(0.0);
     let middle = &frames[frames.len() / 2];
-    let density =
-        Air::at_height_m(middle.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+    let density = Air::at_height_m(middle.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
     let (total, _) = along.drag();
     let of = |frame: &Frame| {
         let vehicle = VehicleNow::of(&mission.airframe, &mass, density * total, frame.fins_rad, false, 0.0);

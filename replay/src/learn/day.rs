@@ -44,7 +44,10 @@ impl Day {
         let settings = [
             set("airframe.motor", toml::Value::String(vehicles::thrust_curve::to_rasp(&curve))),
             set("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
-            set("airframe.body.crossflow_drag_coefficient", float(body.crossflow_drag_coefficient * drag_scale)),
+            set(
+                "airframe.body.crossflow_drag_coefficient",
+                float(body.crossflow_drag_coefficient * drag_scale),
+            ),
             set("airframe.fins.drag_coefficient", float(fins.drag_coefficient * drag_scale)),
             set("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
             set("ignition.delay_s", float(delay.mean)),
@@ -54,8 +57,9 @@ impl Day {
         let head = head("The mission", ask, sources);
         let mission_toml = head + &mission_toml_with(ask.mission_toml, &settings)?;
         let mission = mission_with(&mission_toml, &[])?;
-        let dispersion_toml = dispersion_toml(ask, &mission, lots, drag.map(|mean| mean.sigma / mean.value), wind_m_s, sources)
-            .map_err(LearnError::Day)?;
+        let dispersion_toml =
+            dispersion_toml(ask, &mission, lots, drag.map(|mean| mean.sigma / mean.value), wind_m_s, sources)
+                .map_err(LearnError::Day)?;
         // Read as the campaign reads it.
         let dispersion = Dispersion::from_toml(&dispersion_toml, "the day's set")?;
         Ok(Self { mission, mission_toml, dispersion, dispersion_toml })
@@ -63,7 +67,8 @@ impl Day {
 }
 
 fn head(what: &str, ask: &Ask<'_>, sources: &[String]) -> String {
-    let mut head = format!("# {what} of the next flight, after {} with the prior {}:\n", sources.len(), ask.set.0);
+    let mut head =
+        format!("# {what} of the next flight, after {} with the prior {}:\n", sources.len(), ask.set.0);
     for source in sources {
         // Writing to a String cannot fail.
         let _ = writeln!(head, "# {}", protocol::text::printable(source.as_bytes()));
@@ -126,7 +131,9 @@ mod tests {
     fn val_hand_a_scaled_motor() {
         let curve = vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
         let found = scaled(&curve, 1.1, 2.0).unwrap();
-        assert!((found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12);
+        assert!(
+            (found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12
+        );
         assert!((found.thrust_at_n(4.0) - 22.0).abs() < 1e-12);
         assert!((found.propellant_mass_kg() - 0.12).abs() < 1e-12);
     }

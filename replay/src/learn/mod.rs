@@ -26,7 +26,7 @@ use world::truth::Truth;
 use self::day::Day;
 use self::posterior::{Chance, Lot};
 use self::rate::{Prediction, Trial, draw_next, predict};
-use crate::fit::{Fit, Pooled, Z_95, pooled};
+use crate::fit::{Basis, Fit, Pooled, Z_95, pooled};
 use crate::settings::SettingError;
 
 /// What is asked.
@@ -51,13 +51,11 @@ pub enum LearnError {
     /// No fit has a burn.
     #[error("no burn was found in {0} fits: a lot is learnt from burns")]
     NoBurn(usize),
-    /// The fits are not of one lot or one vehicle.
-    #[error("{source_name} is of {found}, and others are of {others}: one vehicle and one motor are learnt at a time")]
-    Mixed {
-        source_name: String,
-        found: String,
-        others: String,
-    },
+    /// A fit is of another vehicle or motor than the mission.
+    #[error(
+        "{source_name} is of {found}, and the mission of {known}: one vehicle and one motor are learnt at a time"
+    )]
+    Other { source_name: String, found: String, known: String },
     /// The mission, or a value that was learnt for it.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -122,9 +120,12 @@ const PROPERTIES: [(&str, &str); 3] =
 /// # Errors
 /// [`LearnError`] says what is wrong with the fits, the mission or the set.
 pub fn learn(fits: &[Fit], ask: &Ask<'_>) -> Result<Learnt, LearnError> {
-    one_vehicle(fits)?;
     let set = Dispersion::from_toml(ask.set.1, ask.set.0)?;
     let mission = crate::settings::mission_with(ask.mission_toml, &[])?;
+    one_vehicle(fits, [&mission.name, mission.motor_curve.name()])?;
+    let basis = Basis::of(&mission);
+    let fits: Vec<Fit> = fits.iter().map(|fit| fit.over(&basis)).collect();
+    let fits = fits.as_slice();
     let scatter_scale = mission.airframe.igniter.scatter_scale;
     let both = |sigma: f64, even: f64| libm::sqrt(sigma * sigma + even * even / 3.0);
     let priors = [
@@ -182,19 +183,16 @@ pub fn learn(fits: &[Fit], ask: &Ask<'_>) -> Result<Learnt, LearnError> {
     })
 }
 
-/// Refuses fits of different vehicles or motors; a test stand has no vehicle.
-fn one_vehicle(fits: &[Fit]) -> Result<(), LearnError> {
-    let of = |fit: &Fit| [fit.mission.clone(), fit.motor.clone()];
-    for what in 0..2 {
-        let mut known: Option<String> = None;
-        for fit in fits {
-            let found = of(fit)[what].clone();
-            if found.is_empty() {
-                continue;
-            }
-            let others = known.get_or_insert_with(|| found.clone()).clone();
-            if others != found {
-                return Err(LearnError::Mixed { source_name: fit.source.clone(), found, others });
+/// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has no vehicle.
+fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<(), LearnError> {
+    for fit in fits {
+        for (found, known) in [&fit.mission, &fit.motor].into_iter().zip(known) {
+            if !found.is_empty() && found != known {
+                return Err(LearnError::Other {
+                    source_name: fit.source.clone(),
+                    found: found.clone(),
+                    known: known.to_owned(),
+                });
             }
         }
     }
@@ -281,6 +279,7 @@ mod tests {
             source: text(source),
             mission: text(mission),
             motor: text(motor),
+            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found,
             not_found: Vec::new(),
             damage: None,
@@ -290,10 +289,9 @@ mod tests {
     #[test]
     fn other_vehicles_and_other_motors_are_refused_and_a_stand_is_not() {
         let fits = [fit("a", "mk2", "H45W", vec![]), fit("b", "", "H45W", vec![])];
-        assert!(one_vehicle(&fits).is_ok());
-        let fits = [fit("a", "mk2", "H45W", vec![]), fit("c", "mk2", "H53", vec![])];
-        let error = one_vehicle(&fits).unwrap_err().to_string();
-        assert!(error.starts_with("c is of H53, and others are of H45W"), "{error}");
+        assert!(one_vehicle(&fits, ["mk2", "H45W"]).is_ok());
+        let error = one_vehicle(&fits, ["mk2", "H53"]).unwrap_err().to_string();
+        assert!(error.starts_with("a is of H45W, and the mission of H53"), "{error}");
     }
 
     /// A range of 0 to 6 is 3 with 1.732; one flight in 5 m/s makes the mean 4 and the squares 3 + 2 (worth one value and one
@@ -305,6 +303,9 @@ mod tests {
         let wind_y = Parameter::normal("wind_y", "m/s", 4.0, 0.1);
         let [low, high] = wind(&[fit("a", "mk2", "H45W", vec![wind_x, wind_y])], &set);
         let reach = libm::sqrt(3.0) * libm::sqrt((3.0 + 2.0) / 3.0 * 1.5);
-        assert!((high - 4.0 - reach).abs() < 1e-9 && (low - (4.0 - reach).max(0.0)).abs() < 1e-9, "{low} {high}");
+        assert!(
+            (high - 4.0 - reach).abs() < 1e-9 && (low - (4.0 - reach).max(0.0)).abs() < 1e-9,
+            "{low} {high}"
+        );
     }
 }

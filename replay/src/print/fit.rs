@@ -29,7 +29,11 @@ pub fn print_fit(report: &FitReport, output: &mut impl Write) -> io::Result<()> 
     if report.together.is_empty() {
         return Ok(());
     }
-    writeln!(output, "\ntogether, {}: mean with its 95 % interval, and scatter from one to the next", of(report))?;
+    writeln!(
+        output,
+        "\ntogether, {}: mean with its 95 % interval, and scatter from one to the next",
+        of(report)
+    )?;
     for Pooled { mean, flights, scatter } in &report.together {
         let scatter = digits(*scatter, mean.sigma);
         writeln!(output, "  {}   scatter {scatter} in {flights}", line(mean))?;
@@ -43,7 +47,13 @@ fn of(report: &FitReport) -> String {
 
 fn print_one(fit: &Fit, output: &mut impl Write) -> io::Result<()> {
     let mission = if fit.mission.is_empty() { "a test stand" } else { &fit.mission };
-    writeln!(output, "{}: {} with {}, 95 % intervals", shown(&fit.source), shown(mission), shown(&fit.motor))?;
+    writeln!(
+        output,
+        "{}: {} with {}, 95 % intervals",
+        shown(&fit.source),
+        shown(mission),
+        shown(&fit.motor)
+    )?;
     for parameter in &fit.found {
         writeln!(output, "  {}", line(parameter))?;
     }

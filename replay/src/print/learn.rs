@@ -13,7 +13,10 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
     let Learnt { mission, motor, set, sources, .. } = learnt;
     let logs = counted(sources.len() as u64, "fit");
     writeln!(output, "{} with {} after {logs}, prior {}", shown(mission), shown(motor), shown(set))?;
-    writeln!(output, "lot                  burns      mean   95 % interval       next burn +-   before any burn +-")?;
+    writeln!(
+        output,
+        "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
+    )?;
     for lot in &learnt.lots {
         let interval = format!("{:.4} to {:.4}", lot.low, lot.high);
         let text = format!(

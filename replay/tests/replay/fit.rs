@@ -34,7 +34,7 @@ fn close(fit: &Fit, name: &str, truth: f64, bar: f64) {
 #[test]
 fn val_simulation_a_field_flight_is_known_within_the_bars() {
     let recipe = Recipe::built_in("mk2", "field").unwrap();
-    
+
     let truth = draw(&recipe.mission, &recipe.dispersion, 1, 3).truth;
     let (found, _) = fits(&[LANDED.log.to_str().unwrap()]);
     let fit = &found[0];

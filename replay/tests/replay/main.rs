@@ -21,6 +21,8 @@ mod from_estimate;
 mod from_power_up;
 mod gate;
 mod ground_log;
+mod help;
+mod learn;
 mod limits;
 mod lost_frames;
 mod lost_samples;
