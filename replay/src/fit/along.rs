@@ -344,7 +344,7 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         inflate(&mut solution, &priors, residuals, BLOCK);
         return Ok(found(solution, priors, 0.0));
     };
-    priors.extend([wide, wide, Prior { mean: mission.ignition.delay_s, sigma: 1.0 }]);
+    priors.extend([wide, wide, Prior { mean: mission.ignition.delay_s, sigma: 0.2 }]);
     // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
     let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
     priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
@@ -353,9 +353,13 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
     priors.push(Prior { mean: mission.exhaust.fin_loss, sigma: 0.05 });
     let whitener = series.noises(series.samples.len(), updraught_m_s);
     let residuals = |values: &[f64]| whitener.apply(&series.missed(values));
-    let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
-    start[DELAY] = lit_s - commanded_s;
-    let mut solution = solve_from(&start, &priors, residuals).ok_or(NOT_SOLVED)?;
+    // The thrust's corner can hold the iteration on its wrong side: it begins before and behind it.
+    let solved = [0.0, 0.02].into_iter().filter_map(|earlier_s| {
+        let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+        start[DELAY] = (lit_s - commanded_s - earlier_s).max(0.0);
+        solve_from(&start, &priors, residuals)
+    });
+    let mut solution = solved.min_by(|one, other| one.cost.total_cmp(&other.cost)).ok_or(NOT_SOLVED)?;
     inflate(&mut solution, &priors, residuals, BLOCK);
     let burn_seen_s =
         series.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);

@@ -134,7 +134,9 @@ impl Fit {
                 _ => continue,
             };
             let Parameter { value, sigma, low, high, .. } = parameter;
-            [value, sigma, low, high].into_iter().for_each(|number| *number *= factor);
+            for number in [value, sigma, low, high] {
+                *number *= factor;
+            }
         }
         fit
     }

@@ -215,8 +215,8 @@ mod tests {
         #[test]
         fn no_table_panics(text in "\\PC{0,200}", rows in prop::collection::vec((-1e3..1e3_f64, -1e6..1e6_f64), 0..60)) {
             let _ = read_stand(&text);
-            let lines: String = rows.iter().map(|(time, thrust)| format!("{time},{thrust}\n")).collect();
-            let _ = read_stand(&format!("time_s,thrust_n\n{lines}"));
+            let lines: Vec<String> = rows.iter().map(|(time, thrust)| format!("{time},{thrust}")).collect();
+            let _ = read_stand(&format!("time_s,thrust_n\n{}", lines.join("\n")));
             let mut rows = rows;
             rows.sort_by(|one, two| one.0.total_cmp(&two.0));
             let _ = fit_stand("any", &rows, &curve());
