@@ -106,7 +106,7 @@ impl Ask {
             write_new(&out.join(FILES[1]), &learnt.day.dispersion_toml)?;
             let out = out.display();
             say(&format!(
-                "onboard-sim campaign --profile {out}/mission.toml --dispersion {out}/dispersion.toml --out day"
+                "onboard-sim campaign --profile {out}/mission.toml --dispersion {out}/dispersion.toml --out flights"
             ));
         }
         answer(|output| if self.json { print_json(&learnt, output) } else { print_learn(&learnt, output) })?;
