@@ -161,7 +161,7 @@ fn main() -> anyhow::Result<()> {
     for (name, Tally { errors, not_found }) in tallies {
         let count = errors.len();
         if count == 0 {
-            writeln!(stdout, "{name:<26} {count:>5} {:>79}", not_found)?;
+            writeln!(stdout, "{name:<26} {count:>5} {not_found:>79}")?;
             continue;
         }
         let n = count as f64;
