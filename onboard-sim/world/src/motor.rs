@@ -154,6 +154,7 @@ impl Motor {
             | Fault::AscentWeak { .. }
             | Fault::SeparationFails
             | Fault::GimbalStuck
+            | Fault::GimbalJams { .. }
             | Fault::GimbalSlow { .. }
             | Fault::FinStuck { .. } => {}
         }
