@@ -16,10 +16,12 @@ pub(super) struct Rate {
 }
 
 impl Rate {
-    /// Notes a message by the vehicle's time, s. A time before the last one begins anew.
+    /// Notes a message by the vehicle's time, s. A copy counts once; an earlier time begins anew.
     pub(super) fn note(&mut self, time_s: f64) {
-        if self.heard_s.back().is_some_and(|last_s| time_s < *last_s) {
-            self.heard_s.clear();
+        match self.heard_s.back() {
+            Some(last_s) if time_s < *last_s => self.heard_s.clear(),
+            Some(last_s) if time_s <= *last_s => return,
+            _ => {}
         }
         if self.heard_s.len() >= COUNTED {
             self.heard_s.pop_front();
@@ -116,6 +118,8 @@ mod tests {
         assert!(of(Check::Gimbal).runs && of(Check::Gimbal).words == "TD_GIMBAL 4.0 Hz");
         assert!(!of(Check::Turning).runs && of(Check::Turning).words.contains("needed at 6 Hz"));
         assert!(!of(Check::Thrust).runs && of(Check::Thrust).words.contains("LOCAL_POSITION_NED 0.0 Hz"));
-        assert!(!rates.coverage(false).iter().any(|coverage| coverage.runs && coverage.check == Check::Thrust));
+        assert!(
+            !rates.coverage(false).iter().any(|coverage| coverage.runs && coverage.check == Check::Thrust)
+        );
     }
 }

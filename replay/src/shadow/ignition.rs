@@ -5,9 +5,9 @@
 //! 0.2 s ago, back along the fall, and allows what lies between them, and 1.5 m beside: the fins are heard twice a second and turn
 //! between. (In 100 nominal falls of mk2 and 100 of the F15's no height is farther off.)
 
+use flight::guidance::vertical::Column;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use flight::guidance::vertical::Column;
 
 use super::heard::{Descent, Fins};
 
@@ -30,8 +30,7 @@ fn chosen_m(mission: &Mission, descent: &Descent, fins: &Fins, before_s: f64) ->
     let falls_m_s = -descent.vertical_m_s;
     let drag_m_s2 = 0.5 * density_kg_m3 * area_m2 * falls_m_s * falls_m_s / mass_kg;
     let vertical_m_s = descent.vertical_m_s + (mission.gravity_m_s2 - drag_m_s2) * before_s;
-    let outlook =
-        mission.ignition.outlook(&column, &mission.motor_curve, height_m, vertical_m_s, fins_m2);
+    let outlook = mission.ignition.outlook(&column, &mission.motor_curve, height_m, vertical_m_s, fins_m2);
     outlook.chosen_m
 }
 

@@ -292,9 +292,10 @@ impl Shadow {
                         100.0 * (1.0 - found)
                     ),
                 ),
-                Weak::AllAtOnce { found, before } => {
-                    (before, format!("the motor has lost {:.0} % all at once", 100.0 * (1.0 - found / before)))
-                }
+                Weak::AllAtOnce { found, before } => (
+                    before,
+                    format!("the motor has lost {:.0} % all at once", 100.0 * (1.0 - found / before)),
+                ),
             };
             Flag {
                 time_s: 0.0,

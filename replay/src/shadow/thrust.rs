@@ -106,7 +106,8 @@ mod tests {
     use super::*;
 
     fn mission() -> Mission {
-        let (name, text) = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").expect("built in");
+        let (name, text) =
+            vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").expect("built in");
         vehicles::mission::from_toml(text, name).unwrap()
     }
 

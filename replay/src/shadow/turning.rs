@@ -95,7 +95,8 @@ mod tests {
     /// 3 degrees at 200 rad/s^2 for a radian turn by -1.31 rad/s in 0.125 s; -7 degrees by 3.05 rad/s.
     #[test]
     fn a_vehicle_that_turns_as_the_stuck_gimbal_does_is_found_and_one_that_obeys_is_not() {
-        let axes = [Axis { commanded_deg: -7.0, measured_deg: 3.0 }, Axis { commanded_deg: 0.0, measured_deg: 0.0 }];
+        let axes =
+            [Axis { commanded_deg: -7.0, measured_deg: 3.0 }, Axis { commanded_deg: 0.0, measured_deg: 0.0 }];
         let after = |pitch_rad_s: f64| {
             let mut watch = TurningWatch::default();
             watch.on_gimbal(10.0, axes);
