@@ -1,7 +1,7 @@
 //! Finds a servo that does not follow its command, from a few messages a second.
 //!
 //! One message alone shows nothing: a servo that turns towards a new command is as far from it as one that is stuck. (In
-//! 100 nominal burns of mk2 and 100 of the F15 3 % of the messages have a gap of more than 2 degrees, 1.5 % of more than 3.)
+//! 60 nominal burns of mk2 and 100 of the F15 3 % of the messages have a gap of more than 2 degrees, 1.5 % of more than 3.)
 //! Two messages do, both with a gap: a servo whose command is 3 degrees away turns at 250 degrees a second, so it stands at the very
 //! centidegree of a quarter of a second before only by chance: the angles of a burn spread over some 4 degrees, and one of
 //! 400 centidegrees, or a neighbour, is hit with a probability of 0.75 %. With 1.5 % of such gaps and 32 pairs of messages

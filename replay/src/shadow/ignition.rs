@@ -3,7 +3,7 @@
 //! The vehicle renews its outlook every 0.05 s near the ignition and every 0.2 s before, and the message has the height and
 //! speed of its own instant, so the outlook may be 0.2 s older than they are. The shadow makes the outlook for now and for
 //! 0.2 s ago, back along the fall, and allows what lies between them, and 1.5 m beside: the fins are heard twice a second and turn
-//! between. (In 100 nominal falls of mk2 and 100 of the F15's no height is farther off.)
+//! between. (In 12 nominal falls of mk2 and 12 of the F15's no height is farther off.)
 
 use flight::guidance::vertical::Column;
 use flight::vehicle::atmosphere::Air;

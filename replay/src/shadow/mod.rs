@@ -48,6 +48,8 @@ const FOUND_AFTER_S: f64 = 0.01;
 /// A longer time between two phases heard does not say when the second one began, s. The status is sent five times a
 /// second, and at once with a new phase.
 const PHASE_AGE_S: f64 = 0.3;
+/// Speed of a fall that was not heard, m/s: that of a rocket from apogee on its open fins.
+const FALLS_M_S: f64 = 40.0;
 /// Right after the light the gimbal goes to its first plan, and near the ground the legs and the ground turn the vehicle.
 const STEADY_AFTER_S: f64 = 0.4;
 const STEADY_ABOVE_M: f64 = 1.0;
@@ -57,7 +59,8 @@ const STEADY_ABOVE_M: f64 = 1.0;
 struct InSpace {
     mission: Mission,
     mass: MassModel,
-    strength: StrengthWatch,
+    /// From the light on.
+    strength: Option<StrengthWatch>,
     thrust: ThrustWatch,
     turning: TurningWatch,
     ignition_flagged: bool,
@@ -81,7 +84,7 @@ impl Shadow {
         let curve = &mission.motor_curve;
         let in_space = InSpace {
             mass: MassModel::new(&mission.airframe.mass, curve.propellant_mass_kg()),
-            strength: StrengthWatch::new(mission),
+            strength: None,
             thrust: ThrustWatch::default(),
             turning: TurningWatch::default(),
             ignition_flagged: false,
@@ -283,7 +286,9 @@ impl Shadow {
         let (Some(known), Some(since_s)) = (self.in_space.as_deref_mut(), burning_s) else {
             return Vec::new();
         };
-        let flag = known.strength.take(since_s, strength).map(|weak| {
+        let falls_m_s = self.heard.descent.map_or(FALLS_M_S, |descent| -descent.vertical_m_s);
+        let watch = known.strength.get_or_insert_with(|| StrengthWatch::new(&known.mission, falls_m_s));
+        let flag = watch.take(since_s, strength).map(|weak| {
             let (expected, means) = match weak {
                 Weak::FromTheLight { lowest, found } => (
                     1.0,

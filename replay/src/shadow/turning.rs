@@ -6,7 +6,7 @@
 //! more than 5 degrees apart, the vehicle turns as it does with that angle and not as with that command, the gimbal does not
 //! follow. It is found an eighth of a second after that message, where [`super::following`] needs the next one.
 //!
-//! 0.2 % of the messages of a nominal burn have such a gap (1 s after the light and above 1 m), and the angle that has acted is then as near to the
+//! 0.13 % of the messages of a nominal burn have such a gap (0.4 s after the light and above 1 m), and the angle that has acted is then as near to the
 //! measured one as is asked for with a probability of at most a third: less than one false flag in 100 flights.
 
 use super::heard::Attitude;

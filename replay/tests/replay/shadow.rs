@@ -140,14 +140,10 @@ fn check(mission: &str, count: u64) {
     let motor = [Check::MotorStrength, Check::Thrust];
     let lost = flights(mission, count, Trouble::fault("weak-motor:0.9@powered+AFTER"));
     let lost = flagged(&lost, &motor);
-    // A motor of 0.90 of its certified impulse, and one that is 10 % weaker than what its own scatter has made of it.
+    // Of 0.90 of its certified impulse: on top of the scatter the scatter is the limit (`replay::shadow`, strength).
     let certified = Trouble { impulse_share: Some(0.0), ..Trouble::fault("weak-motor:0.9@0") };
     let weak = flagged(&flights(mission, count, certified), &motor);
-    let scattered = flagged(&flights(mission, count, Trouble::fault("weak-motor:0.9@0")), &motor);
-    println!(
-        "{mission}: of {count} motors 10 % weak flagged: {weak} weak from the light on, {scattered} on top of their \
-         scatter, {lost} in the burn"
-    );
+    println!("{mission}: of {count} motors 10 % weak flagged: {weak} from the light on, {lost} in the burn");
 
     let jammed = flights(mission, count, Trouble::fault("gimbal-jams:3@powered+AFTER"));
     let gimbal = [Check::Gimbal, Check::Turning];
@@ -170,8 +166,8 @@ fn check(mission: &str, count: u64) {
 
 #[test]
 fn weak_motors_and_jammed_gimbals_are_flagged_and_nominal_flights_are_not() {
-    check("mk2", 12);
-    check("vlr-f15", 12);
+    check("mk2", 10);
+    check("vlr-f15", 10);
 }
 
 #[test]
