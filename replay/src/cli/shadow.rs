@@ -121,8 +121,8 @@ impl Ask {
             flags: Vec::new(),
         };
         let heard = match source {
-            Some(log) => from_log(&mut listener, log, first, header.start_unix_ns),
-            None => self.from_link(&mut listener),
+            Some(log) => hear_log(&mut listener, log, first, header.start_unix_ns),
+            None => self.hear_link(&mut listener),
         };
         // Whatever happened, the log is finished.
         let finished = listener.recorder.as_ref().map(Recorder::finish).transpose();
@@ -179,7 +179,7 @@ impl Ask {
         }
     }
 
-    fn from_link(&self, listener: &mut Listener) -> Result<()> {
+    fn hear_link(&self, listener: &mut Listener) -> Result<()> {
         let address: LinkAddress = self
             .connect
             .parse()
@@ -227,7 +227,7 @@ impl Ask {
 }
 
 /// Hears every frame of a log, at the times of its records.
-fn from_log(
+fn hear_log(
     listener: &mut Listener,
     mut log: FlightLog<impl std::io::Read>,
     first: Option<replay::log::StampedEntry>,

@@ -131,6 +131,7 @@ fn flagged(seen: &[Seen], checks: &[Check]) -> u64 {
 }
 
 /// The figures of a number of flights, of each: nominal ones flagged; weak motors, sudden losses and jammed gimbals found.
+#[expect(clippy::print_stdout, reason = "the figures are what the long test is run for")]
 fn check(mission: &str, count: u64) {
     let nominal = flights(mission, count, Trouble::default());
     let false_flags: Vec<String> =
