@@ -19,6 +19,7 @@
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`frames`]: a flight as the frames that a board reads.
+//! * [`shadow`](mod@shadow): holds the telemetry of a vehicle in flight against what this build expects.
 //! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
 //! * [`print`](mod@print): prints reports as text for people, JSON for programs and JUnit XML for build servers.
@@ -40,6 +41,7 @@ pub mod recover;
 pub mod refly;
 pub mod report;
 pub mod settings;
+pub mod shadow;
 pub mod sweep;
 pub mod table;
 pub mod tick;

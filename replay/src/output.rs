@@ -138,7 +138,7 @@ fn exists() -> io::Error {
 }
 
 /// Whether two paths name the same file; a missing file is never the same as another.
-fn same_file(a: &Path, b: &Path) -> bool {
+pub fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 

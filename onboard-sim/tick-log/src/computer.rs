@@ -3,7 +3,7 @@
 
 use alloc::vec::Vec;
 
-use flight::computer::crew::{Answer, Asked, Ending, People, Request};
+use flight::computer::crew::{Asked, Ending, People, Request};
 use flight::computer::pilot::Sensed;
 use flight::computer::plane::PlaneSensed;
 use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
@@ -144,15 +144,25 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
     Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
 }
 
-/// A frame's output as a record; `computer` has just flown it.
-pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
-    let ended = |answer: &Answer| match answer.ending {
+/// Whether a frame accepted an abort.
+pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
+    let aborts = |request: &v1::Request| ASKED.get(request.asked as usize) == Some(&Asked::Abort);
+    let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
+    answered.any(|(request, answer)| aborts(request) && *answer == ending_to_log(Ending::Accepted))
+}
+
+fn ending_to_log(ending: Ending) -> u32 {
+    match ending {
         Ending::Accepted => 0,
         Ending::NotNow => 1,
         Ending::Denied => 2,
         Ending::Failed => 3,
         Ending::Asked => 4,
-    };
+    }
+}
+
+/// A frame's output as a record; `computer` has just flown it.
+pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
     v1::ComputerOutput {
         gimbal_rad: output.commands.gimbal_rad.to_vec(),
         fins_rad: output.commands.fins_rad.to_vec(),
@@ -161,7 +171,7 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
         released: output.released,
         planned: output.planned,
         phase: u32::from(computer.mode().phase.index()),
-        answers: output.answers.iter().map(ended).collect(),
+        answers: output.answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
         ignite_booster: output.commands.booster.ignite.then_some(true),
         separate_booster: output.commands.booster.separate.then_some(true),
     }

@@ -36,6 +36,11 @@ pub enum Fault {
     SeparationFails,
     /// Both gimbal axes are stuck.
     GimbalStuck,
+    /// The servo of the pitch axis runs to an angle and stays there.
+    GimbalJams {
+        /// The angle, degrees; beyond the stop it is the stop.
+        deg: f64,
+    },
     /// The gimbal servos turn slowly.
     GimbalSlow {
         /// Rate, as a fraction of the rate without the fault.

@@ -155,6 +155,7 @@ impl Motor {
             | Fault::AscentWeak { .. }
             | Fault::SeparationFails
             | Fault::GimbalStuck
+            | Fault::GimbalJams { .. }
             | Fault::GimbalSlow { .. }
             | Fault::FinStuck { .. } => {}
         }

@@ -19,6 +19,8 @@ pub(crate) struct Servo {
     horn_rad: f64,
     load_rad: f64,
     stuck: bool,
+    /// Where it runs to and stays, whatever is commanded.
+    jams_at_rad: Option<f64>,
 }
 
 impl Servo {
@@ -36,6 +38,7 @@ impl Servo {
             horn_rad: at_rad,
             load_rad: at_rad,
             stuck: false,
+            jams_at_rad: None,
         }
     }
 
@@ -68,7 +71,7 @@ impl Servo {
             return;
         }
         let (low_rad, high_rad) = self.stops_rad;
-        let wanted_rad = delayed_rad.clamp(low_rad, high_rad);
+        let wanted_rad = self.jams_at_rad.unwrap_or(delayed_rad).clamp(low_rad, high_rad);
         self.horn_rad += (wanted_rad - self.horn_rad).clamp(-self.step_max_rad, self.step_max_rad);
         // The load does not move until the horn has taken up the play.
         self.load_rad =
@@ -83,6 +86,11 @@ impl Servo {
     /// The servo is stuck from now on.
     pub(crate) fn stick(&mut self) {
         self.stuck = true;
+    }
+
+    /// The servo runs to an angle, rad, from now on, and stays there.
+    pub(crate) fn jam(&mut self, at_rad: f64) {
+        self.jams_at_rad = Some(at_rad);
     }
 
     /// The servo turns at a fraction of its rate from now on.
@@ -133,6 +141,14 @@ mod tests {
         let at_rad = after(&mut servo, 0.05, 1);
         servo.stick();
         assert!((after(&mut servo, -0.1, 50) - at_rad).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_jammed_servo_runs_to_its_angle_at_its_own_rate() {
+        let mut servo = servo(0.0, 1.0_f64.to_degrees(), 0.0);
+        servo.jam(0.05);
+        assert!((after(&mut servo, -0.1, 10) - 0.010).abs() < 1e-12);
+        assert!((after(&mut servo, -0.1, 100) - 0.05).abs() < 1e-12);
     }
 
     proptest! {

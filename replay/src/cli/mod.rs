@@ -14,6 +14,7 @@ mod recover;
 mod refly;
 mod report;
 mod settings;
+mod shadow;
 mod sweep;
 mod tick;
 mod verify;
@@ -43,6 +44,7 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
+///      shadow: something was flagged;
 ///      gate: some flight got worse, lands no longer, diverged or is missing;
 ///      learn: NO-GO
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
@@ -92,6 +94,11 @@ enum Question {
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
     Compare(compare::Ask),
+    /// Flies along: holds the telemetry of a vehicle in flight against what the flight computer of this build expects.
+    ///
+    /// It only listens. It prints a line for each difference as its frame arrives, records what it heard and flagged, and says
+    /// at the end which checks ran at the rates it heard. Signatures are not checked. Exit code 1 if something was flagged.
+    Shadow(shadow::Ask),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
@@ -160,6 +167,7 @@ impl Cli {
             Question::Bisect(ask) => ask.run(),
             Question::Gate(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
+            Question::Shadow(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
             Question::Frames(ask) => ask.run(),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::Anchors;
 use crate::info::VerdictFacts;
-use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts};
+use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts, heard_message};
 use crate::table::{Cell, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
@@ -104,7 +104,8 @@ impl Flown {
         let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
             flights.note(&stamped.entry);
-            verdicts.note(log.channel(stamped.channel_id), &stamped);
+            let message = heard_message(log.channel(stamped.channel_id), &stamped);
+            verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);
             has_ticks |= matches!(stamped.entry, Entry::Tick(_) | Entry::PilotTick(_));
         }

@@ -2,16 +2,13 @@
 
 use flight::rules::phase::Phase;
 use protocol::dialect::TdInterlock;
+use tick_log::computer::accepts_abort;
 
 use super::VerdictFacts;
 use crate::log::Entry;
 
 /// Begins the event of a start that was refused.
 const REFUSED: &str = "REFUSED: ";
-/// The number of an abort among the requests of a frame.
-const ASKED_ABORT: u32 = 4;
-/// The answer of a frame that accepts a request.
-const ACCEPTED: u32 = 0;
 
 /// Whether an abort is latched, in the interlocks of telemetry.
 fn has_latched_abort(interlocks: u32) -> bool {
@@ -30,9 +27,7 @@ impl EndingTracker {
     pub(super) fn note(&mut self, entry: &Entry) {
         let phase = match entry {
             Entry::ComputerFrame(frame) => {
-                let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
-                self.aborted |=
-                    answered.any(|(request, answer)| request.asked == ASKED_ABORT && *answer == ACCEPTED);
+                self.aborted |= accepts_abort(frame);
                 frame.output.phase
             }
             Entry::PilotTick(tick) => {

@@ -22,7 +22,9 @@ use std::path::Path;
 
 use protocol::log::record::SCHEMA_VERSION;
 
-use crate::log::{Clocks, Entry, FlightLog, Flights, LogError, SummaryFacts, Verdicts, summary_of};
+use crate::log::{
+    Clocks, Entry, FlightLog, Flights, LogError, SummaryFacts, Verdicts, heard_message, summary_of,
+};
 use channels::ChannelCounter;
 use ending::EndingTracker;
 use frames::FrameCounter;
@@ -59,8 +61,9 @@ pub fn info_of<R: Read>(
         let channel = log.channel(stamped.channel_id);
         let first_ns = *seen.first_ns.get_or_insert(stamped.log_time_ns);
         let since_s = stamped.log_time_ns.saturating_sub(first_ns) as f64 / 1e9;
-        seen.clocks.note(channel, &stamped, since_s);
-        seen.verdicts.note(channel, &stamped);
+        let message = heard_message(channel, &stamped);
+        seen.clocks.note(&stamped, message.as_ref(), since_s);
+        seen.verdicts.note(&stamped, message.as_ref());
         seen.ending.note(&stamped.entry);
         seen.take(stamped.entry, stamped.sequence);
     }

@@ -6,10 +6,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use protocol::log::reader::LogChannel;
+use protocol::dialect::MavMessage;
 use serde::Serialize;
 
-use super::heard::{frame_of, heard_by_ground};
 use super::{Entry, StampedEntry};
 
 /// A clock.
@@ -74,8 +73,8 @@ impl fmt::Display for ClockTime {
 }
 
 impl Clocks {
-    /// Notes a record, `since_s` after the first one.
-    pub(crate) fn note(&mut self, channel: Option<&LogChannel>, stamped: &StampedEntry, since_s: f64) {
+    /// Notes a record, `since_s` after the first one, and the message of the vehicle in it.
+    pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>, since_s: f64) {
         match &stamped.entry {
             Entry::ComputerFrame(frame) => {
                 self.boot_zero_s.get_or_insert(since_s - frame.input.time_s);
@@ -91,8 +90,8 @@ impl Clocks {
             Entry::Telemetry(telemetry) => {
                 self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);
             }
-            Entry::RawFrame if self.flight_zero_s.is_none() && heard_by_ground(channel) => {
-                if let Some(boot_s) = boot_time_s(&stamped.data) {
+            Entry::RawFrame if self.flight_zero_s.is_none() => {
+                if let Some(boot_s) = message.and_then(boot_time_s) {
                     // The message that was delayed least says best when the vehicle was powered up.
                     let zero_s = since_s - boot_s;
                     self.boot_zero_s = Some(self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s)));
@@ -127,9 +126,9 @@ impl Clocks {
 }
 
 /// The time since power-up in a message of the vehicle, s, for the messages that are sent most often.
-fn boot_time_s(bytes: &[u8]) -> Option<f64> {
-    use protocol::dialect::MavMessage as M;
-    let time_ms = match frame_of(bytes)?.decode().ok()? {
+fn boot_time_s(message: &MavMessage) -> Option<f64> {
+    use MavMessage as M;
+    let time_ms = match message {
         M::TD_FLIGHT_STATUS(data) => data.time_boot_ms,
         M::LOCAL_POSITION_NED(data) => data.time_boot_ms,
         M::ATTITUDE_QUATERNION(data) => data.time_boot_ms,

@@ -121,14 +121,14 @@ impl Heard {
 }
 
 impl Verdicts {
-    /// Notes a record and the channel it came on.
-    pub(crate) fn note(&mut self, channel: Option<&LogChannel>, stamped: &StampedEntry) {
+    /// Notes a record, and the message of the vehicle in it ([`heard_message`]).
+    pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
         match &stamped.entry {
             Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
             Entry::Tick(_) | Entry::PilotTick(_) => self.has_ticks = true,
-            Entry::RawFrame if !self.has_ticks && heard_by_ground(channel) => {
-                if let Some(message) = message_of(&stamped.data) {
-                    self.heard.take(&message);
+            Entry::RawFrame if !self.has_ticks => {
+                if let Some(message) = message {
+                    self.heard.take(message);
                 }
             }
             _ => {}
@@ -143,17 +143,18 @@ impl Verdicts {
     }
 }
 
+/// The message of a raw frame that a ground station has received, decoded once for everybody who wants it.
+pub(crate) fn heard_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
+    let heard = stamped.entry == Entry::RawFrame && heard_by_ground(channel);
+    if heard { frame_of(&stamped.data)?.decode().ok() } else { None }
+}
+
 /// Whether a ground station received the frames of a channel.
-pub(crate) fn heard_by_ground(channel: Option<&LogChannel>) -> bool {
+fn heard_by_ground(channel: Option<&LogChannel>) -> bool {
     channel.is_some_and(|channel| {
         channel.topic == TOPIC_RAW_RX
             && channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "ground")
     })
-}
-
-/// The message of a raw frame, if the dialect has it.
-pub(crate) fn message_of(bytes: &[u8]) -> Option<MavMessage> {
-    frame_of(bytes)?.decode().ok()
 }
 
 /// A raw frame, if its checksum is right and the dialect has its message.

@@ -23,7 +23,7 @@ pub use error::LogError;
 pub use flights::{Cut, FlightKind, Flights, LoggedFlight};
 pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-pub(crate) use heard::{Found, Heard, Verdicts, frame_of};
+pub(crate) use heard::{Found, Heard, Verdicts, frame_of, heard_message};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
 pub(crate) use schema::{computer_descriptor, pilot_descriptor, tick_descriptor};

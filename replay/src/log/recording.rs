@@ -9,7 +9,7 @@ use flight::vehicle::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::heard::Verdicts;
+use super::heard::{Verdicts, heard_message};
 use super::{Clocks, Cut, Entry, FlightKind, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
 use crate::settings::explained;
 
@@ -152,8 +152,9 @@ impl Recording {
             let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
             flights.note(&stamped.entry);
             let channel = log.channel(stamped.channel_id);
-            recording.clocks.note(channel, &stamped, since_ns as f64 / 1e9);
-            verdicts.note(channel, &stamped);
+            let message = heard_message(channel, &stamped);
+            recording.clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
+            verdicts.note(&stamped, message.as_ref());
             match stamped.entry {
                 Entry::Tick(mut tick) => {
                     tick.output.plan.states = Vec::new();

@@ -34,12 +34,31 @@ pub struct Report {
 /// # Errors
 /// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
+    let (flight, info) = told(path)?;
+    let html = page::page(&flight, &info, &section::all(&flight, &info));
+    Ok(Report { name: info.file, html, completeness: info.completeness })
+}
+
+/// Builds the page of a log file, with the flight of another log in the same pictures behind its verdict.
+///
+/// # Errors
+/// As [`report`], for either file.
+pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
+    let ((flight, info), (other, others)) = (told(path)?, told(with)?);
+    let mut sections = section::all(&flight, &info);
+    let both = section::overlay::html([(&flight, &info), (&other, &others)]);
+    sections.insert(1, section::Section { title: "Two flights", html: both });
+    let html = page::page(&flight, &info, &sections);
+    Ok(Report { name: info.file, html, completeness: info.completeness })
+}
+
+/// A flight and the description of its log.
+fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
     let flight = match recording.kind() {
         FlightKind::InSpace => apogee::flight(recording),
         FlightKind::Planar => Flight::new(recording, plans_of(path)?),
     };
-    let html = page::page(&flight, &info, &section::all(&flight, &info));
-    Ok(Report { name: info.file, html, completeness: info.completeness })
+    Ok((flight, info))
 }

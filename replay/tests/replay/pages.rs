@@ -2,7 +2,7 @@
 
 use flight::vehicle::profile::StartPoint;
 use quick_xml::events::Event as Xml;
-use replay::report::report;
+use replay::report::{report, report_with};
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{self, LANDED};
@@ -184,4 +184,20 @@ fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
         .filter(|tick| tick.input.frame.is_multiple_of(10) && tick.input.time_s <= contact_s)
         .count();
     assert!(section.contains(&format!("At {counted} planning frames")), "{counted}");
+}
+
+/// Two flights in the same pictures: both are named, and every picture has a line of each.
+#[test]
+fn a_report_with_another_log_draws_both_flights() {
+    let page = report_with(&NOMINAL.log, &DISPERSED.log).unwrap().html;
+    check(&page);
+    let both = page.split("<h2>").find(|section| section.starts_with("Two flights")).unwrap();
+    for words in ["Both paths of the landing", "altitude of both, m", "commanded, deg", "LANDED"] {
+        assert!(both.contains(words), "{words} is not in {both}");
+    }
+    for figure in both.split("<figure").skip(1) {
+        assert!(figure.contains("class=\"l a\"") && figure.contains("class=\"l b\""), "{figure}");
+    }
+    // A rocket in space beside a planar landing is no mistake either.
+    check(&report_with(&NOMINAL.log, &LANDED.log).unwrap().html);
 }

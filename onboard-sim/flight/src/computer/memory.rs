@@ -11,18 +11,52 @@ use core::hash::Hasher as _;
 use nalgebra::{ArrayStorage, Const, Matrix, UnitQuaternion};
 use twox_hash::XxHash64;
 
+/// Bytes that are given to the hash at once. Word by word, the hash took a third of the time of `replay verify`.
+const BLOCK: usize = 1024;
+
 /// The hash being computed: XXH64, of words in little-endian order.
-pub(crate) struct Memory(XxHash64);
+pub(crate) struct Memory {
+    hash: XxHash64,
+    /// What the hash has not taken yet, in the first `waiting` bytes.
+    block: [u8; BLOCK],
+    waiting: usize,
+}
 
 impl Memory {
+    fn new() -> Self {
+        Self { hash: XxHash64::with_seed(0), block: [0; BLOCK], waiting: 0 }
+    }
+
     pub(crate) fn digest_of(remembered: &impl Remembers) -> u64 {
-        let mut memory = Self(XxHash64::with_seed(0));
+        let mut memory = Self::new();
         remembered.remember(&mut memory);
-        memory.0.finish()
+        memory.finish()
     }
 
     fn word(&mut self, word: u64) {
-        self.0.write(&word.to_le_bytes());
+        self.bytes(&word.to_le_bytes());
+    }
+
+    /// Adds bytes, whose division into blocks does not change the hash.
+    #[inline]
+    fn bytes(&mut self, bytes: &[u8]) {
+        for part in bytes.chunks(BLOCK) {
+            if self.waiting + part.len() > BLOCK {
+                self.flush();
+            }
+            self.block[self.waiting..self.waiting + part.len()].copy_from_slice(part);
+            self.waiting += part.len();
+        }
+    }
+
+    fn flush(&mut self) {
+        self.hash.write(&self.block[..self.waiting]);
+        self.waiting = 0;
+    }
+
+    fn finish(mut self) -> u64 {
+        self.flush();
+        self.hash.finish()
     }
 }
 
@@ -99,7 +133,7 @@ impl<A: Remembers, B: Remembers> Remembers for (A, B) {
 impl Remembers for &str {
     fn remember(&self, memory: &mut Memory) {
         self.len().remember(memory);
-        memory.0.write(self.as_bytes());
+        memory.bytes(self.as_bytes());
     }
 }
 
@@ -167,6 +201,24 @@ mod tests {
     /// The published value of XXH64 for no input and seed 0.
     #[test]
     fn val_xxh64_of_nothing() {
-        assert_eq!(Memory(XxHash64::with_seed(0)).0.finish(), 0xef46_db37_51d8_e999);
+        assert_eq!(Memory::new().finish(), 0xef46_db37_51d8_e999);
+    }
+
+    /// The digest of many words, with texts between them, is the hash of all their bytes at once.
+    #[test]
+    fn blocks_do_not_change_the_digest() {
+        let text = "seven b";
+        let long = "x".repeat(3 * BLOCK);
+        let (mut memory, mut all) = (Memory::new(), Vec::new());
+        for word in 0..1000_u64 {
+            memory.word(word);
+            all.extend_from_slice(&word.to_le_bytes());
+            let text = if word == 500 { long.as_str() } else { text };
+            memory.bytes(text.as_bytes());
+            all.extend_from_slice(text.as_bytes());
+        }
+        let mut at_once = XxHash64::with_seed(0);
+        at_once.write(&all);
+        assert_eq!(memory.finish(), at_once.finish());
     }
 }

@@ -92,6 +92,10 @@ const NAMES: &[(&str, &str, Build)] = &[
         Some(Breakage::Vehicle(Fault::FinStuck { fin: fin as usize }))
     }),
     ("gimbal-stuck", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::GimbalStuck))),
+    ("gimbal-jams", "deg, -90 to 90", |value| {
+        let deg = value.filter(|deg| (-90.0..=90.0).contains(deg))?;
+        Some(Breakage::Vehicle(Fault::GimbalJams { deg }))
+    }),
     ("gimbal-slow", "rate over nominal, 0 to 1", |value| {
         let scale = value.filter(|scale| (0.0..=1.0).contains(scale))?;
         Some(Breakage::Vehicle(Fault::GimbalSlow { scale }))
@@ -239,6 +243,7 @@ impl fmt::Display for TimedFault {
             Breakage::Vehicle(Fault::AscentWeak { scale }) => write!(f, "ascent-weak:{scale}"),
             Breakage::Vehicle(Fault::SeparationFails) => write!(f, "separation-fails"),
             Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
+            Breakage::Vehicle(Fault::GimbalJams { deg }) => write!(f, "gimbal-jams:{deg}"),
             Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
             Breakage::Vehicle(Fault::FinStuck { fin }) => write!(f, "fin-stuck:{fin}"),
         }?;
@@ -260,6 +265,7 @@ mod tests {
             "accelerometer-dead@boost",
             "barometer-step:-20@coast+1",
             "ascent-self-lights@12",
+            "gimbal-jams:3@powered+0.5..2",
             "ascent-weak:0.6@boost",
             "ascent-no-light@0",
             "separation-fails@coast",

@@ -178,6 +178,7 @@ impl World {
         self.motor.break_down(fault);
         match *fault {
             Fault::GimbalStuck => self.gimbal.iter_mut().for_each(Servo::stick),
+            Fault::GimbalJams { deg } => self.gimbal[0].jam(deg.to_radians()),
             Fault::GimbalSlow { scale } => self.gimbal.iter_mut().for_each(|servo| servo.slow(scale)),
             Fault::FinStuck { fin } => {
                 if let Some(servo) = self.fins.get_mut(fin) {

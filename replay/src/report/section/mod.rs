@@ -6,6 +6,7 @@ mod estimator;
 mod events;
 mod link;
 mod motion;
+pub(super) mod overlay;
 mod path;
 mod phases;
 mod prediction;
