@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use e2e::{
-    Ended, Program, Running, Signal, auto_ground, expect_landing, program, rewrite_log, ticks_of, vehicle,
-};
+use e2e::{Ended, Program, Running, Signal, program, rewrite_log, ticks_of};
 use prost::Message as _;
 
 /// Hides the instructions by which glibc chooses its mathematical functions.
@@ -96,80 +94,4 @@ fn a_file_that_is_no_log_is_refused_by_name() {
         "{}",
         refused.output
     );
-}
-
-/// A log that a real ground station has written is read by every command, and is the vehicle's flight as it was heard.
-#[test]
-fn the_log_of_a_ground_station_is_described_reported_exported_and_compared() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut ground = Running::start(&mut auto_ground(folder.path(), &["udpin:127.0.0.1:0"]));
-    let vehicle = Running::start(&mut vehicle(folder.path(), &[&ground.udp_link()]));
-    expect_landing(vehicle, ground);
-    let replay = |arguments: &[&str]| {
-        Running::to_end(program(Program::Replay).args(arguments).current_dir(folder.path()))
-    };
-    let described = replay(&["info", "ground.mcap"]);
-    assert_eq!(described.code, Some(0), "{}", described.output);
-    assert!(described.output.contains("verdict     LANDED inside every limit"), "{}", described.output);
-
-    let reported = replay(&["report", "ground.mcap", "--output", "ground.html"]);
-    assert_eq!(reported.code, Some(0), "{}", reported.output);
-    let page = std::fs::read_to_string(folder.path().join("ground.html")).unwrap();
-    assert!(page.contains("LANDED inside every limit") && page.contains(">touchdown<"));
-
-    let exported = replay(&["export", "ground.mcap", "--to", "csv", "--output", "tables"]);
-    assert_eq!(exported.code, Some(0), "{}", exported.output);
-    for (table, rows) in [("mavlink_1_1_td_landing_verdict", 1), ("mavlink_1_1_attitude_quaternion", 50)] {
-        let text = std::fs::read_to_string(folder.path().join(format!("tables/{table}.csv"))).unwrap();
-        assert!(text.lines().count() > rows, "{table}: {text}");
-    }
-
-    // The station ends a moment before the vehicle, which goes on sending, so that the last frames are not compared.
-    let mut compare = program(Program::Replay);
-    compare.args(["compare", "vehicle.mcap", "ground.mcap", "--json"]).current_dir(folder.path());
-    let compared = compare.output().unwrap();
-    let report: serde_json::Value = serde_json::from_slice(&compared.stdout).unwrap();
-    let signals = report[0]["signals"].as_array().unwrap();
-    assert!(signals.len() > 50, "{report}");
-    let differ: Vec<_> =
-        signals.iter().filter(|signal| signal["max"].as_f64().is_some_and(|max| max > 0.0)).collect();
-    assert!(differ.is_empty(), "{differ:?}");
-}
-
-/// A shadow on a link of its own flags a gimbal that is stuck, says which checks ran, and its log gives the same again.
-#[test]
-fn a_shadow_flags_a_stuck_gimbal_in_flight_and_again_from_its_log() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut listen = program(Program::Replay);
-    listen.args([
-        "shadow",
-        "--connect",
-        "udpin:127.0.0.1:0",
-        "--profile",
-        "mk2",
-        "--once",
-        "--log",
-        "shadow.mcap",
-    ]);
-    let mut shadow = Running::start(listen.current_dir(folder.path()));
-    let link = shadow.wait_for_line("listening on udpin:");
-    let port = link.split("udpin:127.0.0.1:").nth(1).unwrap().split(';').next().unwrap().to_owned();
-    let mut fly = vehicle(folder.path(), &[&format!("udpout:127.0.0.1:{port}")]);
-    fly.args(["--profile", "mk2", "--start", "apogee", "--auto-start", "--speed", "4"]);
-    let flight = Running::start(fly.args(["--fault", "gimbal-stuck@powered+1"]));
-    let (seen, flown) = (shadow.wait(), flight.wait());
-    assert_eq!(seen.code, Some(1), "{}{}", seen.output, flown.output);
-    assert!(seen.output.contains("gimbal: TD_GIMBAL."), "{}", seen.output);
-    assert!(seen.output.contains("not in telemetry:") && !seen.output.contains("NOT RUN"), "{}", seen.output);
-
-    let flags = |output: &str| -> Vec<String> {
-        output.lines().filter(|line| line.starts_with("boot")).map(str::to_owned).collect()
-    };
-    let mut again = program(Program::Replay);
-    again.args(["shadow", "--connect", "shadow.mcap", "--log", "none"]).current_dir(folder.path());
-    let again = Running::to_end(&mut again);
-    assert_eq!((again.code, flags(&again.output)), (Some(1), flags(&seen.output)), "{}", again.output);
-    let described =
-        Running::to_end(program(Program::Replay).args(["info", "shadow.mcap"]).current_dir(folder.path()));
-    assert_eq!(described.code, Some(0), "{}", described.output);
 }

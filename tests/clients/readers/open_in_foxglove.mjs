@@ -1,6 +1,5 @@
 // Opens a log in Foxglove's own application in a browser without a window:
-// node open_in_foxglove.mjs BROWSER LOG HEIGHT GIMBAL PICTURE [LAYOUT], where HEIGHT and GIMBAL are the message paths of its two
-// plots, unless a layout's file is given.
+// node open_in_foxglove.mjs BROWSER LOG HEIGHT GIMBAL PICTURE, where HEIGHT and GIMBAL are the message paths of its two plots.
 // Prints JSON once the whole log is plotted: the text of the page, and how many pixels the line of each plot covers.
 import { createServer } from "node:http";
 import { createReadStream, existsSync, statSync } from "node:fs";
@@ -8,7 +7,7 @@ import { createRequire } from "node:module";
 import path from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 
-const [browserPath, log, height, gimbal, picture, layout] = process.argv.slice(2);
+const [browserPath, log, height, gimbal, picture] = process.argv.slice(2);
 const PATIENCE_MS = 120_000;
 // Everything but the lines is grey.
 const COLORFUL = 60;
@@ -24,7 +23,6 @@ const types = { ".js": "text/javascript", ".html": "text/html", ".wasm": "applic
 function fileOf(url) {
   if (url === "/") return page;
   if (url === "/flight.mcap") return log;
-  if (url === "/layout.json") return layout;
   const root = url.startsWith("/react") ? modules : studio;
   return path.join(root, url.replace("/assets/", "/"));
 }
@@ -56,7 +54,7 @@ try {
   await tab.setViewport({ width: 1600, height: 1000 });
   const crashes = [];
   tab.on("pageerror", (error) => crashes.push(String(error)));
-  await tab.goto(`${origin}/?${new URLSearchParams(layout ? { layout } : { height, gimbal })}`);
+  await tab.goto(`${origin}/?${new URLSearchParams({ height, gimbal })}`);
   const counter = await browser.newPage();
 
   // A worker draws the plots, so only a picture of the page shows their pixels.

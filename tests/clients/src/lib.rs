@@ -53,7 +53,6 @@ pub static READERS: PythonPackages = PythonPackages::with_dependencies(
         "pandas==3.1.1",
         "polars==2.1.0",
         "pyarrow==26.0.1",
-        "matplotlib==3.11.2",
         "pymavlink==2.4.50",
     ],
 );

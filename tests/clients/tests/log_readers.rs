@@ -125,29 +125,6 @@ fn logs_open_in_foxglove_with_plots() {
     }
 }
 
-/// Foxglove's application opens the layouts that we ship: each plot is there with its title, and the first ones have lines.
-#[test]
-fn our_layouts_open_in_foxglove() {
-    let browser = found(&["chromium", "chromium-browser", "google-chrome"], "chromium");
-    let flights = [
-        (&NOMINAL, "foxglove-planar.json", ["Height and speeds", "Pitch and its rate"]),
-        (&MK2, "foxglove-space.json", ["Height and vertical speed", "Phase and level"]),
-    ];
-    for (flight, layout, titles) in flights {
-        let layout = file("../../replay/layouts").join(layout);
-        let mut open = FOXGLOVE.node();
-        open.arg(file("readers/open_in_foxglove.mjs")).args([&browser, &flight.log]).args(["", ""]);
-        open.arg(flight.beside("layout.png")).arg(&layout);
-        let shown: serde_json::Value = serde_json::from_str(&said(&mut open)).unwrap();
-        let words = shown["words"].as_str().unwrap();
-        assert!(titles.iter().all(|title| words.contains(title)), "{words}");
-        let drawn: Vec<u64> =
-            shown["pixels"].as_array().unwrap().iter().filter_map(serde_json::Value::as_u64).collect();
-        assert!(drawn.len() == 2 && drawn.iter().all(|pixels| *pixels > 300), "{shown}");
-        assert_eq!(shown["crashes"].as_array().unwrap().len(), 0, "{shown}");
-    }
-}
-
 /// A number as Foxglove writes it, with commas between thousands.
 fn grouped(count: u64) -> String {
     if count < 1000 { count.to_string() } else { format!("{},{:03}", grouped(count / 1000), count % 1000) }
@@ -186,24 +163,6 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
     let last = recording.world.last().unwrap();
     let values = [("state.position_m.x", last.state.position_m.x), ("height_m", last.height_m)];
     check(&LANDED.log, LANDED.beside("tables"), "vehicle_truth3d.parquet", recording.world.len(), &values);
-}
-
-/// The example of the README: from a log to a plot in ten lines.
-#[test]
-fn the_example_plots_a_flight() {
-    let tables = MK2.beside("tables-to-plot");
-    let mut opened = FlightLog::open(&MK2.log).unwrap();
-    export_tables(&mut opened, TableFormat::Parquet, &tables).unwrap();
-    let picture = MK2.beside("plot.png");
-    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../replay/examples/plot.py");
-    said(READERS.python().arg(example).arg(&tables).arg(&picture));
-    let lines = std::fs::read_to_string(example).unwrap();
-    assert!(lines.lines().filter(|line| !line.is_empty() && !line.starts_with('"')).count() <= 10);
-    // Three lines in pandas' colours.
-    let count = "import sys, matplotlib.image as i\nimage = i.imread(sys.argv[1])[..., :3]\n\
-                 print(int((image.max(2) - image.min(2) > 0.3).sum()))";
-    let coloured: u32 = said(READERS.python().arg("-c").arg(count).arg(&picture)).trim().parse().unwrap();
-    assert!(coloured > 1000, "{coloured} coloured pixels");
 }
 
 #[test]
