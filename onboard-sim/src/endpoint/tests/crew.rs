@@ -178,8 +178,8 @@ impl Launch {
         self.deliver(&frame);
         self.run(0.4);
         let to = frame.source();
-        let answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
-        let answer = answers.filter(|answer| answer.target == to).last();
+        let mut answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
+        let answer = answers.rfind(|answer| answer.target == to);
         let results = [
             MavResult::MAV_RESULT_ACCEPTED,
             MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
