@@ -41,9 +41,9 @@ fn station_of(number: u8, mission: Option<&str>) -> Rig {
     rig
 }
 
-fn crew(rig: &mut Rig, crew: TD_CREW_DATA) {
-    let time_boot_ms = rig.boot_ms();
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 2, time_boot_ms, ..crew }));
+fn crew(rig: &mut Rig, mut crew: TD_CREW_DATA) {
+    (crew.people, crew.time_boot_ms) = (2, rig.boot_ms());
+    rig.hear(&MavMessage::TD_CREW(crew));
 }
 
 fn asks(rig: &mut Rig, by: u8, act: TdAct, ask_left_ms: u16) {
