@@ -202,6 +202,8 @@ impl Person {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
     use super::*;
 
     const TWO: &str = r#"
@@ -273,7 +275,6 @@ mod tests {
         std::fs::remove_file(&bob).unwrap();
         KeyFile::create(&bob).unwrap();
         assert_eq!(crew.keys().unwrap().keys().copied().collect::<Vec<_>>(), [1, 2]);
-        use std::os::unix::fs::PermissionsExt as _;
         std::fs::set_permissions(&bob, std::fs::Permissions::from_mode(0o640)).unwrap();
         assert!(crew.keys().unwrap_err().to_string().contains("chmod 600"));
     }

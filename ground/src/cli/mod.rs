@@ -51,7 +51,7 @@ pub struct Cli {
 
     /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
     /// share. Without the name of somebody who has a key this station only looks on.
-    #[arg(long, value_name = "FILE", requires = "key", global = true)]
+    #[arg(long, value_name = "FILE", global = true)]
     pub crew: Option<PathBuf>,
 
     /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.

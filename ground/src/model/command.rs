@@ -93,8 +93,8 @@ impl CommandKind {
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
-            // The answer is all there is to see, for a tap; who commands is on every screen.
-            Self::Tap | Self::TakeCommand => true,
+            // The answer is all there is to see.
+            Self::Tap | Self::TakeCommand => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
@@ -102,6 +102,11 @@ impl CommandKind {
                     || status.is_some_and(|status| status.value.interlocks.contains(latched))
             }
         }
+    }
+
+    /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
+    pub fn shows_nothing(self) -> bool {
+        matches!(self, Self::Tap | Self::TakeCommand)
     }
 
     /// What shows the effect, for the event "observed".

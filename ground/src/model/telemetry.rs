@@ -78,7 +78,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
         }
         MavMessage::TD_MISSION(data) => {
-            vehicle.mission = Some((MissionHash(data.hash), name(&data.name[..])))
+            vehicle.mission = Some((MissionHash(data.hash), name(&data.name[..])));
         }
         MavMessage::TD_TOUCHDOWN_LIMITS(data) => vehicle.limits = Some(data.clone()),
         MavMessage::EXTENDED_SYS_STATE(data) => {
@@ -168,6 +168,12 @@ fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
             violated: data.limits_violated,
         },
     }
+}
+
+/// The text of a field of characters, without what a terminal would act on.
+fn name(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    protocol::text::printable(&bytes[..end])
 }
 
 #[cfg(test)]
@@ -268,10 +274,4 @@ mod tests {
         }
         assert_eq!(phase_from_number(13), None);
     }
-}
-
-/// The text of a field of characters, without what a terminal would act on.
-fn name(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    protocol::text::printable(&bytes[..end])
 }

@@ -219,7 +219,9 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 pub(super) fn observe(model: &mut Model, now: Duration) {
     let mut seen = Vec::new();
     for track in &mut model.commands.tracks {
-        if track.observed_at.is_none() && track.kind.is_observed(&model.vehicle, track.commanded_at) {
+        let answered = track.kind.shows_nothing() && track.accepted();
+        let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
+        if track.observed_at.is_none() && shown {
             track.observed_at = Some(now);
             seen.push((
                 EventLevel::Info,

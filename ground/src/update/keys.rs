@@ -226,7 +226,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             Some(why) => model.warn(now, format!("cannot start: {why}")),
         },
         Act::Disarm => model.dialog = Dialog::disarm(now),
-        Act::HoldCountdown => model.dialog = Dialog::hold(now),
+        Act::HoldCountdown if act.works(model, now) => model.dialog = Dialog::hold(now),
+        Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => match why_not_take(model, now) {
             None => model.dialog = Dialog::take_command(now),

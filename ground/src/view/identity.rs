@@ -18,7 +18,7 @@ const CREW_COLUMNS: u16 = 14;
 pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
     let vehicle = vehicle(model);
     let crew = crew(model, theme);
-    let crew_columns = CREW_COLUMNS.max(crew.width() as u16 + 1);
+    let crew_columns = CREW_COLUMNS.max(crew.width() as u16);
     let [mode_area, vehicle_area, station_area, crew_area] = area.layout(&Layout::horizontal([
         Constraint::Length(MODE_COLUMNS),
         Constraint::Length(vehicle.len() as u16 + 1),

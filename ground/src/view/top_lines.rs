@@ -10,6 +10,7 @@ use super::theme::{TextRole, Theme};
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
 use crate::model::link_state::LinkState;
 use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::permits::why_other_mission;
 use crate::model::{Model, Role, abort_too_late, words};
 
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long. Its alarm
@@ -247,6 +248,9 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     }
     if !model.link.uplink.is_proven(now) {
         return Some(("NO-GO: uplink not proven, every other check passes".to_owned(), TextRole::Caution));
+    }
+    if let Some(why) = why_other_mission(model) {
+        return Some((format!("NO-GO: {why}"), TextRole::Caution));
     }
     Some(("GO: every arming check passes".to_owned(), TextRole::Good))
 }

@@ -34,7 +34,7 @@ use self::recording::{log_state, nanoseconds, note, record};
 use crate::endpoint::VehicleEndpoint;
 use crate::solve_times::SolveTimes;
 use crate::streams::Standard;
-use crate::vehicle::{Judged, VehicleEvent};
+use crate::vehicle::{Judged, Vehicle, VehicleEvent};
 use flight::computer::plane::PlaneError;
 pub use flight::vehicle::profile::StartPoint;
 pub use sim::plane::DeadlinePolicy;
@@ -242,18 +242,8 @@ fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEn
     if options.auto_start { endpoint.starting_by_itself() } else { endpoint }
 }
 
-/// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
-///
-/// The outcome depends only on the profile, the seed and the frames that arrive on the links, not on the speed, the
-/// machine or the clock. (If deadlines are enforced, it also depends on the speed of the machine.)
-///
-/// # Errors
-/// The profile cannot be simulated, or a link cannot be opened.
-pub async fn fly_observed(
-    options: FlyOptions,
-    mut stop: watch::Receiver<bool>,
-    mut observe: impl FnMut(f64, &VehicleEvent) + Send,
-) -> Result<FlightSummary, FlyError> {
+/// The vehicle, powered up, with its crew and with its pin out.
+fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
     let mut vehicle = options.profile.vehicle(options.seed, options.deadline_policy)?;
     if let Some(crew) = &options.crew {
         if options.key_file.is_none() {
@@ -267,6 +257,22 @@ pub async fn fly_observed(
     }
     // The crew pulls the pin by hand; the simulation does it when the program starts.
     vehicle.set_pin_out(true);
+    Ok(vehicle)
+}
+
+/// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
+///
+/// The outcome depends only on the profile, the seed and the frames that arrive on the links, not on the speed, the
+/// machine or the clock. (If deadlines are enforced, it also depends on the speed of the machine.)
+///
+/// # Errors
+/// The profile cannot be simulated, or a link cannot be opened.
+pub async fn fly_observed(
+    options: FlyOptions,
+    mut stop: watch::Receiver<bool>,
+    mut observe: impl FnMut(f64, &VehicleEvent) + Send,
+) -> Result<FlightSummary, FlyError> {
+    let mut vehicle = vehicle_of(&options)?;
     let mut links = Links::open(
         &options.links,
         options.key_file.as_deref(),

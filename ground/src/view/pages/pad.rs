@@ -242,16 +242,22 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let counting = vehicle.countdown_s().is_some();
     let keys = &model.settings.keys;
     let two = model.people() == Some(2);
-    let then =
-        |word: &str| if two { format!("{word} Enter, and CONFIRM") } else { format!("{word} Enter (10 s)") };
+    let then = |act: Act, word: &str| {
+        let key = keys.name(act);
+        if two {
+            format!("{key}, {word} Enter, then CONFIRM")
+        } else {
+            format!("{key}, then {word} Enter (10 s)")
+        }
+    };
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
         (model.link.uplink.is_proven(now), "it hears us: uplink proven".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
         (checked, "every check passes".to_owned()),
-        (armed, format!("{}, then {}", keys.name(Act::Arm), then("ARM"))),
+        (armed, then(Act::Arm, "ARM")),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
-        (counting, format!("{}, then {}", keys.name(Act::Start), then("START"))),
+        (counting, then(Act::Start, "START")),
     ];
     let mut lines: Vec<Line> = rungs
         .into_iter()

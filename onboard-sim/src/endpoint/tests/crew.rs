@@ -178,8 +178,8 @@ impl Launch {
         self.deliver(&frame);
         self.run(0.4);
         let to = frame.source();
-        let answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
-        let answer = answers.filter(|answer| answer.target == to).last();
+        let mut answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
+        let answer = answers.rfind(|answer| answer.target == to);
         let results = [
             MavResult::MAV_RESULT_ACCEPTED,
             MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
@@ -423,14 +423,14 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
                 1 | 2 => waits.map_or(FIRST_ASK, |ask| ask.number),
                 _ => (dice >> 16) as u16,
             };
-            if dice >> 10 & 7 == 0 && !recorded.is_empty() {
+            if (dice >> 10).is_multiple_of(8) && !recorded.is_empty() {
                 // Heard before, or stolen and never heard.
                 let old = recorded[(dice >> 13) as usize % recorded.len()].clone();
                 launch.deliver(&old);
                 continue;
             }
             let frame = launch.command(station, ARM, 1.0, f32::from(number));
-            if dice >> 13 & 7 == 0 {
+            if (dice >> 13).is_multiple_of(8) {
                 // Signed with one key in the name of another.
                 let forger = &mut launch.stations[station].signing;
                 let forged =

@@ -124,7 +124,7 @@ fn a_million_random_sequences_arm_nothing_without_two_keys() {
             let dice = random.next_u32();
             time_s += [0.0, 0.005, 0.5, 3.0, 9.995, 10.0, 10.005, 60.0][(dice & 7) as usize];
             let by = alone.unwrap_or(people[(dice >> 3 & 0xFF) as usize % 5]);
-            let act = if dice >> 11 & 3 == 0 { Act::Start } else { Act::Arm };
+            let act = if (dice >> 11).is_multiple_of(4) { Act::Start } else { Act::Arm };
             let confirms = match dice >> 13 & 7 {
                 0..=2 => None,
                 // The latest number, an earlier one, the next one, any.
