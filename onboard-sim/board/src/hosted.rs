@@ -108,7 +108,9 @@ fn compare(machines: &[String], folders: &[PathBuf]) -> Result<ExitCode> {
                 println!("  recorded {:?}", expected[*first]);
                 println!("  here     {:?}", found.get(*first));
             }
-            different.into_iter().for_each(|place| same_here[place] = false);
+            for place in different {
+                same_here[place] = false;
+            }
         }
         frames += expected.len();
         identical += same_here.iter().filter(|same| **same).count();
