@@ -17,7 +17,7 @@ use semihosting::io::{self, Read as _, Write as _};
 use semihosting::{eprintln, println, process};
 
 /// Heap, bytes: what the memory map leaves beside the static data.
-const HEAP_BYTES: usize = 408 * 1024;
+const HEAP_BYTES: usize = 920 * 1024;
 
 #[global_allocator]
 static HEAP: LockedHeap = LockedHeap::empty();
