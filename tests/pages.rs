@@ -17,7 +17,7 @@ fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         if path.is_dir() && !name.starts_with('.') && name != "target" {
             pages(&path, found);
-        } else if name.ends_with(".md") && name != "CHANGELOG.md" {
+        } else if path.extension().is_some_and(|end| end == "md") && name != "CHANGELOG.md" {
             found.push(path);
         }
     }
