@@ -10,14 +10,17 @@ use e2e::{Program, Running, program};
 const PROGRAMS: [(&str, Program); 3] =
     [("ground", Program::Ground), ("onboard-sim", Program::OnboardSim), ("replay", Program::Replay)];
 
-/// Every page, except in folders that hold no sources.
+/// Pages whose blocks are drawings, or about earlier releases.
+const NO_COMMANDS: [&str; 2] = ["ARCHITECTURE.md", "CHANGELOG.md"];
+
+/// Every other page, except in folders that hold no sources.
 fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder of the workspace") {
         let path = entry.expect("an entry").path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         if path.is_dir() && !name.starts_with('.') && name != "target" {
             pages(&path, found);
-        } else if path.extension().is_some_and(|end| end == "md") && name != "CHANGELOG.md" {
+        } else if path.extension().is_some_and(|end| end == "md") && !NO_COMMANDS.contains(&name) {
             found.push(path);
         }
     }
@@ -42,8 +45,10 @@ fn lines_of_code(page: &str) -> Vec<String> {
 fn commands_of(line: &str) -> Vec<(Program, Vec<String>)> {
     let parts = line.split([';', '|', '\'']).flat_map(|part| part.split("&&"));
     let words_of = |part: &str| -> Vec<String> {
-        let words = part.split_whitespace().map(|word| word.trim_matches('"').to_owned());
-        // What GNU parallel fills in, and where output goes.
+        // Slurm and GNU parallel fill in a number.
+        let filled_in = |word: &str| word.replace("$SLURM_ARRAY_TASK_ID", "1").replace("{}", "1");
+        let words = part.split_whitespace().map(|word| filled_in(word.trim_matches('"')));
+        // What follows is not of the program: parallel's list, or where output goes.
         words.take_while(|word| word != ":::" && !word.starts_with('>') && !word.starts_with("2>")).collect()
     };
     parts
