@@ -1,20 +1,15 @@
-//! Generates the MAVLink dialect from its XML and the log records from their `.proto` files, and records which build
-//! this is, so that every log can name it.
+//! Generates the MAVLink dialect from its XML, and records which build this is, so that every log can name it.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
 use anyhow::{Context, Result};
-use prost::Message as _;
 use sha2::Digest as _;
 
 fn main() -> Result<()> {
     let out_dir = PathBuf::from(env::var("OUT_DIR").context("OUT_DIR")?);
     generate_dialect(&out_dir)?;
-    for package in ["log", "flight", "computer"] {
-        generate_log_records(&out_dir, package)?;
-    }
     note_the_build()
 }
 
@@ -26,21 +21,6 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     }
     mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec!["dialect/touchdown.xml"]), out_dir)
         .context("dialect/touchdown.xml")?;
-    Ok(())
-}
-
-fn generate_log_records(out_dir: &Path, package: &str) -> Result<()> {
-    let file = format!("proto/touchdown/{package}/v1.proto");
-    println!("cargo:rerun-if-changed={file}");
-    let descriptors = protox::compile([&file], ["proto"]).with_context(|| file.clone())?;
-    fs::write(out_dir.join(format!("{package}_v1.fds")), descriptors.encode_to_vec())?;
-    let mut config = prost_build::Config::new();
-    if package == "computer" {
-        // What it imports is generated already.
-        config.extern_path(".touchdown.log.v1", "crate::log::v1");
-        config.extern_path(".touchdown.flight.v1", "crate::log::flight_v1");
-    }
-    config.compile_fds(descriptors).with_context(|| file.clone())?;
     Ok(())
 }
 

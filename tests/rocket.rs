@@ -4,7 +4,7 @@ use e2e::{
     ABORT, ACCEPTED, ARM, BareGround, Program, Running, START, SerialLine, Signal, auto_ground,
     expect_identical_replay, expect_landing, last_time_s, program, vehicle,
 };
-use protocol::dialect::{MavMessage, MavState, TdAbortEffect, TdChute, TdPhase};
+use protocol::dialect::{MavMessage, MavState, TdAbortEffect, TdChute, TdInterlock, TdPhase};
 
 #[test]
 fn a_rocket_without_a_ground_lands_and_its_log_replays_bit_for_bit() {
@@ -31,6 +31,25 @@ fn the_demonstration_of_the_ground_flies_the_same_mission_from_the_pad() {
         assert!(flight.output.contains(words), "no {words} in:\n{}", flight.output);
     }
     expect_identical_replay(folder.path(), "both.mcap");
+}
+
+/// Nobody armed it, nobody started it: it rises all the same, and comes down under its parachute.
+#[test]
+fn a_lift_off_that_nobody_asked_for_is_flown_to_the_parachute() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut ground = BareGround::new();
+    let mut command = vehicle(folder.path(), &[&ground.link()]);
+    let fault = ["--fault", "ascent-self-lights@8"];
+    let flight = ["--profile", "mk2", "--start", "pad", "--stay", "--speed", "2"];
+    let vehicle = Running::start(command.args(flight).args(fault));
+    ground.wait_for_status("a boost", |status| status.phase == TdPhase::TD_PHASE_BOOST);
+    let down = ground.wait_for_status("the parachute", |status| status.phase == TdPhase::TD_PHASE_CHUTE);
+    assert!(down.interlocks.contains(TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED), "{down:?}");
+    ground.wait_for_status("the ground", |status| status.phase == TdPhase::TD_PHASE_TOUCHDOWN);
+    vehicle.signal(Signal::SIGTERM);
+    let output = vehicle.wait().output;
+    assert!(output.contains("LIFT-OFF without a countdown"), "{output}");
+    expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 
 #[test]

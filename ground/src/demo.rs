@@ -71,6 +71,7 @@ impl Demo {
             system_id: options.system_id,
             links: vec![link],
             key_file: None,
+            crew: None,
             recorder,
             on_the_wire: OnTheWire::drawn(),
             seed: options.seed,

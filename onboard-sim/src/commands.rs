@@ -76,6 +76,10 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         } else {
             unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
         }
+    } else if request.is(MavCmd::MAV_CMD_TD_TAP) {
+        Ok(Command::Vehicle(Asked::Tap))
+    } else if request.is(MavCmd::MAV_CMD_TD_TAKE_COMMAND) {
+        Ok(Command::Vehicle(Asked::TakeCommand))
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
         Ok(Command::SetInterval { message_id: message_id(param1)?, interval_us: param2 })
     } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
@@ -93,6 +97,14 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     }
 }
 
+/// The number of the ask that an arm or a start confirms, in parameter 3. Other ground stations leave it at 0 or NaN:
+/// their command is an ask.
+pub fn confirmed_ask(request: &CommandRequest) -> Option<u16> {
+    let param3 = request.params[2];
+    let confirms = (1.0..=f32::from(u16::MAX)).contains(&param3) && param3.fract() == 0.0;
+    confirms.then_some(param3 as u16)
+}
+
 /// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl, MAVSDK) and
 /// ArduPilot's (Mission Planner, MAVProxy).
 const FORCE_CODES: [f32; 2] = [21196.0, 2989.0];
@@ -107,7 +119,8 @@ const LEGACY_REQUESTS: [(u16, u32); 3] =
 pub fn mav_result(ending: Ending) -> MavResult {
     match ending {
         Ending::Accepted => MavResult::MAV_RESULT_ACCEPTED,
-        Ending::NotNow => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+        // Other ground stations take it for the refusal that it is for them.
+        Ending::NotNow | Ending::Asked => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
         Ending::Denied => MavResult::MAV_RESULT_DENIED,
         Ending::Failed => MavResult::MAV_RESULT_FAILED,
     }

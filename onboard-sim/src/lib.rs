@@ -10,11 +10,13 @@
 //! * [`telemetry`] and [`streams`]: the vehicle's state as MAVLink messages, and their rates. Pure.
 //! * [`parameters`]: values that a ground station may read by name, and the few that it may set. Pure.
 //! * [`solve_times`]: statistics of the controller's solve times.
+//! * [`figure`]: curves and maps as SVG.
 //! * [`landability`]: maps of where a landing exists.
 //! * [`paper`]: the landing paper's experiments, its numbers beside ours.
 
 pub mod commands;
 pub mod endpoint;
+pub mod figure;
 pub mod fly;
 pub mod landability;
 pub mod paper;

@@ -8,10 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Parser, Subcommand};
-use cli::output::{refuse_loss, write_file};
-use onboard_sim::fly::{builtins, load_flight, load_planar};
-use onboard_sim::landability::{self, Axis};
-use onboard_sim::paper;
+use onboard_sim::fly::{builtins, load_flight};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
 
@@ -32,8 +29,11 @@ enum Command {
     /// Exit codes: 0 landed inside every limit (from apogee: the limits of the legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     Fly(cli::fly::FlyArguments),
-    /// Map where a landing inside the touchdown limits exists, over two quantities.
-    Landability(LandabilityArguments),
+    /// Map where a vehicle lands, over two quantities.
+    ///
+    /// A profile: where a plan exists that ends inside the touchdown limits, one solve for each cell. A mission: where its
+    /// own guidance lands, one simulated flight for each cell, or with `--ask attainable` where a clairvoyant could.
+    Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     Campaign(cli::campaign::CampaignArguments),
     /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
@@ -50,11 +50,7 @@ enum Command {
     #[command(after_help = cli::card::EXAMPLE)]
     Card(cli::card::CardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
-    Paper {
-        /// As JSON.
-        #[arg(long)]
-        json: bool,
-    },
+    Paper(cli::paper::PaperArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     Keygen {
         /// The file; an existing one is not overwritten.
@@ -74,32 +70,6 @@ enum Command {
     },
 }
 
-#[derive(clap::Args)]
-struct LandabilityArguments {
-    /// Built-in profile or TOML file.
-    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
-    profile: String,
-    /// Columns: QUANTITY=FROM:TO:COUNT. Quantities: thrust-to-weight, height (m), speed (m/s), tilt (deg), rate
-    /// (deg/s), lateral-speed (m/s), thrust-scale.
-    #[arg(long, default_value = "thrust-to-weight=0.9:1.5:41", value_name = "AXIS")]
-    x: Axis,
-    /// Rows, in the same form.
-    #[arg(long, default_value = "height=5:35:31", value_name = "AXIS")]
-    y: Axis,
-    /// Write the cells as CSV.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-    /// Write the map as a picture.
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
-    /// Cells computed at the same time; the map does not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
-}
-
 fn main() -> ExitCode {
     match run(Arguments::parse()) {
         Ok(code) => code,
@@ -113,11 +83,11 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
-        Command::Landability(arguments) => map_landability(&arguments),
+        Command::Landability(arguments) => cli::landability::run(&arguments),
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Motors(arguments) => cli::motors::run(&arguments),
         Command::Card(arguments) => cli::card::run(&arguments),
-        Command::Paper { json } => repeat_paper(json),
+        Command::Paper(arguments) => cli::paper::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
@@ -137,49 +107,6 @@ fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
     let passphrase = line.trim_end_matches(['\n', '\r']);
     anyhow::ensure!(!passphrase.is_empty(), "the passphrase is empty");
     KeyFile::create_with(file, &Key::from_passphrase(passphrase))?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn map_landability(arguments: &LandabilityArguments) -> anyhow::Result<ExitCode> {
-    let profile = load_planar(&arguments.profile)?.profile;
-    let (x, y) = (arguments.x, arguments.y);
-    anyhow::ensure!(x.quantity != y.quantity, "both axes vary {}; choose two quantities", x.quantity.name());
-    for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
-        refuse_loss(path, arguments.force)?;
-    }
-    let jobs =
-        arguments.jobs.or_else(|| std::thread::available_parallelism().ok().map(usize::from)).unwrap_or(1);
-    let count = x.count * y.count;
-    let shown = (count / 20).max(1);
-    let map = landability::map(&profile, x, y, jobs, &|done| {
-        if done.is_multiple_of(shown) || done == count {
-            // Messages go to standard error, which may be closed.
-            let _ = write!(
-                std::io::stderr(),
-                "\r{done} of {count} cells{}",
-                if done == count { "\n" } else { "" }
-            );
-        }
-    });
-    map.write_table(&mut std::io::stdout().lock())?;
-    if let Some(path) = &arguments.csv {
-        write_file(path, arguments.force, |out| map.write_csv(out))?;
-    }
-    if let Some(path) = &arguments.svg {
-        write_file(path, arguments.force, |out| landability::write_svg(&map, &profile.name, out))?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn repeat_paper(json: bool) -> anyhow::Result<ExitCode> {
-    let rows = paper::experiments()?;
-    let printed = paper::as_printed()?;
-    let mut out = std::io::stdout().lock();
-    if json {
-        writeln!(out, "{:#}", paper::to_json(&rows, &printed))?;
-    } else {
-        paper::write_tables(&mut out, &rows, &printed)?;
-    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -6,8 +6,9 @@ use protocol::dialect::{
     CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
     GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
     MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA, SYSTEM_TIME_DATA, TD_CONTROLLER_DATA,
-    TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+    TD_CREW_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
@@ -55,10 +56,12 @@ pub struct Standard {
     payload_len: usize,
     /// Default rate, Hz; 0 is off.
     pub rate_hz: f64,
+    /// Only a vehicle with operators sends it.
+    of_crew: bool,
 }
 
 const fn standard<M: MessageData>(parameter: &'static str, rate_hz: f64) -> Standard {
-    Standard { message_id: M::ID, parameter, payload_len: M::ENCODED_LEN, rate_hz }
+    Standard { message_id: M::ID, parameter, payload_len: M::ENCODED_LEN, rate_hz, of_crew: false }
 }
 
 impl Standard {
@@ -66,12 +69,19 @@ impl Standard {
     const fn cut_to(self, payload_len: usize) -> Self {
         Self { payload_len, ..self }
     }
+
+    const fn of_crew(self) -> Self {
+        Self { of_crew: true, ..self }
+    }
 }
 
 /// The periodic messages of the planar vehicle. If the budget runs short, the last ones are dropped first.
-pub const STANDARD: [Standard; 21] = [
+pub const STANDARD: [Standard; 24] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
+    // More often whenever something changes.
+    standard::<TD_CREW_DATA>("RATE_CREW", 1.0).of_crew(),
+    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 0.5).of_crew(),
     standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 10.0).cut_to(32),
@@ -94,12 +104,16 @@ pub const STANDARD: [Standard; 21] = [
     // Without its extensions, which are not known here.
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
 ];
 
 /// The periodic messages of the rocket from apogee, in the same order.
-pub const FROM_APOGEE: [Standard; 25] = [
+pub const FROM_APOGEE: [Standard; 28] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
+    // More often whenever something changes.
+    standard::<TD_CREW_DATA>("RATE_CREW", 1.0).of_crew(),
+    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 0.5).of_crew(),
     standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
@@ -127,6 +141,7 @@ pub const FROM_APOGEE: [Standard; 25] = [
     // Without its extensions, which are not known here.
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
 ];
 
 #[derive(Debug, Clone, Copy)]
@@ -169,12 +184,21 @@ pub struct Streams {
 impl Streams {
     /// Every message at its default rate, within a radio's budget.
     pub fn of(messages: &'static [Standard]) -> Self {
-        Self::at_most(messages, 0, f64::INFINITY)
+        Self::at_most(messages, 0, f64::INFINITY, false)
     }
 
     /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget holds.
     pub fn signed(messages: &'static [Standard]) -> Self {
-        let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz);
+        Self::slowed(messages, false)
+    }
+
+    /// The same for a vehicle with operators.
+    pub fn with_crew(messages: &'static [Standard]) -> Self {
+        Self::slowed(messages, true)
+    }
+
+    fn slowed(messages: &'static [Standard], crew: bool) -> Self {
+        let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz, crew);
         let [fastest, slower @ ..] = SIGNED_RATES_MAX_HZ;
         slower.into_iter().fold(
             at_most(fastest),
@@ -188,17 +212,20 @@ impl Streams {
         self.messages
     }
 
-    fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64) -> Self {
-        let streams = messages.iter().enumerate().map(|(place, standard)| {
+    fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64, crew: bool) -> Self {
+        let mut place = 0;
+        let streams = messages.iter().map(|standard| {
+            place += usize::from(crew || !standard.of_crew);
             let rate_max_hz = if is_vital(standard.message_id) { f64::INFINITY } else { rate_max_hz };
-            let interval_s = (standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
+            let sent = standard.rate_hz > 0.0 && (crew || !standard.of_crew);
+            let interval_s = sent.then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
             Stream {
                 message_id: standard.message_id,
                 frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
                 default_interval_s: interval_s,
                 interval_s,
                 // Spread in time, so that the slow messages are not all due at the same instant.
-                due_s: 0.02 * place as f64,
+                due_s: 0.02 * (place - 1) as f64,
                 sent_s: f64::NEG_INFINITY,
             }
         });

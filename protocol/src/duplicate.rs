@@ -22,6 +22,7 @@ struct Seen {
     /// How many frames of its source arrived before it.
     nth: u64,
     link: usize,
+    operator: u8,
     message_id: u32,
     crc: u16,
 }
@@ -48,8 +49,9 @@ impl Duplicates {
         Self::default()
     }
 
-    /// Notes a frame and returns whether it is a copy.
-    pub fn is_copy(&mut self, frame: &Frame, link: usize, now: Duration) -> bool {
+    /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether it is a copy. Nobody
+    /// can turn another one's frame into a copy.
+    pub fn is_copy(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
         let source = frame.source();
         if !self.sources.contains_key(&source) && self.sources.len() >= MAX_SOURCES {
             return false;
@@ -57,12 +59,13 @@ impl Duplicates {
         let of =
             self.sources.entry(source).or_insert_with(|| SourceHistory { ring: vec![None; 256], heard: 0 });
         let place = &mut of.ring[usize::from(frame.sequence())];
-        let heard = Seen { at: now, nth: of.heard, link, message_id: frame.message_id(), crc: frame.crc() };
+        let heard =
+            Seen { at: now, nth: of.heard, link, operator, message_id: frame.message_id(), crc: frame.crc() };
         let is_copy = place.is_some_and(|seen| {
             seen.link != link
                 && now.saturating_sub(seen.at) <= MAX_DELAY
                 && heard.nth - seen.nth < MAX_FRAMES_APART
-                && (seen.message_id, seen.crc) == (heard.message_id, heard.crc)
+                && (seen.operator, seen.message_id, seen.crc) == (heard.operator, heard.message_id, heard.crc)
         });
         if !is_copy {
             *place = Some(heard);
@@ -86,13 +89,16 @@ mod tests {
         let (first, second) = (beat(), beat());
         let mut duplicates = Duplicates::new();
         let at = |ms| Duration::from_millis(ms);
-        assert!(!duplicates.is_copy(&first, 0, at(0)));
-        assert!(!duplicates.is_copy(&second, 1, at(10)), "it is another frame");
-        assert!(duplicates.is_copy(&first, 1, at(300)));
-        assert!(duplicates.is_copy(&first, 2, at(400)), "it arrives over a third link");
-        assert!(!duplicates.is_copy(&first, 0, at(500)), "it arrives again over its own link");
-        assert!(duplicates.is_copy(&first, 1, at(9_000)), "it arrives over a link that lags far behind");
-        assert!(!duplicates.is_copy(&first, 1, at(11_000)), "the sequence number may have been used again");
+        assert!(!duplicates.is_copy(&first, 0, 0, at(0)));
+        assert!(!duplicates.is_copy(&second, 0, 1, at(10)), "it is another frame");
+        assert!(duplicates.is_copy(&first, 0, 1, at(300)));
+        assert!(duplicates.is_copy(&first, 0, 2, at(400)), "it arrives over a third link");
+        assert!(!duplicates.is_copy(&first, 0, 0, at(500)), "it arrives again over its own link");
+        assert!(duplicates.is_copy(&first, 0, 1, at(9_000)), "it arrives over a link that lags far behind");
+        assert!(
+            !duplicates.is_copy(&first, 0, 1, at(11_000)),
+            "the sequence number may have been used again"
+        );
     }
 
     #[test]
@@ -101,7 +107,7 @@ mod tests {
         let mut duplicates = Duplicates::new();
         for frame in 0..1_000 {
             let beat = encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-            assert!(!duplicates.is_copy(&beat, frame % 2, Duration::from_millis(frame as u64)), "{frame}");
+            assert!(!duplicates.is_copy(&beat, 0, frame % 2, Duration::from_millis(frame as u64)), "{frame}");
         }
     }
 
@@ -111,7 +117,7 @@ mod tests {
         for system_id in 1..=255 {
             let source = Address { system_id, component_id: 1 };
             let frame = Encoder::new(source).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-            duplicates.is_copy(&frame, 0, Duration::ZERO);
+            duplicates.is_copy(&frame, 0, 0, Duration::ZERO);
         }
         assert_eq!(duplicates.sources.len(), MAX_SOURCES);
     }

@@ -74,6 +74,25 @@ impl KeyFile {
     /// # Errors
     /// The file cannot be read, other users can read it, or it contains no key; or the timestamps cannot be parsed.
     pub fn open(path: &Path, user: &str) -> Result<(Self, Signing), KeyFileError> {
+        let key = Self::read_key(path)?;
+        let mut stamps_path = path.as_os_str().to_owned();
+        stamps_path.push(format!(".{user}.stamps"));
+        let stamps_path = PathBuf::from(stamps_path);
+        let memory = match fs::read_to_string(&stamps_path) {
+            Ok(text) => Memory::from_text(&text)
+                .map_err(|why| KeyFileError::Memory { path: stamps_path.clone(), why })?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Memory::default(),
+            Err(source) => return Err(KeyFileError::Io { path: stamps_path, source }),
+        };
+        let file = Self { stamps_path, written: memory.clone(), appending: None };
+        Ok((file, Signing::new(key, memory)))
+    }
+
+    /// Reads a key without timestamps.
+    ///
+    /// # Errors
+    /// The file cannot be read, other users can read it, or it contains no key.
+    pub fn read_key(path: &Path) -> Result<Key, KeyFileError> {
         let failed = |source| KeyFileError::Io { path: path.to_owned(), source };
         let mut file = File::open(path).map_err(failed)?;
         let mode = file.metadata().map_err(failed)?.permissions().mode() & 0o777;
@@ -86,18 +105,7 @@ impl KeyFile {
             io::ErrorKind::InvalidData => no_key(),
             _ => failed(error),
         })?;
-        let key = Key::from_hex(text.trim_end()).ok_or_else(no_key)?;
-        let mut stamps_path = path.as_os_str().to_owned();
-        stamps_path.push(format!(".{user}.stamps"));
-        let stamps_path = PathBuf::from(stamps_path);
-        let memory = match fs::read_to_string(&stamps_path) {
-            Ok(text) => Memory::from_text(&text)
-                .map_err(|why| KeyFileError::Memory { path: stamps_path.clone(), why })?,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Memory::default(),
-            Err(source) => return Err(KeyFileError::Io { path: stamps_path, source }),
-        };
-        let file = Self { stamps_path, written: memory.clone(), appending: None };
-        Ok((file, Signing::new(key, memory)))
+        Key::from_hex(text.trim_end()).ok_or_else(no_key)
     }
 
     /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to be called before

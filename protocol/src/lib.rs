@@ -15,7 +15,8 @@
 //! * [`duplicate`] and [`link_stats`]: copies of a frame, and the rates and the loss of a link;
 //! * [`hub`]: several links to one peer, made of the modules above;
 //! * `transport` (a feature): UDP, TCP and serial links;
-//! * `key_file` (the same feature): the file of a signing key;
+//! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
+//! * [`mission`]: which mission is meant;
 //! * [`log`]: the flight log;
 //! * [`hostile`]: hostile input for tests and fuzzing.
 //!
@@ -60,6 +61,8 @@
 //! [`hub::Hub::signing_memory`] so that it survives a power cycle.
 
 pub mod command;
+#[cfg(feature = "transport")]
+pub mod crew_file;
 pub mod dialect;
 pub mod duplicate;
 pub mod frame;
@@ -71,6 +74,7 @@ pub mod identity;
 pub mod key_file;
 pub mod link_stats;
 pub mod log;
+pub mod mission;
 pub mod parameter;
 pub mod signing;
 pub mod text;

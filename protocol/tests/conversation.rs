@@ -18,7 +18,7 @@ fn ms(milliseconds: u64) -> Duration {
 }
 
 fn answer(command: MavCmd, result: MavResult) -> CommandAnswer {
-    CommandAnswer { command: command as u16, result: result as u8, progress: 0, target: GROUND }
+    CommandAnswer { command: command as u16, result: result as u8, progress: 0, detail: 0, target: GROUND }
 }
 
 /// Polls for `seconds` without an answer; returns the times of sending and the events.

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA};
 use protocol::frame::{Encoder, Frame, Framer};
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::signing::{Key, Memory, MemoryError, Rejection, Signing, stamp_of};
 
 const NOW: u64 = 37_000_000_000_000;
@@ -206,5 +206,64 @@ proptest! {
         let frame = Encoder::new(VEHICLE)
             .encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
         prop_assert_eq!(side(1).sign(&frame, link, NOW).without_signature(), frame);
+    }
+}
+
+/// Two operators, the shared key, and a vehicle that checks all three.
+fn crew() -> (Signing, [Signing; 3]) {
+    let [shared, ann, bob] = [1, 2, 3].map(|byte| Key::new([byte; Key::LEN]));
+    let vehicle = Signing::new(shared.clone(), Memory::default())
+        .with_operators([(1, ann.clone()), (2, bob.clone())].into());
+    let station = |shared: &Key| Signing::new(shared.clone(), Memory::default());
+    let stations =
+        [station(&shared), station(&shared).as_operator(1, ann), station(&shared).as_operator(2, bob)];
+    (vehicle, stations)
+}
+
+#[test]
+fn the_link_id_selects_the_key_and_nothing_else() {
+    let (mut vehicle, stations) = crew();
+    let beat = || Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    for (number, mut station) in (0..).zip(stations) {
+        for link in [0, 1, 5] {
+            let id = station.link_id(link);
+            let signed = station.sign(&beat(), id, NOW + u64::from(number) * 100 + link as u64);
+            assert_eq!(vehicle.check(&signed, NOW), Ok(()), "operator {number} over link {link}");
+            assert_eq!(vehicle.operator_of(&signed), number);
+        }
+        // With the key of one and the number of another, or of nobody.
+        for other in (0..=15).filter(|other| *other != number) {
+            let forged = station.sign(&beat(), other, NOW + 1_000 + u64::from(other));
+            assert_eq!(vehicle.check(&forged, NOW), Err(Rejection::Wrong), "operator {number} as {other}");
+        }
+    }
+}
+
+/// Whoever only looks on has the shared key: they can neither use up the streams of an operator nor put one's stream
+/// into the future, and thereby delay an abort.
+#[test]
+fn an_observer_locks_no_operator_out() {
+    let (mut vehicle, [mut observer, mut ann, _]) = crew();
+    for system_id in 1..=255 {
+        let mut encoder = Encoder::new(Address { system_id, component_id: 190 });
+        let frame = encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        for link in 0..16_u8 {
+            let signed = observer.sign(&frame, link << 4, NOW + 1_000_000);
+            let _ = vehicle.check(&signed, NOW);
+        }
+    }
+    let beat = Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    let id = ann.link_id(0);
+    assert_eq!(vehicle.check(&ann.sign(&beat, id, NOW), NOW), Ok(()));
+}
+
+/// The vehicle signs with the shared key, and every station checks with it.
+#[test]
+fn every_station_believes_the_vehicle() {
+    let (mut vehicle, stations) = crew();
+    let beat = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    for (link, mut station) in stations.into_iter().enumerate() {
+        let signed = vehicle.sign(&beat, vehicle.link_id(link), NOW);
+        assert_eq!(station.check(&signed, NOW), Ok(()));
     }
 }

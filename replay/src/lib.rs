@@ -13,9 +13,12 @@
 //! * [`sweep`](mod@sweep): flies many flights with many settings and ranks them; finds the smallest change of a setting
 //!   that changes the verdict.
 //! * [`gate`]: holds a directory of flights against a baseline.
+//! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals.
+//! * [`learn`](mod@learn): what all flights so far tell of a lot, an airframe and a site, and GO or NO-GO.
 //! * [`tick`](mod@tick): solves one recorded tick again.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
+//! * [`frames`]: a flight as the frames that a board reads.
 //! * [`shadow`](mod@shadow): holds the telemetry of a vehicle in flight against what this build expects.
 //! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
@@ -25,9 +28,12 @@ pub mod compare;
 pub mod controller;
 pub mod evaluate;
 pub mod export;
+pub mod fit;
+pub mod frames;
 pub mod gate;
 pub mod import;
 pub mod info;
+pub mod learn;
 pub mod log;
 pub mod output;
 pub mod print;

@@ -40,6 +40,7 @@ fn start_vehicle(
         profile: load_flight("paper-calibrated")?,
         links: vec![link],
         key_file: None,
+        crew: None,
         recorder: None,
         on_the_wire: OnTheWire::drawn(),
         seed: 1,

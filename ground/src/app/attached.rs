@@ -17,6 +17,8 @@ use super::server::read_one;
 use super::signals::Signals;
 use super::stations;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
+use protocol::mission::MissionHash;
+
 use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
 use crate::attach::socket;
 use crate::config::Config;
@@ -27,6 +29,7 @@ use crate::model::callouts::Talk;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::seat::Seat;
+use crate::model::two_person::KeyOwner;
 use crate::model::{Model, Role, Settings};
 use crate::update::{Msg, update};
 
@@ -262,6 +265,9 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         seat: Seat::new(hello.screen, viewer.operator.clone()),
         demonstration: hello.demonstration,
         auto: hello.auto,
+        key_owner: (hello.key_number > 0)
+            .then(|| KeyOwner { number: hello.key_number, name: hello.key_owner.clone() }),
+        mission: hello.mission.map(MissionHash),
         keys: viewer.keys.clone(),
         talk: viewer.talk,
         ..Settings::on_screen(&hello.link_name)

@@ -3,6 +3,7 @@
 pub mod alarm_command;
 pub mod attached;
 pub mod clock;
+mod key_ring;
 pub mod lines;
 pub mod log;
 mod operator;
@@ -23,9 +24,10 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::key_file::KeyFile;
+use onboard_sim::fly::load_flight;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
+use protocol::mission::MissionHash;
 use protocol::transport::LinkAddress;
 
 use crate::cli::{Cli, Command, LogChoice, Seconds};
@@ -37,6 +39,7 @@ use crate::model::{Model, Role, Settings};
 use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
+use key_ring::KeyRing;
 use log::LogGuard;
 use output::Output;
 use server::{Server, hello};
@@ -134,7 +137,8 @@ async fn start(
     if endpoints.is_empty() {
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
-    let key = cli.key.as_deref().map(|path| KeyFile::open(path, "ground")).transpose()?;
+    let KeyRing { key, owner } = KeyRing::open(cli)?;
+    let mission = cli.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened = Wire::open(cli.us(), endpoints, key, clock, recorder.clone(), log_time.clone()).await;
@@ -164,6 +168,8 @@ async fn start(
         vehicle: cli.vehicle(),
         role: Role::Station,
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
+        key_owner: owner,
+        mission: mission.map(|mission| MissionHash::of(mission.toml())),
         demonstration: demo.is_some(),
         auto,
         // A daemon also keeps running after a flight.

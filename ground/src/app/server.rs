@@ -13,6 +13,8 @@ use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
 
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
+use protocol::mission::MissionHash;
+
 use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
 use crate::attach::socket;
 use crate::model::Model;
@@ -147,6 +149,9 @@ pub(super) fn hello(model: &Model) -> Hello {
         link_name: settings.link_name.clone(),
         log_path: settings.log_path.clone().unwrap_or_default(),
         tlog_path: settings.tlog_path.clone().unwrap_or_default(),
+        key_number: settings.key_owner.as_ref().map_or(0, |owner| owner.number),
+        key_owner: settings.key_owner.as_ref().map(|owner| owner.name.clone()).unwrap_or_default(),
+        mission: settings.mission.map(|MissionHash(hash)| hash),
     }
 }
 

@@ -4,7 +4,7 @@ use crate::model::action::Request;
 use crate::update::Msg;
 
 /// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
@@ -27,6 +27,11 @@ pub struct Hello {
     pub log_path: String,
     /// Empty without a telemetry log.
     pub tlog_path: String,
+    /// The number and the owner of the operator's key that the station signs with; 0 without one.
+    pub key_number: u8,
+    pub key_owner: String,
+    /// The hash of the mission that the station knows.
+    pub mission: Option<[u8; 8]>,
 }
 
 /// What a station sends to its screens.

@@ -49,6 +49,15 @@ pub struct Cli {
     #[arg(long, value_name = "FILE", global = true)]
     pub key: Option<PathBuf>,
 
+    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
+    /// share. Without the name of somebody who has a key this station only looks on.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub crew: Option<PathBuf>,
+
+    /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
+    #[arg(long, value_name = "NAME|FILE", global = true)]
+    pub mission: Option<String>,
+
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
@@ -245,6 +254,8 @@ impl Cli {
         let given = [
             ("--connect", !self.connect.is_empty()),
             ("--key", self.key.is_some()),
+            ("--crew", self.crew.is_some()),
+            ("--mission", self.mission.is_some()),
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
@@ -282,6 +293,8 @@ mod tests {
         for word in [
             "--connect",
             "--key",
+            "--crew",
+            "--mission",
             "--sysid",
             "--vehicle-sysid",
             "--log",
@@ -326,6 +339,7 @@ mod tests {
         for (flag, value) in [
             ("--connect", " udpin:0.0.0.0:14550"),
             ("--key", " k"),
+            ("--mission", " mk2"),
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),

@@ -23,6 +23,13 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # Signing key, as for --key. Default: nothing is signed.
 #key = "touchdown.key"
 
+# Who may command, and who sits here, as for --crew and --operator. Default: nobody is named.
+#crew = "crew.toml"
+#operator = "Ann"
+
+# The mission that the vehicle should fly, as for --mission. Default: any.
+#mission = "mission.toml"
+
 # Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
 #log = "flight.mcap"
 
@@ -69,6 +76,9 @@ pub struct Config {
     pub sysid: Option<u8>,
     pub vehicle_sysid: Option<u8>,
     pub key: Option<PathBuf>,
+    pub crew: Option<PathBuf>,
+    pub operator: Option<String>,
+    pub mission: Option<String>,
     pub log: Option<String>,
     pub tlog: Option<String>,
     pub socket: Option<PathBuf>,
@@ -161,6 +171,15 @@ impl Config {
         }
         if cli.key.is_none() && !cli.connect.is_empty() {
             cli.key.clone_from(&self.key);
+        }
+        if cli.crew.is_none() && !cli.connect.is_empty() {
+            cli.crew.clone_from(&self.crew);
+        }
+        if cli.mission.is_none() && !cli.connect.is_empty() {
+            cli.mission.clone_from(&self.mission);
+        }
+        if cli.operator.is_none() {
+            cli.operator.clone_from(&self.operator);
         }
         if cli.log.is_none() {
             cli.log = parsed(self.log.as_ref());

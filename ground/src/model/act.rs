@@ -16,6 +16,12 @@ pub enum Act {
     Start,
     /// Open the dialog that disarms.
     Disarm,
+    /// Open the dialog that holds the countdown.
+    HoldCountdown,
+    /// Tap: our operator has confirmed the start and is still there.
+    Tap,
+    /// Open the dialog that takes command.
+    TakeCommand,
     Acknowledge,
     Show(Page),
     Hold,
@@ -42,10 +48,23 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 26] = [
+pub const DEFINITIONS: [Definition; 29] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
+    define(Act::HoldCountdown, "hold-countdown", Key::Char('H'), "hold the countdown: then Enter within 5 s"),
+    define(
+        Act::Tap,
+        "tap",
+        Key::Char('T'),
+        "two people: tap at least every 2 s, from the start to the release",
+    ),
+    define(
+        Act::TakeCommand,
+        "take",
+        Key::Char('C'),
+        "take command from a silent station: then TAKE and Enter",
+    ),
     define(Act::Acknowledge, "acknowledge", Key::Char(' '), "acknowledge the shown alarm"),
     define(Act::Show(Page::Pad), "pad", Key::Char('1'), "page: arming checks and ladder"),
     define(Act::Show(Page::Descent), "flight", Key::Char('2'), "page: ascent and descent"),
@@ -84,6 +103,11 @@ impl Act {
             Self::Arm => commands && permits::why_not_arm(model, now).is_none(),
             Self::Start => commands && permits::why_not_start(model, now).is_none(),
             Self::Disarm => commands && model.vehicle.armed().is_some_and(|armed| armed.value),
+            Self::HoldCountdown => {
+                commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
+            }
+            Self::Tap => commands && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
+            Self::TakeCommand => commands && permits::why_not_take(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
@@ -100,6 +124,9 @@ impl Act {
 
     /// Whether it opens a dialog that commands the vehicle.
     pub fn opens_ladder(self) -> bool {
-        matches!(self, Self::Arm | Self::Start | Self::Disarm)
+        matches!(
+            self,
+            Self::Arm | Self::Start | Self::Disarm | Self::HoldCountdown | Self::Tap | Self::TakeCommand
+        )
     }
 }

@@ -43,10 +43,9 @@ pub enum AlarmKind {
 
 impl AlarmKind {
     pub fn all() -> impl Iterator<Item = Self> {
-        let of_commands =
-            [Self::Disagreement, Self::Unanswered, Self::Refused].into_iter().flat_map(|kind| {
-                [CommandKind::Arm, CommandKind::Disarm, CommandKind::Start, CommandKind::Abort].map(kind)
-            });
+        let of_commands = [Self::Disagreement, Self::Unanswered, Self::Refused]
+            .into_iter()
+            .flat_map(|kind| CommandKind::ALL.map(kind));
         let others = [
             Self::LinkLost,
             Self::UplinkLost,

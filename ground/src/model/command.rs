@@ -19,9 +19,30 @@ pub enum CommandKind {
     Disarm,
     Start,
     Abort,
+    /// Confirm what another operator asks.
+    ConfirmArm,
+    ConfirmStart,
+    /// Hold the countdown.
+    Hold,
+    /// Whoever confirmed the start is still there.
+    Tap,
+    /// Take command from a station that is silent.
+    TakeCommand,
 }
 
 impl CommandKind {
+    pub const ALL: [Self; 9] = [
+        Self::Arm,
+        Self::Disarm,
+        Self::Start,
+        Self::Abort,
+        Self::ConfirmArm,
+        Self::ConfirmStart,
+        Self::Hold,
+        Self::Tap,
+        Self::TakeCommand,
+    ];
+
     /// The name on screens and in the log.
     pub fn name(self) -> &'static str {
         match self {
@@ -29,24 +50,33 @@ impl CommandKind {
             Self::Disarm => "DISARM",
             Self::Start => "START",
             Self::Abort => "ABORT",
+            Self::ConfirmArm => "CONFIRM ARM",
+            Self::ConfirmStart => "CONFIRM START",
+            Self::Hold => "HOLD",
+            Self::Tap => "TAP",
+            Self::TakeCommand => "TAKE COMMAND",
         }
     }
 
     /// The MAVLink command and its first parameter.
     pub fn mav_command(self) -> (MavCmd, f32) {
         match self {
-            Self::Arm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
+            Self::Arm | Self::ConfirmArm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
             Self::Disarm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0),
-            Self::Start => (MavCmd::MAV_CMD_MISSION_START, 0.0),
+            Self::Start | Self::ConfirmStart => (MavCmd::MAV_CMD_MISSION_START, 0.0),
+            Self::Hold => (MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
+            Self::Tap => (MavCmd::MAV_CMD_TD_TAP, 0.0),
+            Self::TakeCommand => (MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0),
             Self::Abort => (MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0),
         }
     }
 
-    /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe.
+    /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe. A
+    /// confirmation is for one ask, and a tap for one moment.
     pub fn resend(self) -> Resend {
         match self {
-            Self::Arm => Resend::Never,
-            Self::Disarm | Self::Start => Resend::Times(3),
+            Self::Arm | Self::ConfirmArm | Self::ConfirmStart | Self::Tap => Resend::Never,
+            Self::Disarm | Self::Start | Self::Hold | Self::TakeCommand => Resend::Times(3),
             Self::Abort => Resend::UntilWithdrawn,
         }
     }
@@ -56,12 +86,15 @@ impl CommandKind {
         let heartbeat = vehicle.heartbeat.filter(|heartbeat| heartbeat.received_at >= since);
         let status = vehicle.status.as_ref().filter(|status| status.received_at >= since);
         match self {
-            Self::Arm => heartbeat.is_some_and(|heartbeat| heartbeat.value.armed),
+            Self::Arm | Self::ConfirmArm => heartbeat.is_some_and(|heartbeat| heartbeat.value.armed),
             Self::Disarm => heartbeat.is_some_and(|heartbeat| !heartbeat.value.armed),
-            Self::Start => status.is_some_and(|status| {
+            Self::Start | Self::ConfirmStart => status.is_some_and(|status| {
                 let counting = status.value.countdown_ms != i32::MAX;
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
+            Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
+            // The answer is all there is to see.
+            Self::Tap | Self::TakeCommand => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
@@ -71,12 +104,19 @@ impl CommandKind {
         }
     }
 
+    /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
+    pub fn shows_nothing(self) -> bool {
+        matches!(self, Self::Tap | Self::TakeCommand)
+    }
+
     /// What shows the effect, for the event "observed".
     pub fn observed_words(self) -> &'static str {
         match self {
-            Self::Arm => "HEARTBEAT says armed",
+            Self::Arm | Self::ConfirmArm => "HEARTBEAT says armed",
             Self::Disarm => "HEARTBEAT says disarmed",
-            Self::Start => "countdown runs",
+            Self::Start | Self::ConfirmStart => "countdown runs",
+            Self::Hold => "no countdown",
+            Self::Tap | Self::TakeCommand => "accepted",
             Self::Abort => "abort latched",
         }
     }
@@ -93,6 +133,8 @@ pub enum Acknowledgement {
     Waiting,
     /// The vehicle is executing the command.
     InProgress,
+    /// Noted by the vehicle: a second person has to confirm it.
+    Asked,
     /// Answered with this `MAV_RESULT`.
     Answered(u8),
     /// No answer came, and none is expected any more.

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use super::two_person::Ask;
+
 /// How long the crew has to type the word that arms.
 pub const ARM_TIME_LIMIT: Duration = Duration::from_secs(10);
 pub const ARM_WORD: &str = "ARM";
@@ -9,6 +11,10 @@ pub const ARM_WORD: &str = "ARM";
 pub const START_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// The word that starts the countdown.
 pub const START_WORD: &str = "START";
+/// The word that confirms what another operator asks.
+pub const CONFIRM_WORD: &str = "CONFIRM";
+/// The word that takes command.
+pub const TAKE_WORD: &str = "TAKE";
 /// How long the crew has to confirm a disarm.
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
 /// How long the crew has to type the word that quits.
@@ -18,7 +24,7 @@ pub const QUIT_WORD: &str = "QUIT";
 
 /// The open dialog. It accepts the next letter of its word (in either case), or Enter after the whole word. Any other
 /// key closes it. The abort chord works in every dialog.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Dialog {
     Closed,
     /// The second step of arming: the word is typed.
@@ -33,7 +39,22 @@ pub enum Dialog {
         typed: String,
         until: Duration,
     },
+    /// The word that confirms another operator's ask is typed.
+    Confirm {
+        /// The ask: that one and no other is confirmed.
+        ask: Ask,
+        typed: String,
+        until: Duration,
+    },
+    /// The word that takes command is typed.
+    TakeCommand {
+        typed: String,
+        until: Duration,
+    },
     Disarm {
+        until: Duration,
+    },
+    Hold {
         until: Duration,
     },
     /// The word that quits is typed, because the vehicle is armed or in flight.
@@ -53,6 +74,18 @@ impl Dialog {
         Self::Start { typed: String::new(), until: now + START_TIME_LIMIT }
     }
 
+    pub fn confirm(ask: Ask, now: Duration) -> Self {
+        Self::Confirm { ask, typed: String::new(), until: now + ask.left }
+    }
+
+    pub fn take_command(now: Duration) -> Self {
+        Self::TakeCommand { typed: String::new(), until: now + ARM_TIME_LIMIT }
+    }
+
+    pub fn hold(now: Duration) -> Self {
+        Self::Hold { until: now + CONFIRM_TIME_LIMIT }
+    }
+
     pub fn disarm(now: Duration) -> Self {
         Self::Disarm { until: now + CONFIRM_TIME_LIMIT }
     }
@@ -67,7 +100,10 @@ impl Dialog {
             Self::Closed => None,
             Self::Arm { until, .. }
             | Self::Start { until, .. }
+            | Self::Confirm { until, .. }
+            | Self::TakeCommand { until, .. }
             | Self::Disarm { until }
+            | Self::Hold { until }
             | Self::Quit { until, .. } => Some(*until),
         }
     }
@@ -78,7 +114,10 @@ impl Dialog {
             Self::Closed => "nothing",
             Self::Arm { .. } => "arming",
             Self::Start { .. } => "start",
+            Self::Confirm { .. } => "confirmation",
+            Self::TakeCommand { .. } => "take-over",
             Self::Disarm { .. } => "disarm",
+            Self::Hold { .. } => "hold",
             Self::Quit { .. } => "quit",
         }
     }
@@ -86,7 +125,9 @@ impl Dialog {
     /// The word to type; `None` where Enter alone confirms.
     pub fn word(&self) -> Option<&'static str> {
         match self {
-            Self::Closed | Self::Disarm { .. } => None,
+            Self::Closed | Self::Disarm { .. } | Self::Hold { .. } => None,
+            Self::Confirm { .. } => Some(CONFIRM_WORD),
+            Self::TakeCommand { .. } => Some(TAKE_WORD),
             Self::Arm { .. } => Some(ARM_WORD),
             Self::Start { .. } => Some(START_WORD),
             Self::Quit { .. } => Some(QUIT_WORD),
@@ -97,17 +138,24 @@ impl Dialog {
     pub fn is_complete(&self) -> bool {
         match self {
             Self::Closed => false,
-            Self::Disarm { .. } => true,
-            Self::Arm { typed, .. } | Self::Start { typed, .. } | Self::Quit { typed, .. } => {
-                self.word().is_some_and(|word| word.len() == typed.len())
-            }
+            Self::Disarm { .. } | Self::Hold { .. } => true,
+            Self::Arm { typed, .. }
+            | Self::Start { typed, .. }
+            | Self::Confirm { typed, .. }
+            | Self::TakeCommand { typed, .. }
+            | Self::Quit { typed, .. } => self.word().is_some_and(|word| word.len() == typed.len()),
         }
     }
 
     /// Takes a letter. Returns whether it is the next letter of the word.
     pub fn take(&mut self, letter: char) -> bool {
         let Some(word) = self.word() else { return false };
-        let (Self::Arm { typed, .. } | Self::Start { typed, .. } | Self::Quit { typed, .. }) = self else {
+        let (Self::Arm { typed, .. }
+        | Self::Start { typed, .. }
+        | Self::Confirm { typed, .. }
+        | Self::TakeCommand { typed, .. }
+        | Self::Quit { typed, .. }) = self
+        else {
             return false;
         };
         let fits = word.chars().nth(typed.len()).is_some_and(|next| next.eq_ignore_ascii_case(&letter));

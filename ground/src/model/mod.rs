@@ -37,6 +37,7 @@ pub mod telemetry;
 pub mod touchdown;
 pub mod trace;
 pub mod trend;
+pub mod two_person;
 pub mod uplink;
 pub mod vehicle;
 pub mod words;
@@ -48,6 +49,7 @@ use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::OperatorAction;
+use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
 
 use action::Action;
@@ -68,6 +70,7 @@ use page::{Page, Pages};
 use parameters::Parameters;
 use recall::{LookBack, Recall};
 use seat::Seat;
+use two_person::KeyOwner;
 use vehicle::Vehicle;
 
 /// The settings of a run, which do not change during it.
@@ -90,6 +93,10 @@ pub struct Settings {
     pub role: Role,
     /// This screen and its operator.
     pub seat: Seat,
+    /// The operator whose key signs what the station sends; `None` without a crew, and for an observer.
+    pub key_owner: Option<KeyOwner>,
+    /// The mission that the vehicle should fly, if the station knows it.
+    pub mission: Option<MissionHash>,
     /// Whether the vehicle is simulated in the station's own process.
     pub demonstration: bool,
     /// Whether the automatic mode arms and starts.
@@ -117,6 +124,8 @@ impl Settings {
             vehicle: VEHICLE,
             role: Role::Station,
             seat: Seat::default(),
+            key_owner: None,
+            mission: None,
             demonstration: false,
             auto: false,
             interactive: true,
@@ -216,6 +225,8 @@ pub struct Model {
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
+    /// The vehicle's last answer said that a second person has to confirm.
+    pub(crate) asked_to_confirm: bool,
     /// A key to quit was pressed; the program quits at this time unless another key comes first.
     pub(crate) quit_at: Option<Duration>,
     pub(crate) outbox: Vec<Action>,
@@ -253,6 +264,7 @@ impl Model {
             texts: Reassembler::new(),
             due: Due::default(),
             auto_step: AutoStep::default(),
+            asked_to_confirm: false,
             quit_at: None,
             outbox: Vec::new(),
         }

@@ -3,6 +3,7 @@
 
 use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdHold, TdInterlock, TdMotor, TdPhase};
 
+use super::two_person::role_name;
 use super::vehicle::{Vehicle, is_on_pad};
 
 /// Why nobody may approach, the worst reason first.
@@ -89,14 +90,31 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     }
 }
 
+/// The operator who held the countdown, or whose silence did.
+fn held_by(vehicle: &Vehicle) -> Option<String> {
+    let number = vehicle.crew.as_ref().map(|crew| crew.value.held_by)?;
+    let (role, name) = vehicle.operators.get(&number)?;
+    Some(format!("{} {name}", role_name(*role)))
+}
+
 /// Why the countdown was held and what happens next; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
     let whom = if armed_here { "this station" } else { "its station" };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
+        TdHold::TD_HOLD_UPLINK_SILENT if held_by(vehicle).is_some() && !armed_here => {
+            format!("the vehicle did not hear {} for 2 s", held_by(vehicle).unwrap_or_default())
+        }
         TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 2 s"),
-        TdHold::TD_HOLD_COMMANDED => "a station asked for it".to_owned(),
+        TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
+            Some(who) => format!("{who} asked for it"),
+            None => "a station asked for it".to_owned(),
+        },
+        TdHold::TD_HOLD_TAP_OVERDUE => match held_by(vehicle) {
+            Some(who) => format!("no tap of {who} for 2 s"),
+            None => "no tap for 2 s".to_owned(),
+        },
     };
     let held = status.phase == TdPhase::TD_PHASE_PAD_ARMED;
     held.then(|| format!("HOLD: {why}; start anew; disarms in {} s", status.hold_left_s))

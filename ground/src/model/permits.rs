@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TdAct, TdPhase};
 
+use super::two_person::Ask;
 use super::vehicle::is_on_pad;
 use super::{Model, words};
 
@@ -19,6 +20,9 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         let why = model.link.uplink.why_unheard();
         return Some(format!("the uplink is not proven: {why}"));
     }
+    if let Some(why) = why_no_key(model).or_else(|| why_other_mission(model)) {
+        return Some(why);
+    }
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());
     };
@@ -33,8 +37,53 @@ pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     if !model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("not armed".to_owned());
     }
+    if let Some(why) = why_no_key(model) {
+        return Some(why);
+    }
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());
     };
     (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
+}
+
+/// Why the ground does not confirm this ask.
+pub fn why_not_confirm(model: &Model, ask: &Ask, now: Duration) -> Option<String> {
+    match model.ask(now) {
+        Some(waits) if waits.number == ask.number && waits.act == ask.act => {}
+        _ => return Some("it is no longer asked".to_owned()),
+    }
+    match ask.act {
+        TdAct::TD_ACT_START => why_not_start(model, now),
+        _ => why_not_arm(model, now),
+    }
+}
+
+/// Why the ground does not take command.
+pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
+    if !model.link.state(now).carries() {
+        return Some("the vehicle is not heard".to_owned());
+    }
+    if !model.vehicle.armed().is_some_and(|armed| armed.value) {
+        return Some("not armed".to_owned());
+    }
+    if model.link.uplink.armed_by_us {
+        return Some("this station commands already".to_owned());
+    }
+    why_no_key(model)
+}
+
+/// Why a vehicle with operators would refuse everything that this station asks.
+fn why_no_key(model: &Model) -> Option<String> {
+    let observes = model.people().is_some() && model.settings.key_owner.is_none();
+    observes.then(|| "no operator's key here (--crew, --operator): this station looks on".to_owned())
+}
+
+/// Why the vehicle is not the one that this station is prepared for.
+pub fn why_other_mission(model: &Model) -> Option<String> {
+    let ours = model.settings.mission?;
+    match &model.vehicle.mission {
+        Some((theirs, _)) if *theirs == ours => None,
+        Some((theirs, name)) => Some(format!("the vehicle flies {name} {theirs}, --mission is {ours}")),
+        None => Some(format!("the vehicle has not said whether it flies {ours} (--mission)")),
+    }
 }

@@ -7,6 +7,8 @@ use protocol::dialect::{
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
 };
 
+use protocol::mission::MissionHash;
+
 use super::boot::MessageBoot;
 use super::motion::{Attitude, Motion};
 use super::touchdown::Touchdown;
@@ -71,6 +73,13 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         }
         MavMessage::TD_PREDICTED_PATH(data) => vehicle.path = Some(Sample::new(path(data), now)),
         MavMessage::TD_LANDING_VERDICT(data) => vehicle.verdict = Some(Sample::new(verdict(data), now)),
+        MavMessage::TD_CREW(data) => vehicle.crew = Some(Sample::new(data.clone(), now)),
+        MavMessage::TD_OPERATOR(data) => {
+            vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
+        }
+        MavMessage::TD_MISSION(data) => {
+            vehicle.mission = Some((MissionHash(data.hash), name(&data.name[..])));
+        }
         MavMessage::TD_TOUCHDOWN_LIMITS(data) => vehicle.limits = Some(data.clone()),
         MavMessage::EXTENDED_SYS_STATE(data) => {
             let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;
@@ -159,6 +168,12 @@ fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
             violated: data.limits_violated,
         },
     }
+}
+
+/// The text of a field of characters, without what a terminal would act on.
+fn name(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    protocol::text::printable(&bytes[..end])
 }
 
 #[cfg(test)]

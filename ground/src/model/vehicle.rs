@@ -1,11 +1,13 @@
 //! The vehicle as its telemetry shows it. Every value carries the time at which it was received.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use protocol::dialect::{
-    TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock,
-    TdPhase,
+    TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TdInterlock, TdPhase, TdRole,
 };
+use protocol::mission::MissionHash;
 
 use super::boot::Boot;
 use super::flown_path::FlownPath;
@@ -108,6 +110,12 @@ pub struct Vehicle {
     pub verdict: Option<Sample<Verdict>>,
     /// `TD_TOUCHDOWN_LIMITS`: what counts as a landing for this vehicle.
     pub limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
+    /// `TD_CREW`: who commands, what is asked and what is waited for; `None` without operators.
+    pub crew: Option<Sample<TD_CREW_DATA>>,
+    /// `TD_OPERATOR`: role and name, by the number of the key.
+    pub operators: BTreeMap<u8, (TdRole, String)>,
+    /// `TD_MISSION`: the hash and the name of what it flies.
+    pub mission: Option<(MissionHash, String)>,
     /// `EXTENDED_SYS_STATE`: on the ground or not.
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: whether the vehicle's arming checks pass.

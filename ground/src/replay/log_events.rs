@@ -196,6 +196,13 @@ fn event(frame: Frame, sides: &mut Sides) -> Option<RecordedEvent> {
     let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return sent };
     let kind = match command.command {
         _ if command.confirmation > 0 => return sent,
+        // With the number of an ask it confirms that ask.
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 && command.param3 >= 1.0 => {
+            CommandKind::ConfirmArm
+        }
+        MavCmd::MAV_CMD_MISSION_START if command.param3 >= 1.0 => CommandKind::ConfirmStart,
+        MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => CommandKind::Hold,
+        MavCmd::MAV_CMD_TD_TAKE_COMMAND => CommandKind::TakeCommand,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 => CommandKind::Arm,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => CommandKind::Disarm,
         MavCmd::MAV_CMD_MISSION_START => CommandKind::Start,

@@ -54,7 +54,10 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
 
 fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let (command, param1) = kind.mav_command();
-    let params = [param1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    // A confirmation names the ask that it confirms; without a number it would be another ask.
+    let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
+    let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
+    let params = [param1, 0.0, number, 0.0, 0.0, 0.0, 0.0];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 
@@ -72,6 +75,7 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
+    model.asked_to_confirm = answer.detail > 0;
     let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
         track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledgement::GivenUp);
@@ -92,6 +96,7 @@ fn track_of(model: &mut Model, command: u16) -> Option<&mut TrackedCommand> {
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     // With several links the event names the one that carried the answer.
     let over = model.link.heard_over().map_or_else(String::new, |link| format!(", over {link}"));
+    let asked_to_confirm = model.asked_to_confirm;
     let track = match event {
         CommandEvent::Sent { command, .. }
         | CommandEvent::InProgress { command, .. }
@@ -124,11 +129,15 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
         CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => {
-            track.acknowledged = Acknowledgement::Answered(result);
+            let asked = asked_to_confirm && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+            track.acknowledged =
+                if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
-            if track.accepted() {
+            if asked {
+                ("asked", EventLevel::Info, format!("{name} asked{late}: another role must confirm{over}"))
+            } else if track.accepted() {
                 ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}{over}"))
             } else {
                 ("refused", EventLevel::Error, format!("{name} REFUSED{late}: {words}{over}"))
@@ -146,7 +155,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
     model.record_operator(now, operator_kind, &told);
     model.say(now, Speaker::Ground, level, text);
-    if let Some(result) = answered {
+    if let Some(result) = answered.filter(|_| !asked_to_confirm) {
         on_final_answer(model, kind, result, now);
     }
 }
@@ -210,7 +219,9 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 pub(super) fn observe(model: &mut Model, now: Duration) {
     let mut seen = Vec::new();
     for track in &mut model.commands.tracks {
-        if track.observed_at.is_none() && track.kind.is_observed(&model.vehicle, track.commanded_at) {
+        let answered = track.kind.shows_nothing() && track.accepted();
+        let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
+        if track.observed_at.is_none() && shown {
             track.observed_at = Some(now);
             seen.push((
                 EventLevel::Info,

@@ -64,9 +64,14 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
 fn perform(model: &mut Model, does: Does, now: Duration) {
     match does {
         // Enter has chosen it, and a held Enter would confirm it.
-        Does::Act(act @ Act::Disarm) => {
+        Does::Act(act @ (Act::Disarm | Act::HoldCountdown)) => {
             let key = model.settings.keys.name(act);
-            model.info(now, format!("press {key}, then Enter: only these keys disarm"));
+            let does = if act == Act::Disarm { "disarm" } else { "hold" };
+            model.info(now, format!("press {key}, then Enter: only these keys {does}"));
+        }
+        Does::Act(act @ Act::Tap) => {
+            let key = model.settings.keys.name(act);
+            model.info(now, format!("press {key}: only this key taps"));
         }
         Does::Act(act) => keys::perform(model, act, now),
         Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),

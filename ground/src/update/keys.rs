@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA};
+use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 
 use super::{Action, Request, commands, entry};
 use crate::key::Key;
@@ -16,7 +16,7 @@ use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
-use crate::model::permits::{why_not_arm, why_not_start};
+use crate::model::permits::{why_not_arm, why_not_confirm, why_not_start, why_not_take};
 use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, quantity};
@@ -134,6 +134,13 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
         Dialog::Closed => {}
         Dialog::Arm { .. } => ask(model, CommandKind::Arm, now),
         Dialog::Start { .. } => ask(model, CommandKind::Start, now),
+        Dialog::Confirm { ask: waits, .. } => match why_not_confirm(model, waits, now) {
+            None if waits.act == TdAct::TD_ACT_START => ask(model, CommandKind::ConfirmStart, now),
+            None => ask(model, CommandKind::ConfirmArm, now),
+            Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
+        },
+        Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
+        Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Dialog::Quit { .. } => {
@@ -208,6 +215,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
     let shown = model.page();
     match act {
+        Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
+        Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
         Act::Arm => match why_not_arm(model, now) {
             None => model.dialog = Dialog::arm(now),
             Some(why) => model.warn(now, format!("cannot arm: {why}")),
@@ -217,6 +226,13 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             Some(why) => model.warn(now, format!("cannot start: {why}")),
         },
         Act::Disarm => model.dialog = Dialog::disarm(now),
+        Act::HoldCountdown if act.works(model, now) => model.dialog = Dialog::hold(now),
+        Act::HoldCountdown => model.info(now, "no countdown runs"),
+        Act::Tap => ask(model, CommandKind::Tap, now),
+        Act::TakeCommand => match why_not_take(model, now) {
+            None => model.dialog = Dialog::take_command(now),
+            Some(why) => model.warn(now, format!("cannot take command: {why}")),
+        },
         Act::Acknowledge => see_alarm(model, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),
         Act::Show(page) => {
@@ -241,6 +257,17 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
     }
+}
+
+/// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
+/// moment both ask: the vehicle takes the first ask, and the other one is told of it.
+fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
+    let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
+    match why_not_confirm(model, &ask, now) {
+        None => model.dialog = Dialog::confirm(ask, now),
+        Some(why) => model.warn(now, format!("cannot confirm: {why}")),
+    }
+    true
 }
 
 /// Moves the look at the past of this flight; at its end the screen is live again.
@@ -296,9 +323,21 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
     let why_not = match kind {
         CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
         CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
-        CommandKind::Disarm | CommandKind::Abort => None,
+        CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
+            let none = || "nobody of another role asks for it".to_owned();
+            let start = kind == CommandKind::ConfirmStart;
+            let ask = model.ask_to_confirm(now).filter(|ask| (ask.act == TdAct::TD_ACT_START) == start);
+            ask.map_or_else(|| Some(none()), |ask| why_not_confirm(model, &ask, now))
+        }
+        CommandKind::TakeCommand => why_not_take(model, now),
+        CommandKind::Tap => {
+            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.own_number());
+            (!ours).then(|| "no tap of this operator is waited for".to_owned())
+        }
+        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort => None,
     };
     match why_not {
+        None if kind == CommandKind::Tap => tap(model, by, now),
         None => commands::submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
@@ -306,6 +345,18 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
             model.warn(now, text);
         }
     }
+}
+
+/// A tap is sent once and not followed: the next one comes within 2 s, and the vehicle shows the time that is left.
+fn tap(model: &mut Model, by: &Seat, now: Duration) {
+    let (command, _) = CommandKind::Tap.mav_command();
+    model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        command,
+        target_system: model.settings.vehicle.system_id,
+        target_component: model.settings.vehicle.component_id,
+        ..COMMAND_LONG_DATA::default()
+    })));
+    model.record_operator(now, "commanded", &format!("TAP{}", by.in_brackets()));
 }
 
 /// Why not to send a command that another screen has just sent.

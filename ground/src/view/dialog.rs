@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::{TdAct, TdRole};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
@@ -9,7 +10,9 @@ use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
-use crate::model::dialog::{ARM_WORD, Dialog, QUIT_WORD, START_WORD};
+use crate::model::act::Act;
+use crate::model::dialog::{ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD};
+use crate::model::two_person::role_name;
 use crate::model::words;
 use crate::model::{Model, Role};
 
@@ -22,20 +25,47 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
     let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
     let strong = |text: String| Line::styled(text, theme.style(TextRole::Caution));
     let dialog = match &model.dialog {
-        Dialog::Closed => return None,
+        Dialog::Closed => return notice(model, theme, now),
         Dialog::Arm { typed, .. } => {
             let mut lines = vec![
                 strong(format!("Type {ARM_WORD} and Enter within {left:.0} s:  [{typed:<3}]")),
                 plain(ANY_OTHER_KEY.to_owned()),
             ];
             lines.extend(checks(model, theme));
+            if let Some(words) = next_person(model) {
+                lines.insert(1, plain(words));
+            }
             ("ARM, step 2 of 2", lines)
         }
-        Dialog::Start { typed, .. } => (
-            "START the countdown",
+        Dialog::Start { typed, .. } => {
+            let typing = format!("Type {START_WORD} and Enter within {left:.0} s:  [{typed:<5}]");
+            let mut lines = vec![strong(typing), plain(ANY_OTHER_KEY.to_owned())];
+            if let Some(words) = next_person(model) {
+                lines.insert(1, plain(words));
+            }
+            ("START the countdown", lines)
+        }
+        Dialog::Confirm { ask, typed, .. } => (
+            "CONFIRM what another operator asks",
             vec![
-                strong(format!("Type {START_WORD} and Enter within {left:.0} s:  [{typed:<5}]")),
+                plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name())),
+                strong(format!("Type {CONFIRM_WORD} and Enter within {left:.0} s:  [{typed:<7}]")),
                 plain(ANY_OTHER_KEY.to_owned()),
+            ],
+        ),
+        Dialog::TakeCommand { typed, .. } => (
+            "TAKE COMMAND of an armed vehicle",
+            vec![
+                plain(format!("{} is in command, if the vehicle hears them.", commander(model))),
+                strong(format!("Type {TAKE_WORD} and Enter within {left:.0} s:  [{typed:<4}]")),
+                plain(ANY_OTHER_KEY.to_owned()),
+            ],
+        ),
+        Dialog::Hold { .. } => (
+            "HOLD the countdown",
+            vec![
+                strong(format!("Enter within {left:.0} s holds.")),
+                plain("Then only a new start counts down again. Any other key cancels.".to_owned()),
             ],
         ),
         Dialog::Disarm { .. } => (
@@ -64,6 +94,62 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
     Some(dialog)
 }
 
+/// What somebody else has to do after this dialog.
+fn next_person(model: &Model) -> Option<String> {
+    let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2))?;
+    let words = format!("This only asks: {} must confirm within 10 s.", other_roles(own));
+    Some(words)
+}
+
+/// The other roles that may command.
+fn other_roles(own: TdRole) -> String {
+    let all = [TdRole::TD_ROLE_RANGE_SAFETY, TdRole::TD_ROLE_FLIGHT, TdRole::TD_ROLE_PAD];
+    all.into_iter().filter(|role| *role != own).map(role_name).collect::<Vec<_>>().join(" or ")
+}
+
+/// Who is in command.
+fn commander(model: &Model) -> String {
+    match (model.commanded_by(), model.link.uplink.armed_by_other) {
+        (Some(number), _) => model.operator(number),
+        (None, Some(other)) => format!("station {}/{}", other.system_id, other.component_id),
+        (None, None) => "another station".to_owned(),
+    }
+}
+
+/// What is asked or waited for, while no dialog is open: it is on every page.
+fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
+    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
+    let strong = |text: String| Line::styled(text, theme.style(TextRole::Caution));
+    let keys = &model.settings.keys;
+    let own = model.own_number();
+    if let Some(ask) = model.ask(now) {
+        let (left_s, act) = (ask.left.as_secs_f64(), ask.act_name());
+        let who = model.operator(ask.by);
+        if ask.by == own && own > 0 {
+            let others = model.role_of(own).map_or_else(String::new, other_roles);
+            let words = format!("{others} must confirm within {left_s:.0} s.");
+            return Some(("ASKED", vec![plain(format!("You ask to {act}.")), strong(words)]));
+        }
+        let key = keys.name(if ask.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm });
+        let words = match model.ask_to_confirm(now) {
+            Some(_) if model.settings.role.why_not_command().is_none() => strong(format!(
+                "Press {key} within {left_s:.0} s, then type {CONFIRM_WORD} and Enter to confirm."
+            )),
+            _ => plain(format!("Another role must confirm within {left_s:.0} s; not this screen.")),
+        };
+        return Some(("ANOTHER OPERATOR ASKS", vec![strong(format!("{who} asks to {act}.")), words]));
+    }
+    let (by, left) = model.tapping(now)?;
+    let left_s = left.as_secs_f64();
+    if by == own && model.settings.role.why_not_command().is_none() {
+        let key = keys.name(Act::Tap);
+        let words = format!("Tap {key}: {left_s:.1} s left, or the countdown is held.");
+        return Some(("TAP at least every 2 s", vec![strong(words)]));
+    }
+    let words = format!("{} taps: {left_s:.1} s left, or the countdown is held.", model.operator(by));
+    Some(("TAPS", vec![plain(words)]))
+}
+
 fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let Some(status) = model.vehicle.status.as_ref() else {
         return vec![Line::styled(
@@ -88,9 +174,11 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let Some((title, lines)) = lines(model, theme, now) else { return };
     let width = BOX_COLUMNS.min(area.width);
     let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(2).min(area.height);
-    let at =
-        Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
-            .intersection(frame.area());
+    // A notice leaves the middle of the page free.
+    let free = area.height - height;
+    let down = if model.dialog == Dialog::Closed { free } else { free / 2 };
+    let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + down, width, height };
+    let at = at.intersection(frame.area());
     let block = Block::bordered().title(Line::styled(format!(" {title} "), theme.style(TextRole::Title)));
     let inside = block.inner(at);
     frame.render_widget(Clear, at);

@@ -11,6 +11,7 @@ use super::theme::TextRole;
 use crate::model::Model;
 use crate::model::dead_reckoning::{is_unheard, predict_position};
 use crate::model::motor::{KeepAway, hold_words};
+use crate::model::permits::why_other_mission;
 use crate::model::vehicle::{Sample, is_on_pad};
 
 /// The most letters of a word on the pad, as in `STAY OFF`.
@@ -43,7 +44,8 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     if vehicle.armed().is_some_and(|armed| armed.value) {
         return word("ARMED", TextRole::Alarm);
     }
-    if !status.value.checks_failed.is_empty() || !model.link.uplink.is_proven(now) {
+    let other_mission = why_other_mission(model).is_some();
+    if other_mission || !status.value.checks_failed.is_empty() || !model.link.uplink.is_proven(now) {
         return word("NO-GO", TextRole::Caution);
     }
     word("GO", TextRole::Good)

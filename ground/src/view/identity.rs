@@ -17,18 +17,20 @@ const CREW_COLUMNS: u16 = 14;
 /// Draws the line; each part has a fixed place.
 pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
     let vehicle = vehicle(model);
+    let crew = crew(model, theme);
+    let crew_columns = CREW_COLUMNS.max(crew.width() as u16);
     let [mode_area, vehicle_area, station_area, crew_area] = area.layout(&Layout::horizontal([
         Constraint::Length(MODE_COLUMNS),
         Constraint::Length(vehicle.len() as u16 + 1),
         Constraint::Fill(1),
-        Constraint::Length(CREW_COLUMNS),
+        Constraint::Length(crew_columns),
     ]));
     draw_line(frame, mode_area, mode(model, theme).into());
     draw_line(frame, vehicle_area, Line::styled(vehicle, theme.style(TextRole::Plain)));
     let Address { system_id, component_id } = model.settings.us;
     let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
     draw_line(frame, station_area, Line::styled(station, theme.style(TextRole::Label)));
-    draw_line(frame, crew_area, crew(model, theme).into());
+    draw_line(frame, crew_area, crew.into());
 }
 
 /// The same for narrow screens.
@@ -71,6 +73,14 @@ fn others_can_command(model: &Model) -> bool {
 
 /// Who commands: another station that armed the vehicle, otherwise who can command here.
 fn crew(model: &Model, theme: Theme) -> Span<'static> {
+    if let Some(people) = model.people() {
+        let who = match model.own_number() {
+            0 => "OBSERVER".to_owned(),
+            number => model.operator(number),
+        };
+        let mode = if people == 2 { "TWO-PERSON" } else { "one-person" };
+        return Span::styled(format!(" {who} {mode}"), theme.style(TextRole::Title));
+    }
     if let Some(other) = model.link.uplink.armed_by_other {
         let text = format!("armed {}/{}", other.system_id, other.component_id);
         return Span::styled(format!(" {text}"), theme.style(TextRole::Caution));

@@ -10,6 +10,7 @@ use super::theme::{TextRole, Theme};
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
 use crate::model::link_state::LinkState;
 use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::permits::why_other_mission;
 use crate::model::{Model, Role, abort_too_late, words};
 
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long. Its alarm
@@ -142,6 +143,7 @@ fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
 pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting | Acknowledgement::InProgress => ("-", TextRole::Caution),
+        Acknowledgement::Asked => ("asked", TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER", TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("ok", TextRole::Good),
         Acknowledgement::Answered(_) => ("REFUSED", TextRole::Alarm),
@@ -166,6 +168,7 @@ pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Lin
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
+        Acknowledgement::Asked => ("asked, awaits another role".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),
@@ -245,6 +248,9 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     }
     if !model.link.uplink.is_proven(now) {
         return Some(("NO-GO: uplink not proven, every other check passes".to_owned(), TextRole::Caution));
+    }
+    if let Some(why) = why_other_mission(model) {
+        return Some((format!("NO-GO: {why}"), TextRole::Caution));
     }
     Some(("GO: every arming check passes".to_owned(), TextRole::Good))
 }

@@ -23,5 +23,6 @@ mod replay;
 mod rig;
 mod screens;
 mod terminal;
+mod two_person;
 mod uplink;
 mod voice;

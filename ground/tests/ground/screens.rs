@@ -199,10 +199,14 @@ fn regress_help() {
 /// The text is the same with and without colour, and without colour no cell has one.
 #[test]
 fn colour_only_repeats_the_text() {
-    let mut lost = powered();
-    lost.speaks = false;
-    lost.run(6.0);
-    for mut rig in [on_the_pad(), counting(), descending(), powered(), lost] {
+    let lost = || {
+        let mut lost = powered();
+        lost.speaks = false;
+        lost.run(6.0);
+        lost
+    };
+    for rig in [on_the_pad, counting, descending, powered, lost] {
+        let mut rig = rig();
         for digit in '0'..='9' {
             rig.key(Key::Char(digit));
             let mono = rig.draw(80, 24, MONO);

@@ -10,6 +10,7 @@
 //! * [`statistics`], [`summary`], [`picture`]: percentiles, texts and pictures from the rows.
 //! * [`results`]: writes tables, summary and pictures into the directory.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
+//! * [`work`]: the same work on many things, on several threads.
 //! * [`timing`]: the ignition height of the simpler guidance laws, found by simulated flights.
 //!
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
@@ -28,3 +29,4 @@ pub mod summary;
 pub mod table;
 pub mod tally;
 pub mod timing;
+pub mod work;

@@ -7,7 +7,7 @@ use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::SetUpError;
 
-use crate::work::in_parallel;
+use campaign::work::in_parallel;
 
 /// What the flights differ in, beside their mission.
 #[derive(Debug, Clone)]

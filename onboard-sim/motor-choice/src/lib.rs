@@ -24,4 +24,3 @@ pub mod source;
 pub mod table;
 pub mod thrustcurve_db;
 pub mod window;
-mod work;

@@ -7,7 +7,7 @@ use crate::flown::{Flown, FlyError, Weather, fly};
 use crate::frame::Frame;
 use crate::mission_text::{Changes, MissionTextError, changed, name_of};
 use crate::source::{Candidate, Found, Unusable};
-use crate::work::in_parallel;
+use campaign::work::in_parallel;
 
 /// What to look for.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flight::computer::crew::Request;
+use flight::computer::crew::{People, Request};
 use flight::computer::{Commander, Computer, Input, LogState, Output};
 use flight::rules::arming::Uplink;
 
@@ -16,6 +16,8 @@ pub struct Outside<'a> {
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
+    /// How many people an arming and a start take; `None` without operators.
+    pub people: Option<People>,
     /// The requests since the last frame.
     pub requests: &'a [Request],
 }
@@ -27,6 +29,7 @@ impl Outside<'_> {
         log: LogState { running: true, space_bytes: u64::MAX },
         uplink: Uplink::NotNeeded,
         commander: None,
+        people: None,
         requests: &[],
     };
 }

@@ -13,6 +13,7 @@ use onboard_sim::fly::{
     log_header,
 };
 use onboard_sim::vehicle::{RocketFlight, VehicleEvent};
+use protocol::crew_file::CrewFile;
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
@@ -42,6 +43,10 @@ pub(crate) struct FlyArguments {
     /// Sign every frame with this key, and ignore frames that are not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
+    /// People who may command, each with a key of their own (TOML; see the README): arming and start by one or by two of
+    /// them. Needs --key, which all share.
+    #[arg(long, value_name = "FILE", requires = "key")]
+    crew: Option<PathBuf>,
     /// Budget of a network link, bytes per second, 2000 to 1000000; a serial link stays at 2000. More is sent only if a
     /// station asks for it.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
@@ -156,6 +161,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,
+        crew: arguments.crew.as_deref().map(CrewFile::open).transpose()?,
         recorder: recorder.clone(),
         seed: arguments.seed,
         speed: arguments.speed,

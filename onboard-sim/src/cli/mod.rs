@@ -5,6 +5,8 @@ pub(crate) mod card;
 mod choices;
 mod cost;
 pub(crate) mod fly;
+pub(crate) mod landability;
 pub(crate) mod motors;
 pub(crate) mod output;
+pub(crate) mod paper;
 mod single;

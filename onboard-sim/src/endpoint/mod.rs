@@ -14,14 +14,17 @@ use std::collections::BTreeSet;
 
 use flight::computer::crew::Asked;
 use flight::computer::news::Severity;
+use flight::rules::operator::Operator;
 use flight::rules::phase::{Interlocks, Mode, Phase};
+use flight::rules::two_person::TwoPerson;
 use mavlink::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
 use protocol::dialect::PING_DATA;
 use protocol::dialect::{
     AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
-    TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
+    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
@@ -58,6 +61,8 @@ pub struct VehicleEndpoint {
     warned_of_twin: bool,
     /// The known stations, and how well each is heard.
     stations: Stations,
+    /// Who may command, by the numbers of their keys; empty without operators.
+    operators: Vec<Operator>,
     /// Whether the vehicle starts by itself, so that no station has to be heard.
     starts_by_itself: bool,
     /// Commands that the vehicle decides in its next frame.
@@ -67,6 +72,7 @@ pub struct VehicleEndpoint {
     refusals: Refusals,
     warnings: Warnings,
     told: Option<Told>,
+    told_crew: Option<(TwoPerson, Option<Operator>, Option<Address>)>,
     aborted_at_s: Option<f64>,
 }
 
@@ -122,6 +128,13 @@ impl VehicleEndpoint {
         Self::over(Streams::signed(standard), SIGNATURE_LEN)
     }
 
+    /// The same for a vehicle with operators. A frame's signature must have been checked with the key that its link id
+    /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
+    pub fn sending_to_crew(standard: &'static [Standard], operators: &[Operator]) -> Self {
+        let endpoint = Self::over(Streams::with_crew(standard), SIGNATURE_LEN);
+        Self { operators: operators.to_vec(), stations: Stations::of_a_crew(), ..endpoint }
+    }
+
     fn over(streams: Streams, signature_len: usize) -> Self {
         Self {
             us: VEHICLE,
@@ -133,11 +146,13 @@ impl VehicleEndpoint {
             warned_of_twin: false,
             known: BTreeSet::new(),
             stations: Stations::default(),
+            operators: Vec::new(),
             starts_by_itself: false,
             waiting: Vec::new(),
             refusals: Refusals::default(),
             warnings: Warnings::default(),
             told: None,
+            told_crew: None,
             aborted_at_s: None,
         }
     }
@@ -189,10 +204,12 @@ impl VehicleEndpoint {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
             streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
+            streams.hurry(TD_MISSION_DATA::ID);
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
-                self.on_command(link, &request, vehicle);
+                let by = self.operator_of(frame);
+                self.on_command(link, (&request, by), vehicle);
             }
             return;
         }
@@ -248,6 +265,7 @@ impl VehicleEndpoint {
     pub fn poll(&mut self, vehicle: &Vehicle) -> Vec<Outgoing> {
         self.now_s = vehicle.time_s();
         self.watch(vehicle.mode());
+        self.watch_the_crew(vehicle);
         for words in self.warnings.counted(self.now_s) {
             self.say_aloud(Severity::Warning, &words);
         }
@@ -276,7 +294,7 @@ impl VehicleEndpoint {
             }
         }
         if !told.interlocks.armed {
-            self.stations.set_armed_by(None);
+            self.stations.set_commander(None);
         }
         if told.interlocks.abort_latched {
             let aborted_at_s = *self.aborted_at_s.get_or_insert(self.now_s);
@@ -285,6 +303,18 @@ impl VehicleEndpoint {
                     lane.streams.at_least_every(HEARTBEAT_DATA::ID, ABORTED_BEAT_S);
                 }
             }
+        }
+    }
+
+    /// Reports an ask, a confirmation, a tap and a take-over at once.
+    fn watch_the_crew(&mut self, vehicle: &Vehicle) {
+        if self.operators.is_empty() {
+            return;
+        }
+        let memory = vehicle.computer().crew();
+        let told = (memory.two_person, memory.held_by, self.stations.armed_by());
+        if self.told_crew.replace(told) != Some(told) {
+            self.hurry(TD_CREW_DATA::ID);
         }
     }
 
@@ -299,17 +329,27 @@ impl VehicleEndpoint {
         &mut self.lanes[place]
     }
 
-    fn on_command(&mut self, link: usize, request: &CommandRequest, vehicle: &Vehicle) {
+    /// The operator whose key has signed a frame.
+    fn operator_of(&self, frame: &Frame) -> Option<Operator> {
+        self.operators.iter().find(|operator| operator.number == frame.key_number()).copied()
+    }
+
+    fn on_command(
+        &mut self,
+        link: usize,
+        (request, by): (&CommandRequest, Option<Operator>),
+        vehicle: &Vehicle,
+    ) {
         let (result, reason) = match commands::parse(request) {
             Err(unfit) => (unfit.result, unfit.reason),
-            Ok(Command::Vehicle(asked)) => return self.put(link, request, asked, vehicle),
+            Ok(Command::Vehicle(asked)) => return self.put(link, (request, by), asked, vehicle),
             Ok(Command::ForcedDisarm) => {
                 let asked = if means_abort(vehicle) { Asked::Abort } else { Asked::Disarm };
-                return self.put(link, request, asked, vehicle);
+                return self.put(link, (request, by), asked, vehicle);
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 let now_s = self.now_s;
-                if let Some(reason) = self.rates_forbidden(request.source, vehicle) {
+                if let Some(reason) = self.rates_forbidden(request.source, by, vehicle) {
                     (MavResult::MAV_RESULT_DENIED, Some(format!("message {message_id}: {reason}")))
                 } else {
                     self.with_rates_of(link, |streams| streams.set_interval(message_id, interval_us, now_s))
@@ -317,23 +357,27 @@ impl VehicleEndpoint {
             }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(link, message_id, of, vehicle),
         };
-        self.acknowledge(link, request, result);
+        self.acknowledge(link, request, (result, 0));
         if let Some(reason) = reason {
             self.say(Severity::Warning, &reason);
         }
     }
 
     /// Answers a command. Repeated refusals to one station are not answered every time.
-    fn acknowledge(&mut self, link: usize, request: &CommandRequest, result: MavResult) {
+    fn acknowledge(&mut self, link: usize, request: &CommandRequest, (result, detail): (MavResult, i32)) {
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
         if !refused || self.refusals.may_answer(request.source, self.now_s) {
-            self.lane(link).answer(Answer::Command(CommandAnswer::to(request, result)));
+            let answer = CommandAnswer { detail, ..CommandAnswer::to(request, result) };
+            self.lane(link).answer(Answer::Command(answer));
         }
     }
 
     /// Why this station may not set rates now, if so. While the vehicle is armed, only the station that armed it may
     /// set them; if the vehicle armed itself, every station may.
-    fn rates_forbidden(&self, station: Address, vehicle: &Vehicle) -> Option<String> {
+    fn rates_forbidden(&self, station: Address, by: Option<Operator>, vehicle: &Vehicle) -> Option<String> {
+        if !self.operators.is_empty() && by.is_none() {
+            return Some("only an operator with a key of their own sets rates".to_owned());
+        }
         let Address { system_id, component_id } =
             self.stations.armed_by().filter(|by| vehicle.mode().interlocks.armed && *by != station)?;
         Some(format!("while armed, only {system_id}/{component_id}, which armed, sets rates"))

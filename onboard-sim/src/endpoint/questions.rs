@@ -27,7 +27,7 @@ impl VehicleEndpoint {
         if !self.us.accepts(request.target) {
             return true;
         }
-        let asker = frame.source();
+        let (asker, by) = (frame.source(), self.operator_of(frame));
         match request.question {
             ParamQuestion::List => self.lane(link).list_parameters(),
             ParamQuestion::Read(key) => {
@@ -39,7 +39,7 @@ impl VehicleEndpoint {
                 lane.request(vec![answer]);
             }
             ParamQuestion::Set { id, value, value_type } => {
-                let forbidden = self.rates_forbidden(asker, vehicle);
+                let forbidden = self.rates_forbidden(asker, by, vehicle);
                 let now_s = self.now_s;
                 let set = self.with_rates_of(link, |streams| {
                     parameters::set(id, value, value_type, forbidden, streams, now_s)

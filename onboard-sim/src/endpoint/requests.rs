@@ -4,8 +4,9 @@
 use std::time::Duration;
 
 use flight::computer::Commander;
-use flight::computer::crew::{Answer, Asked, Ending, Request};
+use flight::computer::crew::{Answer, Asked, Ending, People, Request};
 use flight::rules::arming::Uplink;
+use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::identity::Address;
@@ -34,7 +35,13 @@ impl VehicleEndpoint {
     }
 
     /// Gives a command to the vehicle's next frame.
-    pub(super) fn put(&mut self, link: usize, command: &CommandRequest, asked: Asked, vehicle: &Vehicle) {
+    pub(super) fn put(
+        &mut self,
+        link: usize,
+        (command, by): (&CommandRequest, Option<Operator>),
+        asked: Asked,
+        vehicle: &Vehicle,
+    ) {
         // Other commands never displace an abort.
         if self.waiting.len() >= MAX_WAITING && asked != Asked::Abort {
             return;
@@ -45,9 +52,12 @@ impl VehicleEndpoint {
             self.stations.uplink(command.source, vehicle.time_s())
         };
         let Address { system_id, component_id } = command.source;
-        let request = Request { asked, uplink, station: Some((system_id, component_id)) };
-        // A station that repeats an abort before the decision is answered once.
-        let repeats = |waiting: &Waiting| waiting.command.source == command.source;
+        let confirms = commands::confirmed_ask(command);
+        let request = Request { asked, uplink, station: Some((system_id, component_id)), by, confirms };
+        // A station that repeats an abort before the decision is answered once. Nobody else's abort makes it a
+        // repetition: an observer may name the same address.
+        let repeats =
+            |waiting: &Waiting| waiting.command.source == command.source && waiting.request.by == by;
         if asked == Asked::Abort
             && self.waiting.iter().any(|waiting| repeats(waiting) && waiting.request.asked == asked)
         {
@@ -86,17 +96,43 @@ impl VehicleEndpoint {
     fn on_answers(&mut self, answers: &[Answer], vehicle: &Vehicle) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
-            let armed = request.asked == Asked::Arm && answer.ending == Ending::Accepted;
-            // The first station that armed it is in command.
-            if armed && vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() {
-                self.stations.set_armed_by(Some(command.source));
-            }
+            self.note_commander(&command, &request, answer, vehicle);
             let result = commands::mav_result(answer.ending);
             if request.asked == Asked::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
             } else {
-                self.acknowledge(link, &command, result);
+                let asked = vehicle.computer().crew().two_person.waiting(vehicle.time_s());
+                let asked = asked.filter(|_| answer.ending == Ending::Asked);
+                self.acknowledge(link, &command, (result, asked.map_or(0, |ask| i32::from(ask.number))));
             }
+        }
+    }
+
+    /// The first station that armed it is in command: of two people the one who asked. A station that takes over is
+    /// next.
+    fn note_commander(
+        &mut self,
+        command: &CommandRequest,
+        request: &Request,
+        answer: &Answer,
+        vehicle: &Vehicle,
+    ) {
+        if answer.ending != Ending::Accepted {
+            return;
+        }
+        let here = (command.source, request.by);
+        match request.asked {
+            Asked::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
+                let asked = vehicle.computer().crew().two_person.armed_by();
+                let asked =
+                    asked.filter(|_| matches!(vehicle.people(), Some(People::Two { .. }))).map(|ask| {
+                        let (system_id, component_id) = ask.station;
+                        (Address { system_id, component_id }, Some(ask.by))
+                    });
+                self.stations.set_commander(Some(asked.unwrap_or(here)));
+            }
+            Asked::TakeCommand => self.stations.set_commander(Some(here)),
+            _ => {}
         }
     }
 
@@ -105,9 +141,10 @@ impl VehicleEndpoint {
         if self.starts_by_itself {
             return (Uplink::NotNeeded, None);
         }
-        let commander = self.stations.armed_by().map(|station| Commander {
+        let commander = self.stations.commander().map(|(station, by)| Commander {
             station: (station.system_id, station.component_id),
             age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
+            by,
         });
         (self.stations.best_uplink(time_s), commander)
     }

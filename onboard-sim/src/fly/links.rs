@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use protocol::command::CommandRequest;
+use protocol::crew_file::CrewFile;
 use protocol::frame::Frame;
 use protocol::hub::{Hub, News};
 use protocol::key_file::KeyFile;
@@ -84,9 +85,12 @@ impl Links {
     pub(super) async fn open(
         endpoints: &[LinkAddress],
         key_file: Option<&std::path::Path>,
+        crew: Option<&CrewFile>,
         recorder: Option<Recorder>,
     ) -> Result<Self, FlyError> {
         let (key_file, signing) = key_file.map(|path| KeyFile::open(path, "vehicle")).transpose()?.unzip();
+        let operators = crew.map(CrewFile::keys).transpose()?.unwrap_or_default();
+        let signing = signing.map(|signing| signing.with_operators(operators));
         let mut open = Vec::new();
         for endpoint in endpoints {
             let transport = Transport::open(endpoint.clone())

@@ -81,7 +81,7 @@ impl LoadedFlight {
     /// # Errors
     /// It cannot be simulated, or the late-output policy does not apply to it.
     pub fn vehicle(&self, seed: u64, policy: DeadlinePolicy) -> Result<Vehicle, FlyError> {
-        Ok(match self {
+        let vehicle = match self {
             Self::AtIgnition(loaded) => {
                 let drawn = draw(&loaded.profile, seed);
                 Vehicle::in_plane(PlanarFlight::new(&loaded.profile, drawn, policy)?)
@@ -90,7 +90,8 @@ impl LoadedFlight {
                 return Err(FlyError::DeadlinePolicy { name: self.name().to_owned() });
             }
             Self::InSpace(flight) => Vehicle::in_space(&seeded(flight, seed))?,
-        })
+        };
+        Ok(vehicle.of_mission(self.name(), self.toml()))
     }
 }
 

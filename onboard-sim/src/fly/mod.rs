@@ -1,6 +1,7 @@
 //! The run loop: a vehicle, its clock, its links and its log.
 
 mod boot;
+mod crew;
 mod links;
 mod load;
 mod own_start;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use flight::rules::phase::Phase;
+use protocol::crew_file::{CrewFile, CrewFileError, Mode};
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LandingVerdict;
@@ -32,7 +34,7 @@ use self::recording::{log_state, nanoseconds, note, record};
 use crate::endpoint::VehicleEndpoint;
 use crate::solve_times::SolveTimes;
 use crate::streams::Standard;
-use crate::vehicle::{Judged, VehicleEvent};
+use crate::vehicle::{Judged, Vehicle, VehicleEvent};
 use flight::computer::plane::PlaneError;
 pub use flight::vehicle::profile::StartPoint;
 pub use sim::plane::DeadlinePolicy;
@@ -71,6 +73,8 @@ pub struct FlyOptions {
     pub links: Vec<LinkAddress>,
     /// The key for signing every frame, if any.
     pub key_file: Option<PathBuf>,
+    /// The people who may command, with a key.
+    pub crew: Option<CrewFile>,
     /// Log to write into.
     pub recorder: Option<Recorder>,
     /// Its identity and budgets on the wire.
@@ -161,6 +165,15 @@ pub enum FlyError {
     /// The key cannot be used.
     #[error(transparent)]
     Key(#[from] KeyFileError),
+    /// The crew cannot be used.
+    #[error(transparent)]
+    Crew(#[from] CrewFileError),
+    /// Operators' frames are checked by their keys, and the vehicle signs with the key that all share.
+    #[error("a crew needs --key, the key that vehicle and stations share")]
+    CrewWithoutKey,
+    /// Two people cannot be replaced by a program.
+    #[error("a two-person crew arms and starts by hand: without --auto-start, and with --mavlink")]
+    CrewWithoutHands,
     /// A link cannot be opened.
     #[error("cannot open the link {link}")]
     Link {
@@ -215,9 +228,10 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
 
 /// The vehicle's endpoint, set up from the options.
 fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEndpoint {
-    let endpoint = match options.key_file {
-        Some(_) => VehicleEndpoint::sending_signed(standard),
-        None => VehicleEndpoint::sending(standard),
+    let endpoint = match (&options.crew, &options.key_file) {
+        (Some(crew), _) => VehicleEndpoint::sending_to_crew(standard, &crew::operators_of(crew)),
+        (None, Some(_)) => VehicleEndpoint::sending_signed(standard),
+        (None, None) => VehicleEndpoint::sending(standard),
     };
     let capacities_bytes_s: Vec<u32> =
         options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
@@ -226,6 +240,24 @@ fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEn
         .booted(options.on_the_wire.boot_number.get())
         .over_links(&capacities_bytes_s);
     if options.auto_start { endpoint.starting_by_itself() } else { endpoint }
+}
+
+/// The vehicle, powered up, with its crew and with its pin out.
+fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
+    let mut vehicle = options.profile.vehicle(options.seed, options.deadline_policy)?;
+    if let Some(crew) = &options.crew {
+        if options.key_file.is_none() {
+            return Err(FlyError::CrewWithoutKey);
+        }
+        if options.auto_start && crew.mode == Mode::TwoPerson {
+            return Err(FlyError::CrewWithoutHands);
+        }
+        let people = crew::people_of(crew, options.on_the_wire.boot_number.get());
+        vehicle = vehicle.with_crew(people, crew::operators_of(crew));
+    }
+    // The crew pulls the pin by hand; the simulation does it when the program starts.
+    vehicle.set_pin_out(true);
+    Ok(vehicle)
 }
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
@@ -240,11 +272,14 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let mut vehicle = options.profile.vehicle(options.seed, options.deadline_policy)?;
-    // The crew pulls the pin by hand; the simulation does it when the program starts.
-    vehicle.set_pin_out(true);
-    let mut links =
-        Links::open(&options.links, options.key_file.as_deref(), options.recorder.clone()).await?;
+    let mut vehicle = vehicle_of(&options)?;
+    let mut links = Links::open(
+        &options.links,
+        options.key_file.as_deref(),
+        options.crew.as_ref(),
+        options.recorder.clone(),
+    )
+    .await?;
     let mut endpoint = endpoint_of(&options, vehicle.standard());
     let crewed = !options.links.is_empty() && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());

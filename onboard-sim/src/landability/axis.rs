@@ -3,29 +3,31 @@
 use std::fmt;
 use std::str::FromStr;
 
-use flight::vehicle::profile::Profile;
-
 /// A quantity that a map varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Nominal thrust over weight.
     ThrustToWeight,
-    /// Height at ignition, m.
+    /// Height at ignition in the plane, at the start of a mission, m.
     Height,
     /// Speed of descent at ignition, m/s.
     Speed,
-    /// Tilt from upright at ignition, degrees.
+    /// Tilt from upright at ignition in the plane, at the start of a mission (below a drone: of its swing), degrees.
     Tilt,
     /// Pitch rate at ignition, degrees per second.
     Rate,
     /// Lateral speed at ignition, m/s.
     LateralSpeed,
-    /// Thrust over nominal, known to the controller.
+    /// Thrust over nominal; known to the controller in the plane, learnt in flight by that of a mission.
     ThrustScale,
+    /// Height of the feet at which the thrust of a mission begins, m.
+    IgnitionHeight,
+    /// Mean wind 10 m above the ground, m/s.
+    Wind,
 }
 
 impl Quantity {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 9] = [
         Self::ThrustToWeight,
         Self::Height,
         Self::Speed,
@@ -33,6 +35,8 @@ impl Quantity {
         Self::Rate,
         Self::LateralSpeed,
         Self::ThrustScale,
+        Self::IgnitionHeight,
+        Self::Wind,
     ];
 
     /// The name on a command line.
@@ -45,6 +49,8 @@ impl Quantity {
             Self::Rate => "rate",
             Self::LateralSpeed => "lateral-speed",
             Self::ThrustScale => "thrust-scale",
+            Self::IgnitionHeight => "ignition-height",
+            Self::Wind => "wind",
         }
     }
 
@@ -58,6 +64,8 @@ impl Quantity {
             Self::Rate => "rate_deg_s",
             Self::LateralSpeed => "lateral_speed_m_s",
             Self::ThrustScale => "thrust_scale",
+            Self::IgnitionHeight => "ignition_height_m",
+            Self::Wind => "wind_m_s",
         }
     }
 
@@ -71,21 +79,8 @@ impl Quantity {
             Self::Rate => "rate, deg/s",
             Self::LateralSpeed => "lateral speed, m/s",
             Self::ThrustScale => "thrust / nominal",
-        }
-    }
-
-    /// Puts a value into the problem.
-    pub(super) fn apply(self, value: f64, profile: &mut Profile, thrust_scale: &mut f64) {
-        match self {
-            Self::ThrustToWeight => {
-                profile.motor.thrust_n = value * profile.vehicle.mass_kg * profile.environment.gravity_m_s2;
-            }
-            Self::Height => profile.start.altitude_m = value,
-            Self::Speed => profile.start.u_m_s = -value,
-            Self::Tilt => profile.start.pitch_deg = 90.0 + value,
-            Self::Rate => profile.start.pitch_rate_deg_s = value,
-            Self::LateralSpeed => profile.start.w_m_s = value,
-            Self::ThrustScale => *thrust_scale = value,
+            Self::IgnitionHeight => "ignition height, m",
+            Self::Wind => "wind at 10 m, m/s",
         }
     }
 }
@@ -149,8 +144,13 @@ impl FromStr for Axis {
             .ok()
             .filter(|count| (2..=Self::MAX_COUNT).contains(count))
             .ok_or_else(|| refuse("the count is not a number from 2 to 500"))?;
-        let positive =
-            matches!(quantity, Quantity::ThrustToWeight | Quantity::Height | Quantity::ThrustScale);
+        let positive = matches!(
+            quantity,
+            Quantity::ThrustToWeight | Quantity::Height | Quantity::ThrustScale | Quantity::IgnitionHeight
+        );
+        if quantity == Quantity::Wind && from.min(to) < 0.0 {
+            return Err(refuse("the range must not be below 0"));
+        }
         if positive && from.min(to) <= 0.0 {
             return Err(refuse("the range must be above 0"));
         }

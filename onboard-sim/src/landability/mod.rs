@@ -1,44 +1,58 @@
-//! Maps where a landing exists, over two quantities of the start or the motor.
+//! Maps where a vehicle lands, over two quantities of the start, the motor or the day.
 //!
-//! Every cell is one cold solve of the profile's landing problem, from both bent initial guesses. A cell lands if the
-//! plan converges and ends inside the touchdown limits (Table 2 of the landing paper). Cells are independent, so the
-//! map does not depend on how many of them are computed at the same time.
+//! There are three questions, cheapest first: whether a plan exists from an ignition in the plane ([`map`], profiles),
+//! whether a clairvoyant could land a mission, and whether the mission's own guidance does ([`map_mission`]). Cells are independent, so a map does not depend on how many of them are computed at the
+//! same time.
 
 mod axis;
 mod picture;
+mod plane;
+mod space;
 
 use std::io::{self, Write};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use flight::guidance::landing::landing_problem;
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
-use flight::vehicle::profile::Profile;
-use nmpc::SolveStatus;
+use campaign::work::in_parallel;
+use sim::sortie::SetUpError;
 
 pub use axis::{Axis, AxisError, Quantity};
-pub use picture::write_svg;
+pub use picture::svg;
+pub use plane::map;
+pub use space::{Question as SpaceQuestion, map as map_mission};
 
 /// The result of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
     /// Whether a landing exists, and if not, why.
     pub finding: Finding,
-    /// Speed at the end of the plan, m/s; the lower bound if nothing was planned.
+    /// Speed at the end of the plan, m/s, or the lower bound if nothing was planned; in space vertical speed at contact, not
+    /// a number where nothing was flown.
     pub touchdown_speed_m_s: f64,
 }
 
 /// Whether a landing exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finding {
-    /// A converged plan ends inside every limit.
+    /// A converged plan, or a flight, ends inside every limit.
     Lands,
-    /// The best plan found ends outside a limit.
+    /// The best plan found, or the flight, ends outside a limit.
     Misses,
-    /// A bound proves that no plan lands.
+    /// A bound proves that nothing lands.
     NotLandable,
 }
 
 impl Finding {
+    /// All of them, in their order.
+    const ALL: [Self; 3] = [Self::Lands, Self::Misses, Self::NotLandable];
+
+    /// Red, green and blue; also different in grey: light, middle, dark.
+    fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Lands => [0x7f, 0xc9, 0x7f],
+            Self::Misses => [0xe6, 0xa2, 0x3c],
+            Self::NotLandable => [0x5b, 0x4b, 0x6b],
+        }
+    }
+
     /// One word, for tables.
     pub fn name(self) -> &'static str {
         match self {
@@ -68,59 +82,56 @@ pub struct Map {
     pub cells: Vec<Cell>,
 }
 
-/// Computes a map on `jobs` threads; `progress` is called with the cells done, from any of them.
-pub fn map(profile: &Profile, x: Axis, y: Axis, jobs: usize, progress: &(dyn Fn(usize) + Sync)) -> Map {
-    let count = x.count * y.count;
-    let next = AtomicUsize::new(0);
-    let done = AtomicUsize::new(0);
-    let work = || {
-        let mut found = Vec::new();
-        loop {
-            let place = next.fetch_add(1, Ordering::Relaxed);
-            if place >= count {
-                return found;
-            }
-            found.push((place, cell(profile, x.value(place % x.count), y.value(place / x.count), x, y)));
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-        }
-    };
-    let mut found: Vec<(usize, Cell)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (1..jobs.max(1)).map(|_| scope.spawn(work)).collect();
-        let mut found = work();
-        for worker in workers {
-            // A worker can only fail by a panic, which the scope propagates.
-            found.extend(worker.join().unwrap_or_default());
-        }
-        found
-    });
-    found.sort_by_key(|(place, _)| *place);
-    Map { x, y, cells: found.into_iter().map(|(_, cell)| cell).collect() }
+/// A map whose cells `of` computes on `jobs` threads from a value of `x` and one of `y`; `progress` is called with the
+/// cells done, from any of them.
+fn map_of<E: Send>(
+    [x, y]: [Axis; 2],
+    jobs: usize,
+    progress: &(dyn Fn(usize) + Sync),
+    of: impl Fn(f64, f64) -> Result<Cell, E> + Sync,
+) -> Result<Map, MapError>
+where
+    MapError: From<E>,
+{
+    let places: Vec<usize> = (0..x.count * y.count).collect();
+    let cell = |place: &usize| of(x.value(place % x.count), y.value(place / x.count));
+    let cells = in_parallel(&places, jobs, cell, progress)?;
+    Ok(Map { x, y, cells: cells.into_iter().collect::<Result<_, E>>()? })
 }
 
-fn cell(profile: &Profile, x_value: f64, y_value: f64, x: Axis, y: Axis) -> Cell {
-    let mut profile = profile.clone();
-    let mut thrust_scale = 1.0;
-    for (axis, value) in [(x, x_value), (y, y_value)] {
-        axis.quantity.apply(value, &mut profile, &mut thrust_scale);
+/// Why there is no map.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The quantity means nothing to this vehicle or question.
+    #[error("{whose} cannot be mapped over {}; it can over {}", .quantity.name(), names(.possible))]
+    Quantity { whose: String, quantity: Quantity, possible: &'static [Quantity] },
+    /// Both axes are the same quantity.
+    #[error("both axes vary {}; choose two quantities", .0.name())]
+    SameQuantity(Quantity),
+    /// A cell's flight cannot be set up.
+    #[error(transparent)]
+    Flight(#[from] SetUpError),
+    /// Does not happen: a plan is always found or refused.
+    #[error(transparent)]
+    Plan(#[from] std::convert::Infallible),
+    /// A thread could not be started.
+    #[error("a thread could not be started")]
+    Thread(#[from] std::io::Error),
+}
+
+fn names(quantities: &[Quantity]) -> String {
+    quantities.iter().map(|quantity| quantity.name()).collect::<Vec<_>>().join(", ")
+}
+
+/// Checks that two quantities are different and among those that are possible.
+fn check(whose: &str, axes: [Axis; 2], possible: &'static [Quantity]) -> Result<(), MapError> {
+    let [x, y] = axes.map(|axis| axis.quantity);
+    if x == y {
+        return Err(MapError::SameQuantity(x));
     }
-    let limits = TouchdownLimits::from_profile(&profile);
-    let initial = profile.start.planar_state();
-    let problem = landing_problem(&profile, initial, 0.0, profile.nmpc.horizon_steps, thrust_scale);
-    let solution = nmpc::solve(&problem, None);
-    if solution.status == SolveStatus::NotLandable {
-        return Cell {
-            finding: Finding::NotLandable,
-            touchdown_speed_m_s: solution.best_touchdown_speed_m_s,
-        };
-    }
-    let Some(end) = solution.states.last() else {
-        return Cell { finding: Finding::Misses, touchdown_speed_m_s: f64::NAN };
-    };
-    let landed = LandingVerdict::judge_plan(&limits, end).landed();
-    let lands = landed && solution.status == SolveStatus::Converged;
-    Cell {
-        finding: if lands { Finding::Lands } else { Finding::Misses },
-        touchdown_speed_m_s: end.speed_m_s(),
+    match [x, y].into_iter().find(|quantity| !possible.contains(quantity)) {
+        Some(quantity) => Err(MapError::Quantity { whose: whose.to_owned(), quantity, possible }),
+        None => Ok(()),
     }
 }
 
@@ -135,7 +146,7 @@ impl Map {
     /// # Errors
     /// The output cannot be written.
     pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
-        writeln!(out, "# lands   o best plan misses a limit   . proved not landable")?;
+        writeln!(out, "# lands   o misses a limit   . proved not landable")?;
         writeln!(out, "{:>10}", self.y.quantity.label())?;
         for (row, cells) in self.cells.chunks(self.x.count).enumerate().rev() {
             let signs: String = cells.iter().map(|cell| cell.finding.sign()).collect();
@@ -187,7 +198,7 @@ mod tests {
         let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
         let x = Axis { quantity: Quantity::ThrustToWeight, from: 0.95, to: 1.2, count: 6 };
         let y = Axis { quantity: Quantity::Height, from: 11.0, to: 19.0, count: 5 };
-        map(&profile, x, y, jobs, &|_| ())
+        map(&profile, [x, y], jobs, &|_| ()).unwrap()
     }
 
     #[test]
@@ -203,7 +214,7 @@ mod tests {
         let at = |thrust_n: f64| {
             let x = Axis { quantity: Quantity::ThrustToWeight, from: thrust_n / weight_n, to: 2.0, count: 1 };
             let y = Axis { quantity: Quantity::Height, from: 15.0, to: 15.0, count: 1 };
-            map(&profile, x, y, 1, &|_| ()).cells[0]
+            map(&profile, [x, y], 1, &|_| ()).unwrap().cells[0]
         };
         assert_eq!(at(33.3).finding, Finding::Lands);
         assert_eq!(at(30.0).finding, Finding::NotLandable);
@@ -214,15 +225,14 @@ mod tests {
     #[test]
     fn table_and_csv_hold_every_cell() {
         let map = small_map(2);
-        let (mut table, mut csv, mut svg) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut table, mut csv) = (Vec::new(), Vec::new());
         map.write_table(&mut table).unwrap();
         map.write_csv(&mut csv).unwrap();
-        write_svg(&map, "paper-calibrated", &mut svg).unwrap();
-        let [table, csv, svg] = [table, csv, svg].map(|bytes| String::from_utf8(bytes).unwrap());
+        let [table, csv] = [table, csv].map(|bytes| String::from_utf8(bytes).unwrap());
         assert_eq!(csv.lines().count(), 31);
         assert!(csv.starts_with("thrust_to_weight,height_m,finding,touchdown_speed_m_s\n"));
         let signs = table.lines().filter_map(|line| line.split_once('|')).map(|(_, signs)| signs.len());
         assert_eq!(signs.sum::<usize>(), 30);
-        assert_eq!(svg.matches("<title>").count(), 30);
+        assert!(svg(&map, "paper-calibrated").unwrap().contains("paper-calibrated"));
     }
 }

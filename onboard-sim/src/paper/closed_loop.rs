@@ -5,7 +5,7 @@ use flight::rules::phase::Phase;
 use flight::rules::verdict::TouchdownLimits;
 use flight::vehicle::profile::Profile;
 
-use super::Finish;
+use super::{Finish, Sample};
 use sim::plane::plant::STEP_S;
 
 /// Flies from ignition to the end of the burn. As in the paper there is no ground in between: its final state is
@@ -19,6 +19,7 @@ pub(super) fn fly(profile: &Profile, limits: &TouchdownLimits) -> Finish {
     let mut state = profile.start.planar_state();
     let mut gimbal_rad = 0.0;
     let (mut first_cost, mut converged) = (None, true);
+    let mut path = vec![Sample { time_s: 0.0, state, gimbal_rad }];
     for tick in 0..profile.nmpc.horizon_steps as u32 {
         let time_s = f64::from(tick) * sample_s;
         let input = ControllerInput {
@@ -42,7 +43,8 @@ pub(super) fn fly(profile: &Profile, limits: &TouchdownLimits) -> Finish {
             let thrust_n = profile.motor.mean_thrust_n(plant_s, STEP_S);
             state = model.rk4_step(&state, gimbal_rad, thrust_n, STEP_S);
         }
+        path.push(Sample { time_s: time_s + sample_s, state, gimbal_rad });
         gimbal_rad = output.gimbal_command_rad;
     }
-    Finish::judged(limits, state, first_cost.unwrap_or(0.0), converged)
+    Finish::judged(limits, path, first_cost.unwrap_or(0.0), converged)
 }

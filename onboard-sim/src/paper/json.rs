@@ -3,12 +3,13 @@
 use flight::vehicle::dynamics::PlanarState;
 use serde_json::{Value, json};
 
-use super::{AsPrinted, Finish, Row};
+use super::{AsPrinted, Experiments, Finish, Objective, Row};
 
 /// Everything as one JSON value; units in the names, angles in degrees as in the paper.
-pub fn to_json(rows: &[Row], printed: &AsPrinted) -> Value {
+pub fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
     json!({
-        "rows": rows.iter().map(row).collect::<Vec<_>>(),
+        "rows": experiments.rows.iter().map(row).collect::<Vec<_>>(),
+        "objective": objective(&experiments.objective),
         "as_printed": {
             "thrust_n": printed.thrust_n,
             "landable": printed.best_touchdown_speed_m_s <= printed.limit_m_s,
@@ -24,6 +25,19 @@ pub fn to_json(rows: &[Row], printed: &AsPrinted) -> Value {
             "promise_converged": printed.promise_converged,
             "happens": printed.happens.as_ref().map(state),
         },
+    })
+}
+
+fn objective(objective: &Objective) -> Value {
+    let ours = objective
+        .definitions
+        .iter()
+        .map(|definition| json!({ "definition": definition.name.trim_start(), "values": definition.values }));
+    json!({
+        "input_weights": objective.weights,
+        "paper": objective.paper,
+        "cost_rate_at_the_papers_final_states": objective.at_paper_finals,
+        "ours": ours.collect::<Vec<_>>(),
     })
 }
 

@@ -5,22 +5,37 @@
 //! and flown closed loop (the horizon shrinks to touchdown; the first action comes one sample late, as in the paper),
 //! and each final state is judged by the paper's Table 2. A second part shows what the paper's equations predict
 //! exactly as printed.
+//!
+//! * [`Objective`]: Table 3's J under every definition that the paper leaves open.
+//! * [`figures`]: Figures 5 to 9 from these runs.
+//! * [`passive`]: the fall of its Fig. 5, in space; [`stability`]: from which tilts that vehicle settles.
 
 mod cases;
 mod closed_loop;
+pub mod figures;
 mod json;
+mod objective;
+pub mod passive;
 mod printed;
+pub mod stability;
+mod stability_table;
 mod table;
 
 use flight::guidance::landing::landing_problem;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::profile::Profile;
-use nmpc::SolveStatus;
+use nmpc::{Problem, SolveStatus};
+use vehicles::airframe::AirframeError;
+use vehicles::motors::MotorError;
+use world::world::WorldError;
 
+use crate::figure::FigureError;
 pub use cases::{Case, PaperRow, Table};
 pub use json::to_json;
+pub use objective::{Definition, Objective};
 pub use printed::{AsPrinted, as_printed};
+pub use stability_table::write_stability;
 pub use table::write_tables;
 
 /// One experiment: the paper's result and ours.
@@ -47,30 +62,75 @@ pub struct Finish {
     pub cost: f64,
     /// Whether the plan, or every plan of a closed loop, met the optimality conditions to the tolerance.
     pub converged: bool,
+    /// The way there, from ignition on, once a sample.
+    pub path: Vec<Sample>,
+}
+
+/// One moment of a landing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time since ignition, s.
+    pub time_s: f64,
+    pub state: PlanarState,
+    /// Gimbal angle that led here, rad.
+    pub gimbal_rad: f64,
 }
 
 impl Finish {
-    fn judged(limits: &TouchdownLimits, state: PlanarState, cost: f64, converged: bool) -> Self {
-        Self { state, verdict: LandingVerdict::judge_plan(limits, &state), cost, converged }
+    /// `path` has its start at least.
+    fn judged(limits: &TouchdownLimits, path: Vec<Sample>, cost: f64, converged: bool) -> Self {
+        let state = path.last().map_or_else(PlanarState::default, |sample| sample.state);
+        Self { state, verdict: LandingVerdict::judge_plan(limits, &state), cost, converged, path }
     }
+}
+
+/// All of the paper's experiments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiments {
+    /// Table by table.
+    pub rows: Vec<Row>,
+    /// What Table 3's J could be.
+    pub objective: Objective,
 }
 
 /// All of the paper's experiments.
 ///
 /// # Errors
 /// A built-in profile is missing: a defect of the build.
-pub fn experiments() -> Result<Vec<Row>, MissingProfile> {
+pub fn experiments() -> Result<Experiments, PaperError> {
     let base = builtin("paper-calibrated")?;
-    Ok(cases::all().into_iter().map(|case| experiment(&base, case)).collect())
+    let rows: Vec<Row> = cases::all().into_iter().map(|case| experiment(&base, case)).collect();
+    let objective = Objective::new(&rows, |case| problem(&papers_own(&base, case)));
+    Ok(Experiments { rows, objective })
 }
 
-/// A built-in profile is missing.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("the built-in profile {0} is missing")]
-pub struct MissingProfile(&'static str);
+/// Why an experiment cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum PaperError {
+    /// A defect of the build.
+    #[error("the built-in profile {0} is missing")]
+    Missing(&'static str),
+    #[error(transparent)]
+    Airframe(#[from] AirframeError),
+    #[error(transparent)]
+    Motor(#[from] MotorError),
+    /// The vehicle's data are refused: a defect of the build.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A thread could not be started.
+    #[error("a thread could not be started")]
+    Thread(#[from] std::io::Error),
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+}
 
-fn builtin(name: &'static str) -> Result<Profile, MissingProfile> {
-    vehicles::profile::builtin(name).ok_or(MissingProfile(name))
+fn builtin(name: &'static str) -> Result<Profile, PaperError> {
+    vehicles::profile::builtin(name).ok_or(PaperError::Missing(name))
+}
+
+/// The whole landing as one problem.
+fn problem(profile: &Profile) -> Problem {
+    landing_problem(profile, profile.start.planar_state(), 0.0, profile.nmpc.horizon_steps, 1.0)
 }
 
 /// The profile with the paper's own problem: its conditions at the end and no others.
@@ -88,14 +148,17 @@ fn papers_own(base: &Profile, case: &Case) -> Profile {
 fn experiment(base: &Profile, case: Case) -> Row {
     let profile = papers_own(base, &case);
     let limits = TouchdownLimits::from_profile(&profile);
-    let initial = profile.start.planar_state();
-    let problem = landing_problem(&profile, initial, 0.0, profile.nmpc.horizon_steps, 1.0);
-    let solution = nmpc::solve(&problem, None);
-    let end = solution.states.last().copied().unwrap_or(initial);
+    let solution = nmpc::solve(&problem(&profile), None);
+    let inputs_rad = core::iter::once(0.0).chain(solution.inputs_rad.iter().copied());
+    let path = solution.states.iter().zip(inputs_rad).enumerate().map(|(node, (state, gimbal_rad))| Sample {
+        time_s: node as f64 * solution.step_s,
+        state: *state,
+        gimbal_rad,
+    });
     let converged = solution.status == SolveStatus::Converged;
     Row {
         paper_landed: case.paper.map(|row| LandingVerdict::judge(&limits, &row.state()).landed()),
-        open_loop: Finish::judged(&limits, end, solution.cost, converged),
+        open_loop: Finish::judged(&limits, path.collect(), solution.cost, converged),
         closed_loop: closed_loop::fly(&profile, &limits),
         case,
     }
@@ -115,7 +178,7 @@ mod tests {
             (90.0, 0.0, _) => 8462.95,
             _ => 8483.94,
         };
-        let rows = experiments().unwrap();
+        let rows = experiments().unwrap().rows;
         for row in rows.iter().filter(|row| (row.case.input_weight - 1.0).abs() < 1e-12) {
             let expected = cost(&row.case);
             assert!(
@@ -129,7 +192,7 @@ mod tests {
 
     #[test]
     fn every_start_and_weight_lands_open_and_closed_loop() {
-        for row in experiments().unwrap() {
+        for row in experiments().unwrap().rows {
             for (name, finish) in [("open", &row.open_loop), ("closed", &row.closed_loop)] {
                 assert!(
                     finish.converged && finish.verdict.landed(),
@@ -144,7 +207,7 @@ mod tests {
     /// By its own Table 2 the paper lands 3 of its 7 distinct starts.
     #[test]
     fn val_landing_paper_lands_three_of_seven() {
-        let rows = experiments().unwrap();
+        let rows = experiments().unwrap().rows;
         let distinct: Vec<_> = rows
             .iter()
             .filter(|row| row.case.table != Table::InputWeights || row.case.is_nominal())

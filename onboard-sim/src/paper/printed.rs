@@ -5,7 +5,7 @@ use flight::vehicle::dynamics::{PlanarModel, PlanarState};
 use flight::vehicle::profile::{ModelKind, Profile};
 use nmpc::{Solution, SolveStatus};
 
-use super::{MissingProfile, builtin};
+use super::{PaperError, builtin};
 use sim::plane::draw::draw;
 use sim::plane::plant::{Plant, STEP_S};
 
@@ -40,7 +40,7 @@ pub struct AsPrinted {
 ///
 /// # Errors
 /// A built-in profile is missing: a defect of the build.
-pub fn as_printed() -> Result<AsPrinted, MissingProfile> {
+pub fn as_printed() -> Result<AsPrinted, PaperError> {
     let profile = builtin("paper-as-printed")?;
     let intervals = profile.nmpc.horizon_steps;
     let initial = profile.start.planar_state();

@@ -4,13 +4,15 @@ use std::io::{self, Write};
 
 use flight::vehicle::dynamics::PlanarState;
 
-use super::{AsPrinted, Finish, Row, Table};
+use super::objective::chord;
+use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
 
 /// Writes Tables 3 to 6 and the results of the printed equations.
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn write_tables(out: &mut impl Write, rows: &[Row], printed: &AsPrinted) -> io::Result<()> {
+pub fn write_tables(out: &mut impl Write, experiments: &Experiments, printed: &AsPrinted) -> io::Result<()> {
+    let rows = &experiments.rows;
     writeln!(out, "Final states: the landing paper's, and ours with its cost, conditions and start")?;
     writeln!(out, "(consistent equations, T = 33.3 N). Verdict by the paper's Table 2.")?;
     for table in Table::ALL {
@@ -36,7 +38,52 @@ pub fn write_tables(out: &mut impl Write, rows: &[Row], printed: &AsPrinted) -> 
         landed(|row| row.paper_landed.is_some()),
         n = rows.len(),
     )?;
+    write_objective(out, &experiments.objective)?;
     write_printed(out, printed)
+}
+
+/// The paper's J beside every definition tried.
+fn write_objective(out: &mut impl Write, objective: &Objective) -> io::Result<()> {
+    let value =
+        |value: &Option<f64>| value.map_or_else(|| format!("{:>12}", "-"), |value| format!("{value:>12.3}"));
+    let line = |out: &mut dyn Write, name: &str, values: &[Option<f64>]| {
+        let ratio = |place: usize| {
+            let (first, other) = (values.first().copied().flatten(), values.get(place).copied().flatten());
+            first.zip(other).map_or(f64::NAN, |(first, other)| other / first)
+        };
+        let row: String = values.iter().map(value).collect();
+        writeln!(out, "{name:<56} {row}   1 : {:.2} : {:.2}", ratio(1), ratio(2))
+    };
+    writeln!(out)?;
+    let weights = objective.weights.iter().map(|p| format!("{:>12}", format!("P = {p}")));
+    let weights = weights.collect::<Vec<_>>().concat();
+    writeln!(out, "{:<56} {weights}   ratios 0.5 : 1 : 2", "J of Table 3")?;
+    line(out, "the paper", &objective.paper)?;
+    line(out, "Eq. 28 at the paper's own final states", &objective.at_paper_finals)?;
+    writeln!(out, "ours, by")?;
+    for definition in &objective.definitions {
+        let values: Vec<Option<f64>> = definition.values.iter().copied().map(Some).collect();
+        line(out, &format!("  {}", definition.name), &values)?;
+    }
+    let [Some(half), Some(one), Some(two), ..] = objective.paper[..] else { return Ok(()) };
+    writeln!(
+        out,
+        "No definition gives the paper's column. Three optima cannot, whatever A and B >= 0 are in J = A + P B:"
+    )?;
+    writeln!(
+        out,
+        "  the landing of P = 1 costs at most {:.2} with P = 2, so a landing of {two} is no optimum;",
+        2.0 * one
+    )?;
+    writeln!(
+        out,
+        "  the least J is concave in P, so between {half} and {two} it is at least {:.2} at P = 1, not {one}.",
+        chord(1.0, [(0.5, half), (2.0, two)])
+    )?;
+    writeln!(
+        out,
+        "  Both hold if the last row is the P = 5 of the paper's Fig. 6, not the P = 2 of its Table 3."
+    )
 }
 
 fn write_row(out: &mut impl Write, row: &Row) -> io::Result<()> {

@@ -5,6 +5,7 @@
 //! accepted from that station, and why the last frame from anybody was refused. Pure: times are vehicle times, s.
 
 use flight::rules::arming::Uplink;
+use flight::rules::operator::Operator;
 use mavlink::MessageData as _;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
 use protocol::frame::Frame;
@@ -13,6 +14,8 @@ use protocol::signing::Rejection;
 
 /// Most stations remembered: the crew's, a spare one and an observer's. Each costs a message twice a second.
 pub const MAX_STATIONS: usize = 3;
+/// The same with operators. No more than [`MAX_STATIONS`] are told at once: of more, each in turn.
+const MAX_STATIONS_OF_A_CREW: usize = 6;
 
 /// Interval of the uplink report to every known station, s.
 const TELL_EVERY_S: f64 = 0.5;
@@ -40,16 +43,42 @@ struct Refused {
 }
 
 /// All known stations.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Stations {
+    most: usize,
     known: Vec<Station>,
+    /// The known station that is told next.
+    next: usize,
     refused: Option<Refused>,
     refused_count: u16,
-    armed_by: Option<Address>,
+    commander: Option<(Address, Option<Operator>)>,
     tell_at_s: f64,
 }
 
+impl Default for Stations {
+    fn default() -> Self {
+        Self::at_most(MAX_STATIONS)
+    }
+}
+
 impl Stations {
+    /// No stations yet, of a vehicle with operators.
+    pub fn of_a_crew() -> Self {
+        Self::at_most(MAX_STATIONS_OF_A_CREW)
+    }
+
+    fn at_most(most: usize) -> Self {
+        Self {
+            most,
+            known: Vec::new(),
+            next: 0,
+            refused: None,
+            refused_count: 0,
+            commander: None,
+            tell_at_s: 0.0,
+        }
+    }
+
     /// Notes an accepted frame.
     pub fn accepted(&mut self, frame: &Frame, time_s: f64) {
         // A radio's own report is accepted unsigned, from any address: it does not prove a station.
@@ -58,7 +87,7 @@ impl Stations {
         }
         let address = frame.source();
         if self.station(address).is_none() {
-            if self.known.len() >= MAX_STATIONS {
+            if self.known.len() >= self.most {
                 let Some(leaving) = self.replaceable(time_s) else { return };
                 self.known.remove(leaving);
             }
@@ -76,7 +105,7 @@ impl Stations {
     fn replaceable(&self, time_s: f64) -> Option<usize> {
         let proven = |station: &Station| {
             station.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= PROVEN_FOR_S)
-                || self.armed_by == Some(station.address)
+                || self.armed_by() == Some(station.address)
         };
         self.known.iter().position(|station| !proven(station))
     }
@@ -108,17 +137,23 @@ impl Stations {
         latest_s.map_or(Uplink::NeverHeard, |at_s| Uplink::Heard { age_s: time_s - at_s })
     }
 
-    /// Sets the station that armed the vehicle, if any.
-    pub fn set_armed_by(&mut self, address: Option<Address>) {
-        self.armed_by = address;
+    /// Sets the station that armed the vehicle or has taken command, if any, and its operator.
+    pub fn set_commander(&mut self, commander: Option<(Address, Option<Operator>)>) {
+        self.commander = commander;
     }
 
-    /// The station that armed the vehicle.
+    /// The station that armed the vehicle or has taken command, and its operator.
+    pub fn commander(&self) -> Option<(Address, Option<Operator>)> {
+        self.commander
+    }
+
+    /// The station that armed the vehicle or has taken command.
     pub fn armed_by(&self) -> Option<Address> {
-        self.armed_by
+        self.commander.map(|(address, _)| address)
     }
 
-    /// The uplink reports that are due: one for each known station, or one for everybody while there is none.
+    /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`], or one for everybody
+    /// while there is none.
     pub fn due(&mut self, time_s: f64) -> Vec<MavMessage> {
         if time_s < self.tell_at_s {
             return Vec::new();
@@ -128,7 +163,10 @@ impl Stations {
         if self.known.is_empty() {
             return vec![self.message(EVERYBODY, None, time_s)];
         }
-        let known = self.known.iter();
+        let told = self.known.len().min(MAX_STATIONS);
+        let first = self.next % self.known.len();
+        self.next = first + told;
+        let known = self.known.iter().cycle().skip(first).take(told);
         known.map(|station| self.message(station.address, Some(station.accepted_at_s), time_s)).collect()
     }
 
@@ -145,7 +183,7 @@ impl Stations {
             refused_count: self.refused_count,
             target_system: to.system_id,
             target_component: to.component_id,
-            commands: u8::from(self.armed_by == Some(to)),
+            commands: u8::from(self.armed_by() == Some(to)),
             refusal: refused.map_or(TdFrameRefusal::TD_FRAME_REFUSAL_NONE, |refused| refusal(refused.why)),
             refused_system: from.system_id,
             refused_component: from.component_id,

@@ -84,7 +84,7 @@ fn each_station_is_told_its_own_age_twice_a_second() {
         }
         if frame == 100 {
             stations.accepted(&beat_from(station(7)), time_s);
-            stations.set_armed_by(Some(station(7)));
+            stations.set_commander(Some((station(7), None)));
         }
         for (to, uplink) in told(&mut stations, time_s) {
             messages += 1;
@@ -118,7 +118,7 @@ fn a_flood_of_strangers_pushes_out_no_station_that_has_proved_itself() {
     let mut stations = Stations::default();
     stations.accepted(&beat_from(GROUND), 0.0);
     stations.accepted(&command_from(station(7)), 0.0);
-    stations.set_armed_by(Some(station(7)));
+    stations.set_commander(Some((station(7), None)));
     for system_id in 8..=250 {
         stations.accepted(&command_from(station(system_id)), 1.0);
         assert!(stations.known.len() <= MAX_STATIONS);

@@ -7,6 +7,7 @@
 //!
 //! [`Motion`]: crate::vehicle::Motion
 
+mod crew;
 mod global;
 mod ours;
 mod space;
@@ -51,7 +52,9 @@ pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option
         TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
-        _ => space::message(message_id, snapshot).or_else(|| global::message(message_id, snapshot)),
+        _ => crew::message(message_id, snapshot)
+            .or_else(|| space::message(message_id, snapshot))
+            .or_else(|| global::message(message_id, snapshot)),
     }
 }
 

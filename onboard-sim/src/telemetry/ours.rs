@@ -29,6 +29,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
             None => TdHold::TD_HOLD_NONE,
             Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
             Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
+            Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
         },
         hold_left_s: snapshot.held.map_or(0, |(_, left_s)| left_s.ceil() as u8),
         phase: td_phase(snapshot.phase),

@@ -16,13 +16,15 @@ mod tests;
 
 use std::time::Duration;
 
-use flight::computer::crew::{Answer, Request};
+use flight::computer::crew::{Answer, People, Request};
 use flight::computer::news::Severity;
 use flight::computer::{Commander, Computer, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
+use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::vehicle::profile::{StartPoint, StateWeights};
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
 use sim::plane::PlanarFlight;
 use sim::recipe::Recipe;
@@ -32,8 +34,8 @@ pub use self::events::{Tick, VehicleEvent};
 use self::ground::Ground;
 use self::sensed::SensorWatch;
 pub use self::snapshot::{
-    AscentFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Judged, Motion, PATH_POINTS,
-    Path, Prediction, SensorFacts, Snapshot,
+    AscentFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts, Judged, Motion,
+    PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
 };
 use crate::streams::{FROM_APOGEE, STANDARD, Standard};
 
@@ -60,6 +62,19 @@ struct InSpace {
     flown: bool,
 }
 
+/// Which mission or profile a vehicle flies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MissionName {
+    pub name: String,
+    pub hash: MissionHash,
+}
+
+impl Default for MissionName {
+    fn default() -> Self {
+        Self { name: String::new(), hash: MissionHash::of("") }
+    }
+}
+
 /// One vehicle, one flight.
 pub struct Vehicle {
     flight: Flight,
@@ -67,6 +82,9 @@ pub struct Vehicle {
     log: LogState,
     uplink: Uplink,
     commander: Option<Commander>,
+    people: Option<People>,
+    operators: Vec<Operator>,
+    mission: MissionName,
     ground: Ground,
     /// How long the last tick of the planar vehicle took, s.
     tick_took_s: f64,
@@ -128,6 +146,9 @@ impl Vehicle {
             log: LogState::NONE,
             uplink: Uplink::NotNeeded,
             commander: None,
+            people: None,
+            operators: Vec::new(),
+            mission: MissionName::default(),
             ground: Ground::default(),
             tick_took_s: 0.0,
             computer_frame: None,
@@ -152,6 +173,29 @@ impl Vehicle {
         self.commander = commander;
     }
 
+    /// Sets who may command, from power-up on.
+    #[must_use]
+    pub fn with_crew(self, people: People, operators: Vec<Operator>) -> Self {
+        Self { people: Some(people), operators, ..self }
+    }
+
+    /// Sets the name and the text of the mission or profile that it flies.
+    #[must_use]
+    pub fn of_mission(self, name: &str, text: &str) -> Self {
+        let mission = MissionName { name: name.to_owned(), hash: MissionHash::of(text) };
+        Self { mission, ..self }
+    }
+
+    /// Who may command; empty without operators.
+    pub fn operators(&self) -> &[Operator] {
+        &self.operators
+    }
+
+    /// How many people an arming and a start take; `None` without operators.
+    pub fn people(&self) -> Option<People> {
+        self.people
+    }
+
     /// Advances by one frame, in which these requests are decided. `stopwatch` may be any clock: only differences of
     /// its values are used, to time the flight computer.
     pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> Frame {
@@ -160,6 +204,7 @@ impl Vehicle {
             log: self.log,
             uplink: self.uplink,
             commander: self.commander,
+            people: self.people,
             requests,
         };
         let mut watcher = Watcher { stopwatch, rehearsed_before: self.rehearsed, frame: None };

@@ -1,12 +1,15 @@
 //! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit. Both
 //! vehicles use the same records.
 
-use flight::computer::crew::{Asked, Ending, Request};
+use alloc::vec::Vec;
+
+use flight::computer::crew::{Asked, Ending, People, Request};
 use flight::computer::pilot::Sensed;
 use flight::computer::plane::PlaneSensed;
 use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
 use flight::rules::arming::{PredictedLanding, Uplink};
-use protocol::log::computer_v1 as v1;
+use flight::rules::operator::{Name, Operator, Role};
+use log_records::computer_v1 as v1;
 
 use crate::pilot::{
     PilotLogError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
@@ -14,7 +17,8 @@ use crate::pilot::{
 use crate::{state_from_log, state_to_log};
 
 /// Requests, by their number in the log.
-const ASKED: [Asked; 5] = [Asked::Arm, Asked::Disarm, Asked::Start, Asked::Hold, Asked::Abort];
+const ASKED: [Asked; 7] =
+    [Asked::Arm, Asked::Disarm, Asked::Start, Asked::Hold, Asked::Abort, Asked::Tap, Asked::TakeCommand];
 
 /// A frame's input, read from a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,8 +47,7 @@ pub fn frame_to_log(
     if rehearsed_before {
         input.rehearsed = None;
     }
-    let phase = u32::from(computer.mode().phase.index());
-    v1::ComputerFrame { input, output: output_to_log(output, phase), state_digest: computer.digest() }
+    v1::ComputerFrame { input, output: output_to_log(output, computer), state_digest: computer.digest() }
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
@@ -70,10 +73,13 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         log_running: input.log.running,
         log_space_bytes: input.log.space_bytes,
         uplink: uplink_to_log(input.uplink),
-        commander: input.commander.map(|Commander { station: (system, component), age_s }| v1::Commander {
-            system: u32::from(system),
-            component: u32::from(component),
-            age_s,
+        commander: input.commander.map(|Commander { station: (system, component), age_s, by }| {
+            v1::Commander {
+                system: u32::from(system),
+                component: u32::from(component),
+                age_s,
+                by: by.as_ref().map(operator_to_log),
+            }
         }),
         requests: input.requests.iter().map(request_to_log).collect(),
         rehearsed: input.rehearsed.map(|rehearsed| v1::Rehearsed {
@@ -84,6 +90,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         }),
         late: input.late,
         booster_attached: input.booster_attached.then_some(true),
+        people: input.people.map(people_to_log),
     }
 }
 
@@ -104,7 +111,8 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
     let commander = input.commander.as_ref().map(|commander| {
         let station =
             (byte(commander.system, frame, "system")?, byte(commander.component, frame, "component")?);
-        Ok(Commander { station, age_s: commander.age_s })
+        let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
+        Ok(Commander { station, age_s: commander.age_s, by })
     });
     let rest = Input {
         frame,
@@ -122,6 +130,7 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
         rehearsed: None,
         late: input.late,
         booster_attached: input.booster_attached.unwrap_or(false),
+        people: input.people.as_ref().map(|people| people_from_log(people, frame)).transpose()?,
     };
     let requests = input.requests.iter().map(|request| request_from_log(request, frame));
     let rehearsed = input.rehearsed.as_ref().map(|rehearsed| Rehearsed {
@@ -148,10 +157,12 @@ fn ending_to_log(ending: Ending) -> u32 {
         Ending::NotNow => 1,
         Ending::Denied => 2,
         Ending::Failed => 3,
+        Ending::Asked => 4,
     }
 }
 
-fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
+/// A frame's output as a record; `computer` has just flown it.
+pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
     v1::ComputerOutput {
         gimbal_rad: output.commands.gimbal_rad.to_vec(),
         fins_rad: output.commands.fins_rad.to_vec(),
@@ -159,7 +170,7 @@ fn output_to_log(output: &Output, phase: u32) -> v1::ComputerOutput {
         parachute: output.commands.parachute,
         released: output.released,
         planned: output.planned,
-        phase,
+        phase: u32::from(computer.mode().phase.index()),
         answers: output.answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
         ignite_booster: output.commands.booster.ignite.then_some(true),
         separate_booster: output.commands.booster.separate.then_some(true),
@@ -210,6 +221,8 @@ fn request_to_log(request: &Request) -> v1::Request {
         uplink: uplink_to_log(request.uplink),
         system: request.station.map(|(system, _)| u32::from(system)),
         component: request.station.map(|(_, component)| u32::from(component)),
+        by: request.by.as_ref().map(operator_to_log),
+        confirms: request.confirms.map(u32::from),
     }
 }
 
@@ -223,7 +236,47 @@ fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotL
         asked: *ASKED.get(request.asked as usize).ok_or(unknown)?,
         uplink: uplink_from_log(request.uplink.as_ref()),
         station: station.transpose()?,
+        by: request.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?,
+        confirms: request.confirms.map(|number| short(number, frame, "ask")).transpose()?,
     })
+}
+
+fn operator_to_log(operator: &Operator) -> v1::Operator {
+    v1::Operator {
+        number: u32::from(operator.number),
+        role: u32::from(operator.role as u8),
+        name: operator.name.as_str().to_owned(),
+    }
+}
+
+fn operator_from_log(operator: &v1::Operator, frame: u64) -> Result<Operator, PilotLogError> {
+    let most = Role::ALL.len() - 1;
+    let unknown = PilotLogError::Unknown { frame, what: "role", found: operator.role, most };
+    Ok(Operator {
+        number: byte(operator.number, frame, "operator")?,
+        role: *Role::ALL.get(operator.role as usize).ok_or(unknown)?,
+        name: Name::new(&operator.name),
+    })
+}
+
+fn people_to_log(people: People) -> v1::People {
+    match people {
+        People::One => v1::People { count: 1, first_ask: None },
+        People::Two { first_ask } => v1::People { count: 2, first_ask: Some(u32::from(first_ask)) },
+    }
+}
+
+fn people_from_log(people: &v1::People, frame: u64) -> Result<People, PilotLogError> {
+    match (people.count, people.first_ask) {
+        (1, _) => Ok(People::One),
+        (2, Some(first_ask)) => Ok(People::Two { first_ask: short(first_ask, frame, "first ask")? }),
+        (found, _) => Err(PilotLogError::Unknown { frame, what: "crew", found, most: 2 }),
+    }
+}
+
+fn short(number: u32, frame: u64, what: &'static str) -> Result<u16, PilotLogError> {
+    let most = usize::from(u16::MAX);
+    u16::try_from(number).map_err(|_too_large| PilotLogError::Unknown { frame, what, found: number, most })
 }
 
 fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, PilotLogError> {
@@ -249,9 +302,33 @@ mod tests {
         ]
     }
 
+    fn any_operator() -> impl Strategy<Value = Operator> {
+        let any = (any::<u8>(), 0..Role::ALL.len(), any::<String>());
+        any.prop_map(|(number, role, name)| Operator {
+            number,
+            role: Role::ALL[role],
+            name: Name::new(&name),
+        })
+    }
+
     fn any_request() -> impl Strategy<Value = Request> {
-        (0..ASKED.len(), any_uplink(), any::<Option<(u8, u8)>>())
-            .prop_map(|(asked, uplink, station)| Request { asked: ASKED[asked], uplink, station })
+        let by = prop::option::of(any_operator());
+        let any = (0..ASKED.len(), any_uplink(), any::<Option<(u8, u8)>>(), by, any::<Option<u16>>());
+        any.prop_map(|(asked, uplink, station, by, confirms)| Request {
+            asked: ASKED[asked],
+            uplink,
+            station,
+            by,
+            confirms,
+        })
+    }
+
+    fn any_people() -> impl Strategy<Value = Option<People>> {
+        prop_oneof![
+            Just(None),
+            Just(Some(People::One)),
+            any::<u16>().prop_map(|first_ask| Some(People::Two { first_ask })),
+        ]
     }
 
     proptest! {
@@ -262,7 +339,8 @@ mod tests {
             flags: [bool; 8],
             space_bytes: u64,
             uplink in any_uplink(),
-            commander: Option<(u8, u8)>,
+            commander in prop::option::of((any::<(u8, u8)>(), prop::option::of(any_operator()))),
+            people in any_people(),
             requests in prop::collection::vec(any_request(), 0..4),
             rehearsed: Option<(bool, String, Option<(bool, String)>)>,
         ) {
@@ -297,7 +375,8 @@ mod tests {
                 pin_out: flags[3],
                 log: LogState { running: flags[4], space_bytes },
                 uplink,
-                commander: commander.map(|station| Commander { station, age_s: number(16) }),
+                commander: commander.map(|(station, by)| Commander { station, age_s: number(16), by }),
+                people,
                 requests: &requests,
                 rehearsed: rehearsed.as_ref(),
                 late: flags[5],
@@ -309,7 +388,9 @@ mod tests {
             prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
-            let asked = |requests: &[Request]| requests.iter().map(|request| request.asked).collect::<Vec<_>>();
+            let asked = |requests: &[Request]| {
+                requests.iter().map(|request| (request.asked, request.by, request.confirms)).collect::<Vec<_>>()
+            };
             prop_assert_eq!(asked(&read.requests), asked(&requests));
         }
     }
@@ -322,15 +403,15 @@ mod tests {
             in_plane: Some(sensed),
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
-            requests: vec![v1::Request { asked: 5, ..v1::Request::default() }],
+            requests: vec![v1::Request { asked: 7, ..v1::Request::default() }],
             ..v1::ComputerInput::default()
         };
         let error = input_from_log(&input).unwrap_err().to_string();
-        assert_eq!(error, "frame 7: request 5 is unknown; this build knows 0 to 4");
+        assert_eq!(error, "frame 7: request 7 is unknown; this build knows 0 to 6");
         let error =
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
-        let both = v1::ComputerInput { known: Some(protocol::log::flight_v1::Estimate::default()), ..input };
+        let both = v1::ComputerInput { known: Some(log_records::flight_v1::Estimate::default()), ..input };
         assert_eq!(input_from_log(&both).unwrap_err(), PilotLogError::Sensed { frame: 7 });
     }
 }

@@ -4,21 +4,30 @@
 //! log use this crate.
 //!
 //! * [`computer`]: the flight computer's frames from power-up on, of both vehicles.
+//! * [`again`]: the flight computer of a log, run again on these frames.
 //! * [`pilot`]: the frames of a rocket in space from its release on.
 //! * This module: the ticks of the planar vehicle's landing controller, and its plant.
 //! * [`sortie`]: a simulated flight of a rocket as records, with the truth.
+//!
+//! Without the feature `simulated` (the last one, and the plant) the crate needs no operating system.
+#![cfg_attr(not(any(test, feature = "simulated")), no_std)]
 
+extern crate alloc;
+
+pub mod again;
 pub mod computer;
 pub mod pilot;
+#[cfg(feature = "simulated")]
+mod plant;
+#[cfg(feature = "simulated")]
 pub mod sortie;
 
 use flight::guidance::controller::{ControllerInput, ControllerOutput, Plan};
 use flight::rules::phase::Phase;
-use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::dynamics::PlanarState;
-use protocol::log::v1;
-use sim::ending::FlightEnding;
-use sim::plane::PlanarFlight;
+use log_records::v1;
+#[cfg(feature = "simulated")]
+pub use plant::{ending_in_plane, plant_truth, verdict_to_log};
 
 /// Why a recorded tick cannot be given to this build's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -139,61 +148,12 @@ pub fn tick_to_log(
     }
 }
 
-/// A landing verdict as a record: the state at contact, and each limit with its result.
-pub fn verdict_to_log(time_s: f64, state: &PlanarState, verdict: &LandingVerdict) -> v1::LandingVerdict {
-    v1::LandingVerdict {
-        time_s,
-        state: state_to_log(state),
-        limits: limits_to_log(verdict),
-        landed: verdict.landed(),
-        table_2: Vec::new(),
-        ending: Some(ending_in_plane(verdict, false).to_string()),
-    }
-}
-
-/// How a planar landing ended: its limits are Table 2.
-pub fn ending_in_plane(verdict: &LandingVerdict, aborted: bool) -> FlightEnding<'static> {
-    let failure = verdict.failures().next().map(|limit| limit.name);
-    FlightEnding { aborted, landed: verdict.landed(), table_2: Some(verdict.landed()), failure }
-}
-
-/// Each limit with its result, as records.
-fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
-    let limits = verdict.results.iter().map(|result| v1::LimitResult {
-        name: result.name.to_owned(),
-        value: result.value,
-        minimum: result.lowest,
-        maximum: result.highest,
-        unit: result.unit.to_owned(),
-        passed: result.passed,
-    });
-    limits.collect()
-}
-
 fn plan_to_log(plan: &Plan) -> v1::Plan {
     v1::Plan {
         states: plan.used_states().iter().map(state_to_log).collect(),
         gimbal_rad: plan.used_gimbal_rad().to_vec(),
         starts_in_s: plan.starts_in_s,
         step_s: plan.step_s,
-    }
-}
-
-/// The true planar vehicle after a frame, as a record.
-pub fn plant_truth(flight: &PlanarFlight) -> v1::PlantTruth {
-    let plant = flight.plant();
-    let (gimbal_rad, fins_rad) = (plant.gimbal_rad(), plant.fins_rad());
-    v1::PlantTruth {
-        time_s: flight.time_s(),
-        phase: u32::from(flight.computer().mode().phase.index()),
-        state: state_to_log(&plant.state()),
-        gimbal_commanded_rad: gimbal_rad.0,
-        gimbal_actual_rad: gimbal_rad.1,
-        fin_commanded_rad: fins_rad.0.to_vec(),
-        fin_actual_rad: fins_rad.1.to_vec(),
-        thrust_n: plant.thrust_n(),
-        mass_kg: plant.mass_kg(),
-        in_contact: plant.in_contact(),
     }
 }
 

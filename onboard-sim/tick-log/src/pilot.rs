@@ -8,8 +8,8 @@ use flight::estimation::motor_estimate::MotorEstimate;
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
+use log_records::flight_v1 as v1;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
-use protocol::log::flight_v1 as v1;
 
 /// Why a recorded frame cannot be given to this build's pilot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

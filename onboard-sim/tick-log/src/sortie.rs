@@ -143,7 +143,7 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
     let both = Limits::of(flight.mission());
-    let mut limits = crate::limits_to_log(&both.by_legs(touchdown).1);
+    let mut limits = crate::plant::limits_to_log(&both.by_legs(touchdown).1);
     let of_legs = [Failure::Vertical, Failure::Lateral, Failure::Tilt, Failure::Rate];
     if let Some(failure) = outcome.failure.filter(|failure| !of_legs.contains(failure)) {
         limits.push(v1::LimitResult {
@@ -161,7 +161,7 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
         state: crate::state_to_log(&in_world_plane(flight, touchdown)),
         limits,
         landed: outcome.legs,
-        table_2: crate::limits_to_log(&both.by_table_2(touchdown).1),
+        table_2: crate::plant::limits_to_log(&both.by_table_2(touchdown).1),
         ending: Some(outcome.ending(aborted).to_string()),
     })
 }

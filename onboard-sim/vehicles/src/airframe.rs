@@ -1,5 +1,9 @@
 //! Airframes, from TOML. Unknown keys are errors.
 
+use alloc::borrow::ToOwned as _;
+use alloc::string::{String, ToString as _};
+use alloc::vec::Vec;
+
 use flight::vehicle::airframe::{Airframe, BadValue};
 
 /// The built-in airframes: name and TOML text.

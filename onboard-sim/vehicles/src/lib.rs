@@ -9,10 +9,16 @@
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
 //! * [`profile`]: profiles of planar landings, from TOML.
 
+// The unit tests of `flight` compile these files as one of their modules, which cannot say this.
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
 // The unit tests of `flight` compile these files as one of their own modules, so paths here start with `super` or
 // `flight`.
 pub mod airframe;
 pub mod mission;
 pub mod motors;
 pub mod profile;
+mod ranges;
 pub mod thrust_curve;

@@ -1,5 +1,9 @@
 //! The motors that come with the program, by name. Each file states its origin in its header.
 
+use alloc::borrow::ToOwned as _;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use flight::vehicle::thrust_curve::ThrustCurve;
 
 use super::thrust_curve::{self, ThrustCurveError};

@@ -25,6 +25,8 @@ pub enum Fault {
     },
     /// The ascent motor never lights.
     AscentNoLight,
+    /// The ascent motor lights without a command.
+    AscentSelfLights,
     /// The ascent motor has less impulse, in the same time.
     AscentWeak {
         /// Thrust, as a fraction of the thrust without the fault.

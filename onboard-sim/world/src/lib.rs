@@ -10,10 +10,12 @@
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`vertical`]: the true vehicle's forces in a vertical fall through still air, for bounds on what is possible.
+//! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
 //! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data.
 //! * [`fault`]: what can break in flight.
 
 mod aero;
+pub mod balance;
 mod body;
 pub mod fault;
 pub mod ground;

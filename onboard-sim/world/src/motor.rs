@@ -151,6 +151,7 @@ impl Motor {
             Fault::WeakMotor { scale } => self.burn.impulse_scale *= scale.clamp(0.01, 1.0),
             Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
             Fault::AscentNoLight
+            | Fault::AscentSelfLights
             | Fault::AscentWeak { .. }
             | Fault::SeparationFails
             | Fault::GimbalStuck

@@ -26,6 +26,8 @@ pub(crate) struct Stack {
     motor: Motor,
     charge_fired_s: Option<f64>,
     stuck: bool,
+    /// The ascent motor lights without a command.
+    lights_itself: bool,
     rail: Option<OnRail>,
 }
 
@@ -58,6 +60,7 @@ impl Stack {
             motor: Motor::new(&launch.booster.motor_curve, &of_motor),
             charge_fired_s: None,
             stuck: false,
+            lights_itself: false,
             rail: Some(OnRail { length_m: launch.rail.length_m, travelled_m: 0.0 }),
         }
     }
@@ -65,6 +68,7 @@ impl Stack {
     pub(crate) fn break_down(&mut self, fault: &Fault) {
         match *fault {
             Fault::AscentNoLight => self.motor.break_down(&Fault::NoLight),
+            Fault::AscentSelfLights => self.lights_itself = true,
             Fault::AscentWeak { scale } => self.motor.break_down(&Fault::WeakMotor { scale }),
             Fault::SeparationFails => self.stuck = true,
             _ => {}
@@ -72,7 +76,7 @@ impl Stack {
     }
 
     pub(crate) fn command(&mut self, ignite: bool, separate: bool, time_s: f64) {
-        if ignite {
+        if ignite || self.lights_itself {
             self.motor.ignite(time_s);
         }
         if separate {

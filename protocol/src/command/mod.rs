@@ -71,27 +71,36 @@ pub struct CommandAnswer {
     pub result: u8,
     /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
     pub progress: u8,
+    /// RESULT_PARAM2: here the number of the ask that a second person has to confirm; 0 if there is none.
+    pub detail: i32,
     /// The component that the answer is for.
     pub target: Address,
 }
 
 impl CommandAnswer {
     pub fn to(request: &CommandRequest, result: MavResult) -> Self {
-        Self { command: request.command, result: result as u8, progress: 0, target: request.source }
+        Self {
+            command: request.command,
+            result: result as u8,
+            progress: 0,
+            detail: 0,
+            target: request.source,
+        }
     }
 
     /// Encodes the answer as a COMMAND_ACK frame.
     pub fn encode(&self, encoder: &mut Encoder) -> Option<Frame> {
         let command = self.command.to_le_bytes();
+        let detail = self.detail.to_le_bytes();
         let payload = [
             command[0],
             command[1],
             self.result,
             self.progress,
-            0,
-            0,
-            0,
-            0,
+            detail[0],
+            detail[1],
+            detail[2],
+            detail[3],
             self.target.system_id,
             self.target.component_id,
         ];
@@ -108,6 +117,7 @@ impl CommandAnswer {
             command: u16::from_le_bytes([payload[0], payload[1]]),
             result: payload[2],
             progress: payload[3],
+            detail: i32::from_le_bytes([payload[4], payload[5], payload[6], payload[7]]),
             target: Address { system_id: payload[8], component_id: payload[9] },
         })
     }

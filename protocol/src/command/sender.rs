@@ -296,7 +296,7 @@ mod tests {
     /// Submits an arming at 0 and a disarming at `disarmed_ms`; answers arrive at `answers_ms`. Returns the events
     /// about answers.
     fn events(disarmed_ms: u64, answers_ms: &[u64]) -> Vec<CommandEvent> {
-        let answer = CommandAnswer { command: ARM as u16, result: 0, progress: 0, target: GROUND };
+        let answer = CommandAnswer { command: ARM as u16, result: 0, progress: 0, detail: 0, target: GROUND };
         let mut sender = CommandSender::new();
         sender.submit(VEHICLE, ARM, [1.0; 7], Resend::Never, ms(0));
         for now in (0..20_000).step_by(100) {
@@ -327,7 +327,7 @@ mod tests {
             sent.extend(sender.poll(ms(now)).iter().map(|_| now));
             for (_, result) in answered.iter().filter(|(at, _)| *at == now) {
                 let (command, result) = (abort as u16, *result as u8);
-                let answer = CommandAnswer { command, result, progress: 0, target: GROUND };
+                let answer = CommandAnswer { command, result, progress: 0, detail: 0, target: GROUND };
                 assert!(sender.on_answer(&answer, ms(now)) || now >= withdrawn_ms);
             }
         }

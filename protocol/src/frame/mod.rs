@@ -78,6 +78,12 @@ impl Frame {
         self.is_signed().then(|| &self.bytes[self.bytes.len() - SIGNATURE_LEN..])
     }
 
+    /// Returns the number of the key that its signature names; 0 for the shared key, and without a signature. It says
+    /// nothing until [`crate::signing::Signing`] has checked the frame against that key.
+    pub fn key_number(&self) -> u8 {
+        self.signature().map_or(0, |signature| crate::signing::key_number(signature[0]))
+    }
+
     /// Returns the same frame marked as signed, without its signature, which must follow.
     pub(crate) fn marked_signed(&self) -> Self {
         self.with_flags(INCOMPAT_SIGNED)

@@ -182,7 +182,8 @@ impl Hub {
         // A rejected frame is no sign of life either, so it does not count in the statistics.
         self.links[link].stats.on_frame(&frame, now);
         // The signature is checked first: a forged frame must not turn the true one into a copy.
-        if self.duplicates.is_copy(&frame, link, now) {
+        let operator = self.signing.as_ref().map_or(0, |signing| signing.operator_of(&frame));
+        if self.duplicates.is_copy(&frame, operator, link, now) {
             self.links[link].copies += 1;
             return News::Copy(frame);
         }
@@ -192,8 +193,7 @@ impl Hub {
     /// Returns the bytes of a frame for one link; with a key they are signed for this link alone.
     pub fn bytes_for(&mut self, link: usize, frame: &Frame, clock: u64) -> Vec<u8> {
         match &mut self.signing {
-            // Links beyond the 256th share an id, which costs nothing but exact statistics.
-            Some(signing) => signing.sign(frame, link as u8, clock).as_bytes().to_vec(),
+            Some(signing) => signing.sign(frame, signing.link_id(link), clock).as_bytes().to_vec(),
             None => frame.as_bytes().to_vec(),
         }
     }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::dialect::{HEARTBEAT_DATA, MavMessage};
 use crate::frame::Encoder;
-use crate::identity::VEHICLE;
+use crate::identity::{GROUND, VEHICLE};
 use crate::signing::{Key, Memory};
 
 const CLOCK: u64 = 37_000_000_000_000;
@@ -141,4 +141,25 @@ fn a_sender_is_accepted_only_for_a_valid_frame() {
     assert_eq!(believed(&mut hub, report), [], "the message that may be unsigned does not prove its sender");
     assert_eq!(believed(&mut hub, signed_by(7)), sender);
     assert_eq!(believed(&mut hub, signed_by(7)), [], "replayed");
+}
+
+/// An observer who repeats an operator's frame over another link, with the key that all share, hides nothing.
+#[test]
+fn nobody_turns_another_one_s_frame_into_a_copy() {
+    let [shared, ann] = [7, 8].map(|byte| Key::new([byte; Key::LEN]));
+    let vehicle = Signing::new(shared.clone(), Memory::default()).with_operators([(1, ann.clone())].into());
+    let mut hub = Hub::new(2, Some(vehicle));
+    let mut observer = Signing::new(shared.clone(), Memory::default());
+    let mut ann = Signing::new(shared, Memory::default()).as_operator(1, ann);
+    let abort = Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    let take = |hub: &mut Hub, link: usize, frame: Frame| {
+        hub.take(link, Received::Stream(0, frame.as_bytes().to_vec()), Duration::ZERO, 6_000_000)
+    };
+    let seen = |news: &[News]| news.iter().filter(|news| matches!(news, News::Frame(_))).count();
+    let id = observer.link_id(0);
+    let forged = take(&mut hub, 0, observer.sign(&abort, id, 6_000_000));
+    let (first, second) = (ann.link_id(1), ann.link_id(0));
+    let true_one = take(&mut hub, 1, ann.sign(&abort, first, 6_000_001));
+    let copy = take(&mut hub, 0, ann.sign(&abort, second, 6_000_002));
+    assert_eq!([seen(&forged), seen(&true_one), seen(&copy)], [1, 1, 0]);
 }

@@ -1,8 +1,8 @@
 //! Writes and reads the flight log: an MCAP file of raw frames, controller ticks, simulated truth, telemetry,
 //! operator actions and events.
 //!
-//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `proto/touchdown/` (`log/v1.proto`,
-//! `flight/v1.proto`, `computer/v1.proto`) and, where one fits, Foxglove's own.
+//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `log_records` and, where one fits,
+//! Foxglove's own.
 //! [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a log's contents. Records are flushed so often that a
 //! killed process loses at most a fraction of a second ([`recorder`]).
 
@@ -13,44 +13,6 @@ pub mod recorder;
 pub mod tlog;
 pub mod writer;
 
-/// The records of `proto/touchdown/log/v1.proto`, generated.
-pub mod v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.log.v1.rs"));
-}
-
-/// The records of `proto/touchdown/flight/v1.proto`, generated.
-pub mod flight_v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.flight.v1.rs"));
-}
-
-/// The records of `proto/touchdown/computer/v1.proto`, generated.
-pub mod computer_v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.computer.v1.rs"));
-}
-
-/// Serialised `google.protobuf.FileDescriptorSet` of [`computer_v1`] and what it imports.
-pub const DESCRIPTORS_COMPUTER_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/computer_v1.fds"));
-
-/// Serialised `google.protobuf.FileDescriptorSet` of [`flight_v1`].
-pub const DESCRIPTORS_FLIGHT_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/flight_v1.fds"));
-
-/// Serialised `google.protobuf.FileDescriptorSet` of [`v1`]: the schema data of its MCAP channels.
-pub const DESCRIPTORS_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/log_v1.fds"));
+pub use log_records::{
+    DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, computer_v1, flight_v1, v1,
+};

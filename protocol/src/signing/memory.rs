@@ -7,8 +7,10 @@ use crate::identity::Address;
 
 /// Stored timestamps are this far ahead of the ones in use, so that no timestamp is used twice after a restart.
 pub(super) const LEAD: u64 = 5 * STAMPS_PER_S;
-/// At most this many streams are remembered. Only holders of the key can begin one.
+/// At most this many streams of one key are remembered. Only holders of the key can begin one.
 pub(super) const MAX_STREAMS: usize = 64;
+/// The shared key and fifteen operators'.
+const MAX_KEYS: usize = 16;
 
 /// Why remembered timestamps cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -87,7 +89,7 @@ impl Memory {
                 let [system_id, component_id, link_id] =
                     [system.parse().ok()?, component.parse().ok()?, link.parse().ok()?];
                 let stream = (Address { system_id, component_id }, link_id);
-                if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(&stream) {
+                if self.streams.len() >= MAX_KEYS * MAX_STREAMS && !self.streams.contains_key(&stream) {
                     return None;
                 }
                 self.streams.insert(stream, stamp(heard)?);

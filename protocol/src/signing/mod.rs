@@ -9,6 +9,7 @@
 mod memory;
 mod timestamp;
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use sha2::{Digest as _, Sha256};
@@ -142,10 +143,28 @@ impl SigningCounters {
     }
 }
 
+/// Operators have keys with these numbers; 0 is the key that vehicle and stations share.
+pub const OPERATORS: std::ops::RangeInclusive<u8> = 1..=15;
+/// The bits of a signature's link id that select the key; the others are the number of the link.
+const KEY_BITS: u32 = 4;
+
+/// The number of the key that a signature with this link id names.
+pub(crate) fn key_number(link_id: u8) -> u8 {
+    link_id & ((1 << KEY_BITS) - 1)
+}
+
 /// Signs frames that are sent and checks frames that arrive.
+///
+/// Without operators everybody has one key. With operators each of them has a key of their own, and the link id of a
+/// signature selects the key to check against; the vehicle itself and whoever only looks on use the shared one.
 #[derive(Debug, Clone)]
 pub struct Signing {
-    key: Key,
+    /// The key that signs, and its number.
+    own: (u8, Key),
+    /// The key of frames whose link id names no operator.
+    shared: Key,
+    /// The operators' keys, by number.
+    operators: BTreeMap<u8, Key>,
     memory: Memory,
     /// The latest time that our clock has shown in earlier runs.
     clock_before: u64,
@@ -156,7 +175,51 @@ impl Signing {
     /// Starts with a key and the timestamps remembered from earlier runs.
     pub fn new(key: Key, memory: Memory) -> Self {
         let clock_before = memory.clock;
-        Self { key, memory, clock_before, counters: SigningCounters::default() }
+        Self {
+            own: (0, key.clone()),
+            shared: key,
+            operators: BTreeMap::new(),
+            memory,
+            clock_before,
+            counters: SigningCounters::default(),
+        }
+    }
+
+    /// Checks what the vehicle sends with this key, the one that all share.
+    #[must_use]
+    pub fn checking_with(self, shared: Key) -> Self {
+        Self { shared, ..self }
+    }
+
+    /// Signs with an operator's key from now on; what the vehicle sends is still checked with the shared one.
+    #[must_use]
+    pub fn as_operator(self, number: u8, key: Key) -> Self {
+        Self { own: (key_number(number), key), ..self }
+    }
+
+    /// Checks frames that name an operator with that operator's key. A frame that names an unknown one is refused.
+    #[must_use]
+    pub fn with_operators(self, operators: BTreeMap<u8, Key>) -> Self {
+        Self { operators, ..self }
+    }
+
+    /// The link id of frames over a link: its number, and the number of the key. Links beyond the 16th share an id,
+    /// which costs nothing but exact statistics.
+    pub fn link_id(&self, link: usize) -> u8 {
+        (link as u8) << KEY_BITS | self.own.0
+    }
+
+    /// The number of the operator whose key checks this frame; 0 for the shared key.
+    pub fn operator_of(&self, frame: &Frame) -> u8 {
+        let number = frame.key_number();
+        if self.operators.is_empty() { 0 } else { number }
+    }
+
+    fn key_of(&self, number: u8) -> Option<&Key> {
+        if number == 0 || self.operators.is_empty() {
+            return Some(&self.shared);
+        }
+        self.operators.get(&number)
     }
 
     /// Signs an unsigned frame for one link. `clock` is the time of the system's clock, which may stand still or be
@@ -169,7 +232,7 @@ impl Signing {
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = link_id;
         signature[1..7].copy_from_slice(&self.memory.ours.to_le_bytes()[..6]);
-        let hash = self.key.hash(&[signed.as_bytes(), &signature[..7]].concat());
+        let hash = self.own.1.hash(&[signed.as_bytes(), &signature[..7]].concat());
         signature[7..].copy_from_slice(&hash);
         signed.push_signature(&signature);
         signed
@@ -191,7 +254,9 @@ impl Signing {
     fn judge(&mut self, frame: &Frame, clock: u64) -> Result<(), Rejection> {
         let signature = frame.signature().ok_or(Rejection::Unsigned)?;
         let bytes = frame.as_bytes();
-        if self.key.hash(&bytes[..bytes.len() - 6]) != signature[7..] {
+        let operator = self.operator_of(frame);
+        let right = |key: &Key| key.hash(&bytes[..bytes.len() - 6]) == signature[7..];
+        if !self.key_of(operator).is_some_and(right) {
             return Err(Rejection::Wrong);
         }
         let stamp = signature[1..7].iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte));
@@ -206,7 +271,7 @@ impl Signing {
         let time = if is_set { clock } else { self.memory.ours.max(clock) };
         match self.memory.streams.get(&stream) {
             Some(last) if stamp <= *last => return Err(Rejection::Replayed),
-            None if stamp + NEW_STREAM_LAG < time || self.memory.streams.len() >= MAX_STREAMS => {
+            None if stamp + NEW_STREAM_LAG < time || self.streams_of(operator) >= MAX_STREAMS => {
                 return Err(Rejection::TooOld);
             }
             _ => {}
@@ -215,6 +280,14 @@ impl Signing {
         // What we sign must be newer than everything we have heard.
         self.memory.ours = self.memory.ours.max(stamp);
         Ok(())
+    }
+
+    /// How many streams a key has. One key's holder cannot use up the streams of another.
+    fn streams_of(&self, operator: u8) -> usize {
+        if self.operators.is_empty() {
+            return self.memory.streams.len();
+        }
+        self.memory.streams.keys().filter(|(_, link_id)| key_number(*link_id) == operator).count()
     }
 
     /// Returns whether our clock is known to be set: it shows a time after this program was written, and it has not

@@ -122,6 +122,7 @@ impl<'a> Export<'a> {
                 Entry::World(truth) => self.world(&truth, log_time_ns)?,
                 Entry::ComputerStart(_)
                 | Entry::ComputerFrame(_)
+                | Entry::Estimate(_)
                 | Entry::RawFrame
                 | Entry::Operator
                 | Entry::Event(_)

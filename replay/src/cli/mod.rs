@@ -4,9 +4,12 @@ mod bisect;
 mod compare;
 mod evaluate;
 mod export;
+mod fit;
+mod frames;
 mod gate;
 mod import;
 mod info;
+mod learn;
 mod recover;
 mod refly;
 mod report;
@@ -17,13 +20,15 @@ mod tick;
 mod verify;
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use clap::{Parser, Subcommand};
 use replay::info::Completeness;
 use replay::log::{Cut, Gap, Recording};
+use replay::output::{Destination, NewFile, Overwrite};
 use replay::verify::Verification;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
@@ -40,7 +45,8 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
 ///      shadow: something was flagged;
-///      gate: some flight got worse, lands no longer, diverged or is missing
+///      gate: some flight got worse, lands no longer, diverged or is missing;
+///      learn: NO-GO
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
@@ -97,10 +103,24 @@ enum Question {
     Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
     Export(export::Ask),
+    /// Writes a flight as the frames that `board fly` reads, and the answers that it should give.
+    Frames(frames::Ask),
     /// Converts a ground station's .tlog to a flight log: telemetry only, nothing can be re-executed.
     Import(import::Ask),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
     Recover(recover::Ask),
+    /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
+    ///
+    /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
+    /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is
+    /// compared with its motor's certified curve.
+    Fit(fit::Ask),
+    /// Learns a motor lot, an airframe and a site from all flights so far, and says GO or NO-GO for the next one.
+    ///
+    /// The prior is a set of dispersions; each burn moves it. The day's flights are simulated with motors that the lot may
+    /// have, and the landing rate gets an interval. GO (exit code 0) if the probability of a rate below the limit is at most
+    /// the risk that is taken, NO-GO (exit code 1) if not.
+    Learn(learn::Ask),
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
     Tick(tick::Ask),
 }
@@ -140,6 +160,8 @@ impl Cli {
             Question::Verify(ask) => ask.run(),
             Question::Evaluate(ask) => ask.run(),
             Question::Refly(ask) => ask.run(),
+            Question::Fit(ask) => ask.run(),
+            Question::Learn(ask) => ask.run(),
             Question::Tick(ask) => ask.run(),
             Question::Sweep(ask) => ask.run(),
             Question::Bisect(ask) => ask.run(),
@@ -148,6 +170,7 @@ impl Cli {
             Question::Shadow(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
+            Question::Frames(ask) => ask.run(),
             Question::Import(ask) => ask.run(),
             Question::Recover(ask) => ask.run(),
         }
@@ -161,6 +184,27 @@ fn answer(write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io:
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
     }
+}
+
+/// Writes a new file; an existing one is kept.
+fn write_new(path: &Path, text: &str) -> Result<()> {
+    refuse_existing(path)?;
+    NewFile::create(Destination { path, overwrite: Overwrite::Never }, Path::new(""))
+        .and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.commit()
+        })
+        .with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+/// Refuses a path where a file is, before the work for it is done.
+fn refuse_existing(path: &Path) -> Result<()> {
+    ensure!(
+        path.symlink_metadata().is_err(),
+        "{}: exists already, and nothing is overwritten",
+        path.display()
+    );
+    Ok(())
 }
 
 /// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second

@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use flight::computer::Output;
 use flight::computer::plane::PlaneError;
-use flight::computer::{Computer, Output, flight_time_s};
-use flight::guidance::baseline::{Controller, Law, UnknownController};
+use flight::guidance::baseline::{Controller, UnknownController};
 use prost_reflect::MessageDescriptor;
 use protocol::log::{computer_v1, flight_v1, v1};
-use tick_log::computer::{frame_to_log, input_from_log};
-use tick_log::pilot::state_from_log;
+use tick_log::again::{FrameError, RecordedComputer};
 
-use super::{FrameError, LoggedPilot, Moment, Replayed, phase_name};
+use super::{LoggedPilot, Moment, Replayed, phase_name};
 use crate::log::computer_descriptor;
 use crate::settings::{SettingError, profile_with};
 
@@ -27,14 +26,10 @@ pub enum StartError {
     NoVehicle,
 }
 
-/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order. Missing frames
-/// mean that the computer was restarted: it is restarted here, too.
+/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order.
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
-    computer: Computer,
-    /// The frame after the last one.
-    next: Option<u64>,
-    rehearsed: bool,
+    computer: RecordedComputer,
     last: Option<Output>,
 }
 
@@ -53,22 +48,22 @@ impl LoggedComputer {
             (Some(start), None) => {
                 let schedule = LoggedPilot::schedule(toml, start, &[])?;
                 let controller = run.get("controller").map(|name| name.parse::<Controller>()).transpose()?;
-                let law = Law::of(controller.unwrap_or_default(), schedule.base());
-                Computer::in_space(schedule.base(), law, &state_from_log(&start.believed))
+                RecordedComputer::in_space(schedule.base(), start, controller.unwrap_or_default())
             }
             (None, Some(release)) => {
                 let profile = profile_with(toml, &[])?;
-                Computer::in_plane(&profile, tick_log::state_from_log(release))?
+                RecordedComputer::in_plane(&profile, release)?
             }
             _ => return Err(StartError::NoVehicle),
         };
-        Ok(Self { computer, next: None, rehearsed: false, last: None })
+        Ok(Self { computer, last: None })
     }
 
     /// The pilot's part of the last frame, as a log has it; `None` on the pad and for the planar vehicle.
     pub fn pilot_tick(&self) -> Option<flight_v1::PilotTick> {
-        let (input, output) = self.computer.piloted()?;
-        Some(tick_log::pilot::tick_to_log(input, output, self.computer.flight_digest()))
+        let computer = self.computer.computer();
+        let (input, output) = computer.piloted()?;
+        Some(tick_log::pilot::tick_to_log(input, output, computer.flight_digest()))
     }
 
     /// The landing controller's tick in the last frame, as a log has it except for the measured times; `None` if the
@@ -101,22 +96,9 @@ impl Replayed for LoggedComputer {
         &mut self,
         frame: &computer_v1::ComputerFrame,
     ) -> Result<computer_v1::ComputerFrame, FrameError> {
-        let read = input_from_log(&frame.input)?;
-        let number = frame.input.frame;
-        if let Some(next) = self.next {
-            if number < next {
-                return Err(FrameError::Order { frame: number, after: next - 1 });
-            }
-            if number > next {
-                // It was dead in the missing frames and restarted at the end of the frame before this one.
-                self.computer.restart(flight_time_s(number - 1));
-            }
-        }
-        self.next = Some(number.saturating_add(1));
-        let input = read.input();
-        let output = self.computer.step(&input);
-        let again = frame_to_log(&input, &output, &self.computer, self.rehearsed);
-        self.rehearsed |= input.rehearsed.is_some();
+        let read = self.computer.read(&frame.input)?;
+        let output = self.computer.step(&read);
+        let again = self.computer.record(&read, &output);
         self.last = Some(output);
         Ok(again)
     }

@@ -10,10 +10,12 @@ mod planar;
 mod plans;
 
 pub use computer::{LoggedComputer, StartError};
-pub use pilot::{FrameError, LoggedPilot, SETTINGS_IN_FLIGHT, settings_in_flight};
+pub use pilot::{LoggedPilot, SETTINGS_IN_FLIGHT, settings_in_flight};
 pub(crate) use pilot::{REFLOWN_AT, REFLOWN_BY};
 pub use planar::LoggedController;
 pub use plans::{NewPlans, path_in_world_m};
+
+pub use tick_log::again::FrameError;
 
 use prost::Message;
 use prost_reflect::MessageDescriptor;

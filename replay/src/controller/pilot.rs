@@ -11,7 +11,8 @@ use flight::vehicle::mission::Mission;
 use nmpc::SolveStatus;
 use prost_reflect::MessageDescriptor;
 use protocol::log::flight_v1;
-use tick_log::pilot::{PilotLogError, input_from_log, state_from_log, tick_to_log, vector_from_log};
+use tick_log::again::FrameError;
+use tick_log::pilot::{input_from_log, state_from_log, tick_to_log, vector_from_log};
 
 use super::{Decided, Decides, Moment, Replayed, phase_name};
 use crate::log::pilot_descriptor;
@@ -38,22 +39,6 @@ pub struct LoggedPilot {
     next: u64,
     /// If false, the recorded digests are copied: digests of another schema cover other fields.
     compares_digests: bool,
-}
-
-/// Why a frame was not run again.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
-    /// This build does not know some value of its input.
-    #[error(transparent)]
-    Input(#[from] PilotLogError),
-    /// It is a repetition, or it is out of order.
-    #[error("frame {frame} comes after frame {after}: nothing behind it was compared")]
-    Order {
-        /// Its number.
-        frame: u64,
-        /// The frame before it in the log.
-        after: u64,
-    },
 }
 
 /// The settings that, according to a log, were changed in its flight.

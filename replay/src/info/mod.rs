@@ -112,6 +112,7 @@ impl Seen {
             Entry::ComputerStart(_)
             | Entry::ComputerFrame(_)
             | Entry::Verdict(_)
+            | Entry::Estimate(_)
             | Entry::World(_)
             | Entry::RawFrame
             | Entry::Operator

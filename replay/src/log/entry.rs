@@ -3,9 +3,9 @@
 use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
-    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS,
-    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
-    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE,
+    TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH,
+    TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
 };
 use protocol::log::{computer_v1, flight_v1, v1};
 
@@ -41,6 +41,8 @@ pub enum Entry {
     PilotTick(Box<flight_v1::PilotTick>),
     /// Solve time of a planning frame.
     PilotTiming(flight_v1::PilotTiming),
+    /// What the flight computer believed after a frame.
+    Estimate(Box<flight_v1::Estimate>),
     /// The simulated world of a flight from apogee.
     World(Box<flight_v1::TruthSample>),
     /// The simulated plant.
@@ -81,6 +83,7 @@ impl Entry {
             TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
                 Self::PilotTiming(*timing)
             }),
+            TOPIC_ESTIMATE => decoded(channel, "Estimate", data, Self::Estimate),
             TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
             TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
             TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
@@ -104,7 +107,7 @@ fn decoded<M: Message + Default>(
 ) -> Entry {
     let package = match message_name {
         "ComputerStart" | "ComputerFrame" => PACKAGE_COMPUTER,
-        "PilotStart" | "PilotTick" | "PilotTiming" | "TruthSample" => PACKAGE_FLIGHT,
+        "PilotStart" | "PilotTick" | "PilotTiming" | "Estimate" | "TruthSample" => PACKAGE_FLIGHT,
         _ => PACKAGE,
     };
     let accepted = format!("{package}.{message_name}");

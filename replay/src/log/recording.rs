@@ -181,6 +181,7 @@ impl Recording {
                 }
                 Entry::ComputerStart(_)
                 | Entry::ComputerFrame(_)
+                | Entry::Estimate(_)
                 | Entry::Verdict(_)
                 | Entry::PilotStart(_)
                 | Entry::RawFrame

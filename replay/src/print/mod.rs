@@ -4,9 +4,11 @@
 
 mod compare;
 mod evaluate;
+mod fit;
 mod gate;
 mod info;
 mod junit;
+mod learn;
 mod recover;
 mod refly;
 mod shadow;
@@ -17,9 +19,11 @@ mod verify;
 
 pub use compare::{compare_cases, print_compare};
 pub use evaluate::{print_evaluate, print_evaluate_csv};
+pub use fit::{FitReport, print_fit};
 pub use gate::{GateReport, gate_cases, print_gate};
 pub use info::print_info;
 pub use junit::{JunitCase, JunitOutcome, print_junit};
+pub use learn::print_learn;
 pub use recover::print_recovery;
 pub use refly::print_refly;
 pub use shadow::{ShadowReport, print_flag, print_shadow};

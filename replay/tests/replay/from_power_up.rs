@@ -4,9 +4,10 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use flight::computer::crew::{Asked, Request};
+use flight::computer::crew::{Asked, People, Request};
 use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
+use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
 use flight::vehicle::profile::StartPoint;
 use onboard_sim::vehicle::{RocketFlight, Vehicle, VehicleEvent};
@@ -39,6 +40,30 @@ fn asked(frame: u64, asked: Asked) -> Reached {
     Reached { frame, request, uplink: Uplink::NotNeeded, commander_age_s: None, pin_out: true }
 }
 
+/// A request of one of two operators.
+fn of(frame: u64, role: Role, asked: Asked, confirms: Option<u16>) -> Reached {
+    let by = Some(Operator { number: role as u8, role, name: Name::new("Ann") });
+    let request = Request { asked, uplink: Uplink::NotNeeded, station: Some((255, 190)), by, confirms };
+    Reached { request: Some(request), ..self::asked(frame, asked) }
+}
+
+/// Two people arm and start; then the second one taps this many times.
+fn two_people(taps: u64) -> Vec<Reached> {
+    let (flight, range) = (Role::Flight, Role::RangeSafety);
+    let mut crew = vec![
+        of(100, flight, Asked::Arm, None),
+        // The same role, and the number of another ask.
+        of(105, flight, Asked::Arm, Some(65_535)),
+        of(106, range, Asked::Arm, Some(7)),
+        of(110, range, Asked::Arm, Some(65_535)),
+        of(120, flight, Asked::Start, None),
+        // The numbers have begun again.
+        of(130, range, Asked::Start, Some(1)),
+    ];
+    crew.extend((1..=taps).map(|nth| of(130 + 50 * nth, range, Asked::Tap, None)));
+    crew
+}
+
 /// A crew that arms, starts, and does nothing else.
 fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
@@ -54,11 +79,20 @@ struct Flown {
 
 impl Flown {
     fn in_plane(crew: &[Reached]) -> Self {
+        Self::in_plane_with(crew, |vehicle| vehicle)
+    }
+
+    /// Of a vehicle that two people arm and start.
+    fn by_two(crew: &[Reached]) -> Self {
+        Self::in_plane_with(crew, |vehicle| vehicle.with_crew(People::Two { first_ask: 65_534 }, Vec::new()))
+    }
+
+    fn in_plane_with(crew: &[Reached], prepared: impl FnOnce(Vehicle) -> Vehicle) -> Self {
         let toml = vehicles::profile::BUILTIN.iter().find(|(name, _)| *name == "paper-calibrated").unwrap().1;
         let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
         let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
         let header = LogHeader { profile_toml: Some(toml.to_owned()), ..LogHeader::default() };
-        Self::fly(Vehicle::in_plane(flight), header, crew)
+        Self::fly(prepared(Vehicle::in_plane(flight)), header, crew)
     }
 
     fn in_space(crew: &[Reached], faults: &[&str]) -> Self {
@@ -83,7 +117,8 @@ impl Flown {
             let mut requests = Vec::new();
             while let Some(reached) = crew.next_if(|reached| reached.frame <= frame) {
                 requests.extend(reached.request);
-                let commander = reached.commander_age_s.map(|age_s| Commander { station: (255, 190), age_s });
+                let commander =
+                    reached.commander_age_s.map(|age_s| Commander { station: (255, 190), age_s, by: None });
                 vehicle.set_uplink(reached.uplink, commander);
                 vehicle.set_pin_out(reached.pin_out);
             }
@@ -185,6 +220,29 @@ fn both_vehicles_verify_from_power_up_to_safed() {
 
 /// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and with a booster that
 /// stays; and from below a drone.
+#[test]
+fn what_two_people_do_verifies() {
+    let flown = Flown::by_two(&two_people(5));
+    assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
+    assert_eq!(all_frames_identical(&flown.verified()), flown.frames());
+    // Without taps the countdown is held.
+    let held = Flown::by_two(&two_people(0));
+    assert_eq!(held.phases, [Phase::PadIdle, Phase::PadArmed]);
+    assert_eq!(all_frames_identical(&held.verified()), held.frames());
+    // A log from which a confirmation is taken is not what the computer would have done.
+    let changed = flown.verified_with(
+        |_| true,
+        |record| {
+            if let Record::ComputerFrame(frame) = record
+                && frame.input.frame == 110
+            {
+                frame.input.requests.clear();
+            }
+        },
+    );
+    assert!(changed.frames.is_some_and(|frames| frames.different > 0));
+}
+
 #[test]
 fn flights_from_the_pad_and_from_a_drone_verify() {
     let started = armed_and_started(2_600);
@@ -334,7 +392,7 @@ fn any_crew() -> impl Strategy<Value = Vec<Reached>> {
     );
     let one = one.prop_map(|(frame, asked, uplink, commander_age_s, pin_out, station)| Reached {
         frame,
-        request: asked.map(|asked| Request { asked, uplink, station }),
+        request: asked.map(|asked| Request { asked, uplink, station, by: None, confirms: None }),
         uplink,
         commander_age_s,
         pin_out,

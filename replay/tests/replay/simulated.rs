@@ -70,6 +70,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simul
         deadline_policy: DeadlinePolicy::Observe,
         log_clock: None,
         key_file: None,
+        crew: None,
     };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let (_stop, stopped) = watch::channel(false);

@@ -38,6 +38,9 @@ pub fn encode_to_screen(told: &ToScreen, now: Duration) -> Option<Vec<u8>> {
             out.u8(u8::from(hello.demonstration)).u32(hello.link_capacity_bytes_s);
             out.u8(hello.system_ids[0]).u8(hello.system_ids[1]);
             out.text(&hello.link_name).text(&hello.log_path).text(&hello.tlog_path);
+            out.u8(hello.key_number).text(&hello.key_owner);
+            out.u8(u8::from(hello.mission.is_some()));
+            out.u64(u64::from_le_bytes(hello.mission.unwrap_or_default()));
         }
         ToScreen::Live => drop(out.kind(1)),
         ToScreen::Msg(msg) => encode_msg(msg, &mut out)?,
@@ -189,6 +192,13 @@ fn hello(rest: &mut Reader) -> Result<Hello, CodecError> {
         link_name: rest.text()?,
         log_path: rest.text()?,
         tlog_path: rest.text()?,
+        key_number: rest.u8()?,
+        key_owner: rest.text()?,
+        mission: {
+            let known = rest.u8()? != 0;
+            let hash = rest.u64()?.to_le_bytes();
+            known.then_some(hash)
+        },
     })
 }
 
@@ -263,11 +273,16 @@ fn number_of(kind: CommandKind) -> u8 {
         CommandKind::Disarm => 2,
         CommandKind::Start => 3,
         CommandKind::Abort => 4,
+        CommandKind::ConfirmArm => 5,
+        CommandKind::ConfirmStart => 6,
+        CommandKind::Hold => 7,
+        CommandKind::Tap => 8,
+        CommandKind::TakeCommand => 9,
     }
 }
 
 fn kind_of(number: u8) -> Result<CommandKind, CodecError> {
-    [CommandKind::Arm, CommandKind::Disarm, CommandKind::Start, CommandKind::Abort]
+    CommandKind::ALL
         .into_iter()
         .find(|kind| number_of(*kind) == number)
         .ok_or(CodecError("an unknown command"))

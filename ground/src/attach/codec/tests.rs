@@ -21,7 +21,14 @@ fn back(told: &ToScreen, now: Duration) -> (ToScreen, Duration) {
 
 #[test]
 fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
-    let hello = ToScreen::Hello(Hello { version: VERSION, link_name: "a".to_owned(), ..Hello::default() });
+    let hello = ToScreen::Hello(Hello {
+        version: VERSION,
+        link_name: "a".to_owned(),
+        key_number: 2,
+        key_owner: "Bob".to_owned(),
+        mission: Some([1, 2, 3, 4, 5, 6, 7, 8]),
+        ..Hello::default()
+    });
     assert_eq!(back(&hello, Duration::ZERO).0, hello);
     assert_eq!(back(&ToScreen::Live, Duration::ZERO).0, ToScreen::Live);
     let status =
@@ -134,12 +141,7 @@ fn msg() -> impl Strategy<Value = Msg> {
         let data = HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() };
         Msg::Frame(Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(data)))
     });
-    let kind = prop::sample::select(vec![
-        CommandKind::Arm,
-        CommandKind::Disarm,
-        CommandKind::Start,
-        CommandKind::Abort,
-    ]);
+    let kind = prop::sample::select(CommandKind::ALL.to_vec());
     prop_oneof![
         prop::sample::select(vec![
             Msg::Tick,

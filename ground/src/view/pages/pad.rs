@@ -241,14 +241,23 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
     let counting = vehicle.countdown_s().is_some();
     let keys = &model.settings.keys;
+    let two = model.people() == Some(2);
+    let then = |act: Act, word: &str| {
+        let key = keys.name(act);
+        if two {
+            format!("{key}, {word} Enter, then CONFIRM")
+        } else {
+            format!("{key}, then {word} Enter (10 s)")
+        }
+    };
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
         (model.link.uplink.is_proven(now), "it hears us: uplink proven".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
         (checked, "every check passes".to_owned()),
-        (armed, format!("{}, then ARM Enter (10 s)", keys.name(Act::Arm))),
+        (armed, then(Act::Arm, "ARM")),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
-        (counting, format!("{}, then START Enter (10 s)", keys.name(Act::Start))),
+        (counting, then(Act::Start, "START")),
     ];
     let mut lines: Vec<Line> = rungs
         .into_iter()
@@ -260,6 +269,11 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             ])
         })
         .collect();
+    if let Some(number) = model.commanded_by() {
+        let here = number == model.own_number();
+        let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
+        lines.push(Line::styled(words, theme.style(TextRole::Plain)));
+    }
     lines.push(match model.settings.role.why_not_command() {
         Some(why) => Line::styled(format!(" {why}"), theme.style(TextRole::Label)),
         None => Line::from(vec![

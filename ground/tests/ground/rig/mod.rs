@@ -238,7 +238,12 @@ impl Rig {
     }
 
     pub(crate) fn answer_to(&mut self, target: Address, command: MavCmd, result: u8) {
-        let answer = CommandAnswer { command: command as u16, result, progress: 0, target };
+        self.answer_with(target, command, result, 0);
+    }
+
+    /// The answer names the ask that somebody else has to confirm.
+    pub(crate) fn answer_with(&mut self, target: Address, command: MavCmd, result: u8, detail: i32) {
+        let answer = CommandAnswer { command: command as u16, result, progress: 0, detail, target };
         let frame: Option<Frame> = answer.encode(&mut self.encoder);
         if let Some(frame) = frame {
             self.msg(Msg::Frame(frame));

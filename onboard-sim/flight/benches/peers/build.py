@@ -9,10 +9,11 @@ import landing
 
 def jobs():
     """(solver, intervals, expanded): the whole horizon unrolled, and every shorter one for the warm solves."""
-    for solver in ("fatrop", "ipopt"):
+    asked = [solver for solver in ("fatrop", "ipopt") if solver in os.environ.get("PEERS", solver)]
+    for solver in asked:
         yield (solver, landing.HORIZON, True)
     for intervals in range(landing.HORIZON, 0, -1):
-        for solver in ("fatrop", "ipopt"):
+        for solver in asked:
             yield (solver, intervals, False)
 
 

@@ -7,7 +7,7 @@ import landing
 
 _POINT, _GIMBAL = ca.SX.sym("x", 6), ca.SX.sym("d")
 _AFTER = landing.STEP(_POINT, _GIMBAL)
-_TANGENT = ca.Function(
+tangent = ca.Function(
     "tangent", [_POINT, _GIMBAL], [_AFTER, ca.jacobian(_AFTER, _POINT), ca.jacobian(_AFTER, _GIMBAL)]
 )
 
@@ -40,7 +40,7 @@ def optimality(start, inputs):
     inputs = np.asarray(inputs)
     nodes, tangents = [np.asarray(start, dtype=float)], []
     for gimbal in inputs:
-        after, by_state, by_input = (np.array(m) for m in _TANGENT(nodes[-1], gimbal))
+        after, by_state, by_input = (np.array(m) for m in tangent(nodes[-1], gimbal))
         nodes.append(after.ravel())
         tangents.append((by_state, by_input.ravel()))
     nodes = np.array(nodes)

@@ -4,6 +4,7 @@ use alloc::format;
 use alloc::string::String;
 
 use crate::rules::arming::{self, Check, Uplink};
+use crate::rules::operator::Operator;
 use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal};
 
 use super::news::Severity;
@@ -20,6 +21,38 @@ pub enum Asked {
     Hold,
     /// Abort, irreversibly.
     Abort,
+    /// A tap in the countdown: whoever confirmed the start is still there.
+    Tap,
+    /// Take the command from a station that is silent.
+    TakeCommand,
+}
+
+impl Asked {
+    /// As in `abort refused`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arm => "arm",
+            Self::Disarm => "disarm",
+            Self::Start => "start",
+            Self::Hold => "hold",
+            Self::Abort => "abort",
+            Self::Tap => "tap",
+            Self::TakeCommand => "take-over",
+        }
+    }
+}
+
+/// How many people an arming and a start take. Without one of these there are no operators, and whoever is heard
+/// commands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum People {
+    /// Every operator alone.
+    One,
+    /// Two of different roles.
+    Two {
+        /// Number of the first ask since power-up, another one at each boot: a confirmation from before it names none.
+        first_ask: u16,
+    },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,12 +62,16 @@ pub struct Request {
     pub uplink: Uplink,
     /// MAVLink system and component of the station; `None` for the vehicle's own programme.
     pub station: Option<(u8, u8)>,
+    /// Whose key has signed it; `None` for the key that all stations share, or none.
+    pub by: Option<Operator>,
+    /// The number of the ask that it confirms.
+    pub confirms: Option<u16>,
 }
 
 impl Request {
     /// A request of the vehicle's own programme.
     pub fn of_the_programme(asked: Asked) -> Self {
-        Self { asked, uplink: Uplink::NotNeeded, station: None }
+        Self { asked, uplink: Uplink::NotNeeded, station: None, by: None, confirms: None }
     }
 }
 
@@ -49,6 +86,8 @@ pub enum Ending {
     Denied,
     /// Understood, but impossible.
     Failed,
+    /// Noted: a second person has to confirm it.
+    Asked,
 }
 
 /// The answer to a request, with the reason if it was not accepted.
@@ -74,19 +113,21 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
         Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
         Asked::Hold => mode.hold.is_some(),
         // A second abort may do more than the first: the phase table decides.
-        Asked::Abort => false,
+        Asked::Abort | Asked::Tap | Asked::TakeCommand => false,
     }
 }
 
-/// The event for a request. `abort` is the event that an abort would be now.
-pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: Event) -> Event {
-    match asked {
+/// The event for a request; `None` for one that is no matter of the phase table. `abort` is the event that an abort
+/// would be now.
+pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: Event) -> Option<Event> {
+    Some(match asked {
         Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
         Asked::Disarm => Event::DisarmRequested,
         Asked::Start => Event::StartRequested { countdown_s },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded },
         Asked::Abort => abort,
-    }
+        Asked::Tap | Asked::TakeCommand => return None,
+    })
 }
 
 /// The answer to a request whose event the table has refused; the crew is told the reason.

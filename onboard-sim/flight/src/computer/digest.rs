@@ -1,11 +1,13 @@
 //! Digests of the flight computer's memory: of all of it, and of the part that decides in the air.
 
 use super::self_test::SelfTest;
-use super::{Commands, Computer, LogState, Release, Vehicle};
+use super::{Commands, Computer, CrewMemory, LogState, Release, Vehicle};
 use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::computer::pilot::BoosterCommands;
 use crate::guidance::controller::ControllerState;
+use crate::rules::operator::Operator;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
+use crate::rules::two_person::{Ask, Tapping};
 
 /// The part of the phase table that decides in the air. Times of the vehicle's clock decide nothing there, nor do the
 /// pin and the arming, which a person may change on the ground.
@@ -52,7 +54,24 @@ remembers!(Hold { cause, at_s });
 remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute, booster });
 remembers!(BoosterCommands { ignite, separate });
 remembers!(Release { frame, time_s });
+remembers!(CrewMemory { two_person, held_by });
+
+remembers!(Ask { act, number, by, station, at_s });
+remembers!(Tapping { by, at_s });
 remembers!(LogState { running } but { space_bytes });
+
+impl Remembers for Operator {
+    fn remember(&self, memory: &mut Memory) {
+        [self.number, self.role as u8].remember(memory);
+        self.name.bytes().remember(memory);
+    }
+}
+
+impl Remembers for crate::rules::two_person::Act {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
 
 impl Remembers for HoldCause {
     fn remember(&self, memory: &mut Memory) {
@@ -125,6 +144,9 @@ impl Remembers for Whole<'_> {
             motor_watch,
             log,
             uplink: _,
+            commander: _,
+            people: _,
+            crew,
             fins_answering,
             igniter_continuity,
             release,
@@ -142,6 +164,10 @@ impl Remembers for Whole<'_> {
         igniter_continuity.remember(memory);
         release.remember(memory);
         level.index().remember(memory);
+        // A crew without operators leaves nothing behind, and logs from before there were any have the same digest.
+        if *crew != CrewMemory::default() {
+            crew.remember(memory);
+        }
     }
 }
 

@@ -2,10 +2,11 @@
 
 use alloc::string::String;
 
-use super::crew::{Asked, Request};
+use super::crew::{Asked, People, Request};
 use super::pilot::{PilotInput, Sensed};
 use super::plane::PlaneSensed;
 use crate::rules::arming::{PredictedLanding, Uplink};
+use crate::rules::operator::Operator;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
@@ -47,6 +48,8 @@ pub struct Commander {
     /// MAVLink system and component.
     pub station: (u8, u8),
     pub age_s: f64,
+    /// Whose key it armed with.
+    pub by: Option<Operator>,
 }
 
 /// Everything that a frame depends on besides the computer's memory.
@@ -72,6 +75,8 @@ pub struct Input<'a> {
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
+    /// How many people an arming and a start take; `None` without operators.
+    pub people: Option<People>,
     /// Requests since the last frame, in order.
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over. The planar vehicle rehearses on board.
@@ -84,8 +89,13 @@ impl Input<'_> {
     /// A frame in the air of a computer that was [released at once](Computer::released), made from its record in a
     /// pilot's log: no station is connected, and a recorded abort becomes a request.
     pub fn in_the_air(input: &PilotInput) -> Self {
-        const ABORT: [Request; 1] =
-            [Request { asked: Asked::Abort, uplink: Uplink::NotNeeded, station: None }];
+        const ABORT: [Request; 1] = [Request {
+            asked: Asked::Abort,
+            uplink: Uplink::NotNeeded,
+            station: None,
+            by: None,
+            confirms: None,
+        }];
         Self {
             frame: input.frame,
             time_s: input.time_s,
@@ -99,6 +109,7 @@ impl Input<'_> {
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
             commander: None,
+            people: None,
             requests: if input.abort { &ABORT } else { &[] },
             rehearsed: None,
             late: false,

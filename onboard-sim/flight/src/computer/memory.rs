@@ -81,7 +81,7 @@ macro_rules! whole_numbers {
         })*
     };
 }
-whole_numbers!(bool, u8, u32, u64);
+whole_numbers!(bool, u8, u16, u32, u64);
 
 impl Remembers for usize {
     fn remember(&self, memory: &mut Memory) {

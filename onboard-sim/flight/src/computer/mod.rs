@@ -38,12 +38,13 @@ use alloc::format;
 use alloc::vec::Vec;
 
 pub use self::abort_effect::AbortEffect;
-use self::crew::Answer;
+use self::crew::{Answer, People};
 pub use self::input::{Commander, Feeling, Input, LogState, Rehearsed};
 use self::motor_watch::MotorWatch;
 use self::news::{Readiness, Severity};
 pub use self::output::{Commands, Output};
 use self::plane::{PlanarTick, Plane};
+pub use self::requests::CrewMemory;
 use self::self_test::{ANSWERING_RAD, SelfTest};
 use self::space::Space;
 use self::table::PhaseTable;
@@ -90,6 +91,9 @@ pub struct Computer {
     motor_watch: MotorWatch,
     log: LogState,
     uplink: Uplink,
+    commander: Option<Commander>,
+    people: Option<People>,
+    crew: CrewMemory,
     fins_answering: [bool; 4],
     igniter_continuity: bool,
     release: Option<Release>,
@@ -105,6 +109,7 @@ impl Computer {
         self.feel(input);
         let asked: Vec<Option<Answer>> = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
+        self.watch_the_taps();
         let abort = asked.iter().any(Option::is_none);
         let mut output = self.decide(input, abort);
         self.keep_time();
@@ -142,6 +147,7 @@ impl Computer {
         }
         self.log = input.log;
         self.uplink = input.uplink;
+        (self.people, self.commander) = (input.people, input.commander);
         self.igniter_continuity = input.igniter_continuity;
         let told = self.commands.fins_rad;
         self.fins_answering =
@@ -277,6 +283,11 @@ impl Computer {
     #[cfg(test)]
     pub(crate) fn into_table(self) -> PhaseTable {
         self.table
+    }
+
+    /// What it remembers of its crew: an ask that waits, the taps, who held.
+    pub fn crew(&self) -> &CrewMemory {
+        &self.crew
     }
 
     /// Number of the last frame.

@@ -12,7 +12,7 @@ use super::plane::{Moment, PlanarLaw, Plane, PlaneError};
 use super::self_test::SelfTest;
 use super::space::Space;
 use super::table::PhaseTable;
-use super::{Commands, Computer, LogState, Vehicle};
+use super::{Commands, Computer, CrewMemory, LogState, Vehicle};
 use crate::guidance::baseline::Law;
 use crate::guidance::controller::ControlLevel;
 use crate::rules::arming::Uplink;
@@ -108,6 +108,9 @@ impl Computer {
             motor_watch: MotorWatch::default(),
             log: LogState::NONE,
             uplink: Uplink::NeverHeard,
+            commander: None,
+            people: None,
+            crew: CrewMemory::default(),
             fins_answering: [false; 4],
             igniter_continuity: false,
             release: None,

@@ -143,6 +143,9 @@ pub struct Mission {
     pub powered: PoweredSettings,
     /// The gimbal loop.
     pub aim: AimGains,
+    /// Whether the gimbal holds a vehicle upright that has touched down while the thrust still carries it.
+    #[serde(default)]
+    pub upright_after_contact: bool,
     /// Limits of the pad checks before arming.
     #[serde(default)]
     pub arming: ArmingLimits,

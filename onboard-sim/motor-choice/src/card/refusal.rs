@@ -8,7 +8,7 @@ use super::{CardError, Order, certified_window};
 use crate::choice::{Choice, Limits, Refusal, StartHeight, choose, usual_limits};
 use crate::frame::{Ballast, Frame};
 use crate::source::Candidate;
-use crate::work::in_parallel;
+use campaign::work::in_parallel;
 
 /// Motors that are suggested.
 const MOST: usize = 3;

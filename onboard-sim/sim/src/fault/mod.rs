@@ -29,6 +29,10 @@ pub enum Breakage {
     GyroBiasStep(f64),
     /// Every accelerometer axis has this bias from now on, thousandths of gravity.
     AccelerometerBiasStep(f64),
+    /// Every accelerometer axis reads nothing from now on.
+    AccelerometerDead,
+    /// The barometer's height is wrong by this from now on, m.
+    BarometerStep(f64),
     /// The radio is silent. Nothing on board depends on it.
     LinkLoss,
     /// Messages in both directions arrive this much later, s.
@@ -80,6 +84,8 @@ const NAMES: &[(&str, &str, Build)] = &[
     ("lidar-out", "", |value| value.is_none().then_some(Breakage::LidarOut)),
     ("gyro-bias", "deg/s", |value| value.map(Breakage::GyroBiasStep)),
     ("accelerometer-bias", "mg", |value| value.map(Breakage::AccelerometerBiasStep)),
+    ("accelerometer-dead", "", |value| value.is_none().then_some(Breakage::AccelerometerDead)),
+    ("barometer-step", "m", |value| value.map(Breakage::BarometerStep)),
     ("fin-stuck", "0 to 3", |value| {
         let fin =
             value.filter(|fin| (0.0..=3.0).contains(fin) && libm::trunc(*fin).to_bits() == fin.to_bits())?;
@@ -108,6 +114,7 @@ const NAMES: &[(&str, &str, Build)] = &[
         Some(Breakage::Vehicle(Fault::EarlyBurnout { after_s }))
     }),
     ("ascent-no-light", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::AscentNoLight))),
+    ("ascent-self-lights", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::AscentSelfLights))),
     ("ascent-weak", "thrust over nominal, 0.01 to 1", |value| {
         let scale = value.filter(|scale| (0.01..=1.0).contains(scale))?;
         Some(Breakage::Vehicle(Fault::AscentWeak { scale }))
@@ -223,6 +230,8 @@ impl fmt::Display for TimedFault {
             Breakage::LidarOut => write!(f, "lidar-out"),
             Breakage::GyroBiasStep(deg_s) => write!(f, "gyro-bias:{deg_s}"),
             Breakage::AccelerometerBiasStep(mg) => write!(f, "accelerometer-bias:{mg}"),
+            Breakage::AccelerometerDead => write!(f, "accelerometer-dead"),
+            Breakage::BarometerStep(step_m) => write!(f, "barometer-step:{step_m}"),
             Breakage::Reboot(down_s) => write!(f, "reboot:{down_s}"),
             Breakage::Abort => write!(f, "abort"),
             Breakage::Vehicle(Fault::NoLight) => write!(f, "no-light"),
@@ -230,6 +239,7 @@ impl fmt::Display for TimedFault {
             Breakage::Vehicle(Fault::WeakMotor { scale }) => write!(f, "weak-motor:{scale}"),
             Breakage::Vehicle(Fault::EarlyBurnout { after_s }) => write!(f, "early-burnout:{after_s}"),
             Breakage::Vehicle(Fault::AscentNoLight) => write!(f, "ascent-no-light"),
+            Breakage::Vehicle(Fault::AscentSelfLights) => write!(f, "ascent-self-lights"),
             Breakage::Vehicle(Fault::AscentWeak { scale }) => write!(f, "ascent-weak:{scale}"),
             Breakage::Vehicle(Fault::SeparationFails) => write!(f, "separation-fails"),
             Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
@@ -252,6 +262,9 @@ mod tests {
             "fin-stuck:2@apogee",
             "gimbal-slow:0.3@ignition+0.3",
             "gimbal-stuck@powered",
+            "accelerometer-dead@boost",
+            "barometer-step:-20@coast+1",
+            "ascent-self-lights@12",
             "gimbal-jams:3@powered+0.5..2",
             "ascent-weak:0.6@boost",
             "ascent-no-light@0",

@@ -107,6 +107,7 @@ impl PlanarFlight {
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
+            people: outside.people,
             requests: outside.requests,
             rehearsed: None,
             late: self.late,

@@ -19,6 +19,8 @@ impl Sortie {
             Breakage::AccelerometerBiasStep(mg) => {
                 sensors.accelerometer_bias_step_m_s2 += every * (1e-3 * mg * STANDARD_GRAVITY_M_S2);
             }
+            Breakage::AccelerometerDead => sensors.accelerometer_dead = true,
+            Breakage::BarometerStep(step_m) => sensors.barometer_step_m += step_m,
             Breakage::LinkLoss => self.radio.silent = true,
             Breakage::LinkDelay(delay_s) => self.radio.delay_s = delay_s,
             Breakage::Reboot(down_s) => self.reboot(down_s),

@@ -239,6 +239,7 @@ impl Sortie {
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
+            people: outside.people,
             requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
             late: false,

@@ -53,7 +53,7 @@ impl Wire {
         let mut sent = Vec::new();
         for frame in 0.. {
             for request in ask(frame) {
-                self.endpoint.on_command(0, &request, &self.vehicle);
+                self.endpoint.on_command(0, (&request, None), &self.vehicle);
             }
             sent.extend(self.run(0.001).into_iter().map(|frame| (self.vehicle.time_s(), frame)));
             if self.vehicle.time_s() >= end_s {
@@ -133,7 +133,7 @@ fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
         let mut wire = new();
         assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
         wire.run_asked(5.0, flood);
-        wire.endpoint.on_command(0, &from(255, 185, 1.0, 0.0), &wire.vehicle);
+        wire.endpoint.on_command(0, (&from(255, 185, 1.0, 0.0), None), &wire.vehicle);
         let aborted_at_s = wire.vehicle.time_s();
         let sent = wire.run_asked(3.0, |frame| {
             let mut asked = flood(frame);

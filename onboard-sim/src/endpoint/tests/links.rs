@@ -31,7 +31,7 @@ impl Wire {
             params: [message_id as f32, interval_us, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(link, &request, &self.vehicle);
+        self.endpoint.on_command(link, (&request, None), &self.vehicle);
         self.run_links(0.1)[link].iter().find_map(CommandAnswer::from_frame).unwrap().result
     }
 }

@@ -109,7 +109,7 @@ fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
         assert_eq!(count(&wire.run(0.5), message_id), 1, "message {message_id}");
         assert_eq!(wire.ask(511, message_id as f32, 1e6).0, 0);
         assert!((4..=6).contains(&count(&wire.run(5.0), message_id)), "message {message_id} at 1 Hz");
@@ -121,7 +121,7 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     let mut wire = Wire::new();
     let request =
         CommandRequest { source: GROUND, target: VEHICLE, command: 410, params: [0.0; 7], confirmation: 0 };
-    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     let sent = wire.run(1.5);
     let home = find(&sent, |message| match message {
         MavMessage::HOME_POSITION(home) => Some((home.latitude, home.longitude, home.altitude)),

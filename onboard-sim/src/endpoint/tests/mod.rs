@@ -119,14 +119,15 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_kept() {
-    assert!(Streams::of(&STANDARD).fit(), "{} B/s", Streams::of(&STANDARD).bytes_s());
+    let streams = Streams::of(&STANDARD);
+    assert!(streams.fit(), "{} B/s", streams.bytes_s());
     let mut wire = Wire::new();
     let sent = wire.run(10.0);
     for standard in &STANDARD {
         if standard.message_id == TD_LANDING_VERDICT_DATA::ID {
             continue;
         }
-        let expected = 10.0 * standard.rate_hz;
+        let expected = 10.0 * streams.rate_hz(standard.message_id);
         let found = count(&sent, standard.message_id) as f64;
         assert!((found - expected).abs() <= 1.0, "message {}: {found} of {expected}", standard.message_id);
     }
@@ -219,13 +220,16 @@ fn intervals_can_be_set_within_the_budget_and_read_back() {
     assert!(words.contains("budget is 2000"), "{words}");
     wire.endpoint.on_command(
         0,
-        &CommandRequest {
-            source: GROUND,
-            target: VEHICLE,
-            command: 512,
-            params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
-            confirmation: 0,
-        },
+        (
+            &CommandRequest {
+                source: GROUND,
+                target: VEHICLE,
+                command: 512,
+                params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
+                confirmation: 0,
+            },
+            None,
+        ),
         &wire.vehicle,
     );
     let interval = wire.run(0.5).iter().find_map(|frame| match frame.decode() {
@@ -245,10 +249,10 @@ fn every_phase_has_a_name_for_other_people_s_clients() {
         params: [AVAILABLE_MODES_DATA::ID as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     // A second request while the first still waits is refused for now, so that the queue stays bounded.
     for _ in 0..3 {
-        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     }
     // They use the room that telemetry leaves.
     let sent = wire.run(8.0);
@@ -293,7 +297,7 @@ fn a_flood_of_requests_does_not_silence_telemetry() {
             params: [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        wire.endpoint.on_command(0, &request, &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     }
     wire.run(2.0);
     assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 18);
@@ -358,6 +362,7 @@ proptest! {
 }
 
 mod budget;
+mod crew;
 mod links;
 mod manners;
 mod questions;

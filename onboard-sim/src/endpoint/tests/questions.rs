@@ -127,7 +127,7 @@ fn set_rates(wire: &mut Wire, station: Address) -> (u8, f32, String) {
         params: [TD_FINS_DATA::ID as f32, 500_000.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, &request, &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
     let sent = wire.run(0.2);
     let answer = sent.iter().find_map(CommandAnswer::from_frame).unwrap();
     let (values, words) = wire.set("RATE_FINS", 1.0, MavParamType::MAV_PARAM_TYPE_REAL32);
@@ -149,7 +149,7 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
         params: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, &again, &wire.vehicle);
+    wire.endpoint.on_command(0, (&again, None), &wire.vehicle);
     wire.run(0.2);
     assert_eq!(wire.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
     assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);

@@ -86,7 +86,7 @@ impl Airborne {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(0, &request, &self.rocket);
+        self.endpoint.on_command(0, (&request, None), &self.rocket);
         let sent = self.run(0.3);
         let found = sent
             .iter()
@@ -98,7 +98,8 @@ impl Airborne {
 
 #[test]
 fn its_standard_rates_fit_the_radio_signed_or_not() {
-    for streams in [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE)] {
+    let all = [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE), Streams::with_crew(&FROM_APOGEE)];
+    for streams in all {
         assert!(streams.fit(), "{} B/s", streams.bytes_s());
         assert!(streams.rate_hz(LOCAL_POSITION_NED_DATA::ID) >= 3.0);
     }

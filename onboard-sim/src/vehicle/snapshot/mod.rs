@@ -1,5 +1,6 @@
 //! A vehicle's state at one instant, for telemetry: what its flight computer believes.
 
+mod crew;
 mod plane;
 mod space;
 
@@ -16,7 +17,8 @@ use nmpc::SolveStatus;
 
 use sim::plane::plant::Impact;
 
-use super::{Flight, Vehicle};
+pub use self::crew::CrewFacts;
+use super::{Flight, MissionName, Vehicle};
 
 /// Points of a predicted path, at most.
 pub const PATH_POINTS: usize = 12;
@@ -80,6 +82,10 @@ pub struct Snapshot {
     pub site: Site,
     /// Altitude of the pad above the sea, m.
     pub pad_altitude_m: f64,
+    /// Who commands and what is asked; `None` without operators.
+    pub crew: Option<CrewFacts>,
+    /// Which mission or profile it flies.
+    pub mission: MissionName,
 }
 
 /// Position, velocity, attitude and rotation, north-east-down. Body axes: x towards the nose.
@@ -329,6 +335,8 @@ impl Vehicle {
             sensors: None,
             site: Site::default(),
             pad_altitude_m: 0.0,
+            crew: self.crew_facts(),
+            mission: self.mission.clone(),
         }
     }
 }

@@ -101,7 +101,7 @@ impl Vehicle {
                 horizontal_sigma_m: sigmas.position_m.xy().max(),
                 height_sigma_m: sigmas.position_m.z,
             }),
-            ..*standing
+            ..standing.clone()
         }
     }
 

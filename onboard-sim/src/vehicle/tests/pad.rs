@@ -150,6 +150,68 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
     }
 }
 
+/// Detections that come early or late because a sensor lies, each with its outcome.
+#[test]
+fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
+    // What happens in order, and how the vehicle moves vertically when it believes in its apogee, m/s.
+    let cases: [(&str, &[Phase], core::ops::Range<f64>); 5] = [
+        // Lift-off is late, seen by the barometer alone, and the booster stays: the estimate falls all the time.
+        (
+            "accelerometer-dead@0",
+            &[Phase::PadArmed, Phase::Boost, Phase::Chute, Phase::Touchdown],
+            -5.0..12.0,
+        ),
+        (
+            "accelerometer-dead@boost+1",
+            &[Phase::PadArmed, Phase::Boost, Phase::Chute, Phase::Touchdown],
+            -5.0..12.0,
+        ),
+        // Two metres a second squared too much: the estimate still rises when the barometer already sinks.
+        ("accelerometer-bias:200@boost", &[], -15.0..1.0),
+        ("accelerometer-bias:-200@boost", &[], -1.0..12.0),
+        // A pressure that jumps is passed again.
+        ("barometer-step:-20@coast+0.5", &[], -1.0..1.0),
+    ];
+    for (fault, expected, believed_m_s) in cases {
+        let (rocket, events) = flown(from(StartPoint::Pad, "field", &[fault]));
+        let seen = phases(&events);
+        assert!(expected.is_empty() || seen == expected, "{fault}: {seen:?}");
+        let fall_m_s = sortie(&rocket).fell_from().velocity_m_s.z;
+        assert!(believed_m_s.contains(&fall_m_s), "{fault}: {fall_m_s} m/s, {seen:?}");
+        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
+        assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
+    }
+}
+
+/// A motor that nobody lit, in every state of the pad: if the vehicle was armed it flies its mission, else it comes down
+/// under its parachute without the landing motor.
+#[test]
+fn an_ascent_motor_that_lights_itself_is_flown() {
+    let ways: [(Phase, &[Asked], Phase); 4] = [
+        (Phase::PadIdle, &[], Phase::Chute),
+        (Phase::PadArmed, &[], Phase::Powered),
+        (Phase::PadArmed, &[Asked::Start], Phase::Powered),
+        (Phase::PadArmed, &[Asked::Start, Asked::Hold], Phase::Powered),
+    ];
+    for (phase, asked, way_down) in ways {
+        let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(phase);
+        for asked in asked {
+            assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
+        }
+        rocket.advance();
+        let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
+        space.sortie.world_mut().inject(&world::Fault::AscentSelfLights);
+        let events = rocket.run_until(Vehicle::is_over);
+        let seen = phases(&events);
+        assert!(said(&events, "LIFT-OFF without a countdown"), "{asked:?}: {seen:?}");
+        assert!(seen.contains(&way_down), "{asked:?}: {seen:?}");
+        let inhibited = rocket.snapshot().interlocks.abort_latched;
+        assert_eq!(inhibited, way_down == Phase::Chute, "{asked:?}");
+        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
+    }
+}
+
 #[test]
 fn below_a_drone_it_swings_is_armed_and_falls_when_it_is_let_go() {
     let (rocket, events) = flown(from(StartPoint::Drone, "none", &[]));

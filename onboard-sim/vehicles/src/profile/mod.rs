@@ -4,6 +4,9 @@
 
 mod validate;
 
+use alloc::borrow::ToOwned as _;
+use alloc::string::{String, ToString as _};
+
 use flight::vehicle::profile::Profile;
 
 /// The built-in profiles: name and TOML text.
@@ -30,7 +33,7 @@ pub enum ProfileError {
         /// Where the text came from (a path or a built-in's name).
         origin: String,
         /// The key, with its section.
-        key: &'static str,
+        key: String,
         found: String,
         /// The accepted range, in words.
         required: &'static str,

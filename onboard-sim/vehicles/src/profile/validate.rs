@@ -1,38 +1,9 @@
 //! Range checks of a parsed profile: one line for each key.
 
-use core::fmt::Display;
-
 use flight::guidance::controller::MAX_HORIZON_STEPS;
 use flight::vehicle::profile::Profile;
 
-/// A value outside its range.
-pub(super) struct BadValue {
-    pub(super) key: &'static str,
-    pub(super) found: String,
-    pub(super) required: &'static str,
-}
-
-type Check = Result<(), BadValue>;
-
-fn require(ok: bool, key: &'static str, found: impl Display, required: &'static str) -> Check {
-    if ok { Ok(()) } else { Err(BadValue { key, found: found.to_string(), required }) }
-}
-
-fn finite(key: &'static str, value: f64) -> Check {
-    require(value.is_finite(), key, value, "a finite number")
-}
-
-fn positive(key: &'static str, value: f64) -> Check {
-    require(value.is_finite() && value > 0.0, key, value, "a finite number above 0")
-}
-
-fn not_negative(key: &'static str, value: f64) -> Check {
-    require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more")
-}
-
-fn angle_below_right(key: &'static str, value_deg: f64) -> Check {
-    require(value_deg > 0.0 && value_deg < 90.0, key, value_deg, "above 0 and below 90")
-}
+use super::super::ranges::{self, Check, angle_below_right, finite, not_negative, positive, require};
 
 pub(super) fn validate(profile: &Profile) -> Check {
     require(!profile.name.trim().is_empty(), "name", "\"\"", "a name")?;
@@ -40,7 +11,9 @@ pub(super) fn validate(profile: &Profile) -> Check {
     actuators(profile)?;
     start(profile)?;
     nmpc(profile)?;
-    limits(profile)?;
+    ranges::touchdown_limits(&profile.touchdown_limits)?;
+    ranges::arming(&profile.arming)?;
+    ranges::gate(&profile.gate)?;
     if let Some((key, found, required)) = profile.site.bad_value() {
         require(false, key, found, required)?;
     }
@@ -122,14 +95,7 @@ fn nmpc(profile: &Profile) -> Check {
         nmpc.actuation_delay_steps,
         "1: a command is applied one sample after the state it answers",
     )?;
-    let weights = &nmpc.weights;
-    not_negative("nmpc.weights.x", weights.x)?;
-    not_negative("nmpc.weights.z", weights.z)?;
-    not_negative("nmpc.weights.theta", weights.theta)?;
-    not_negative("nmpc.weights.u", weights.u)?;
-    not_negative("nmpc.weights.w", weights.w)?;
-    not_negative("nmpc.weights.q", weights.q)?;
-    positive("nmpc.weights.delta", weights.delta)?;
+    ranges::weights("nmpc", &nmpc.weights)?;
     angle_below_right("nmpc.limits.gimbal_deg", nmpc.limits.gimbal_deg)?;
     require(
         nmpc.limits.gimbal_deg <= profile.gimbal.limit_deg,
@@ -148,50 +114,9 @@ fn nmpc(profile: &Profile) -> Check {
             end.settled_nodes,
             "from 1 to nmpc.horizon_steps",
         )?;
-        positive("nmpc.limits.final.pitch_error_deg", end.pitch_error_deg)?;
-        finite("nmpc.limits.final.u_max_m_s", end.u_max_m_s)?;
-        require(
-            end.u_min_m_s.is_finite() && end.u_min_m_s < end.u_max_m_s,
-            "nmpc.limits.final.u_min_m_s",
-            end.u_min_m_s,
-            "finite and below nmpc.limits.final.u_max_m_s",
-        )?;
-        positive("nmpc.limits.final.w_m_s", end.w_m_s)?;
-        positive("nmpc.limits.final.pitch_rate_deg_s", end.pitch_rate_deg_s)?;
+        ranges::final_box("nmpc.limits", end)?;
     }
-    let solver = &nmpc.solver;
-    require(
-        (1..=1000).contains(&solver.max_iterations),
-        "nmpc.solver.max_iterations",
-        solver.max_iterations,
-        "from 1 to 1000",
-    )?;
-    require(
-        solver.max_iterations_after_miss <= solver.max_iterations,
-        "nmpc.solver.max_iterations_after_miss",
-        solver.max_iterations_after_miss,
-        "at most nmpc.solver.max_iterations",
-    )?;
-    positive("nmpc.solver.kkt_tolerance", solver.kkt_tolerance)?;
-    positive("nmpc.solver.terminal_penalty", solver.terminal_penalty)?;
-    require(
-        (1..=1000).contains(&solver.qp_max_iterations),
-        "nmpc.solver.qp_max_iterations",
-        solver.qp_max_iterations,
-        "from 1 to 1000",
-    )?;
-    require(
-        (0.0..=1.0).contains(&solver.guess_amplitude_rad),
-        "nmpc.solver.guess_amplitude_rad",
-        solver.guess_amplitude_rad,
-        "from 0 to 1",
-    )?;
-    require(
-        (1..=10).contains(&solver.guess_half_waves),
-        "nmpc.solver.guess_half_waves",
-        solver.guess_half_waves,
-        "from 1 to 10",
-    )?;
+    ranges::solver("nmpc", &nmpc.solver)?;
     let decay = profile.stabiliser.decay_rate_per_s;
     require(
         decay.is_finite() && decay > 0.0 && decay * nmpc.sample_time_s <= 2.0,
@@ -199,32 +124,6 @@ fn nmpc(profile: &Profile) -> Check {
         decay,
         "above 0 and at most 2 / nmpc.sample_time_s",
     )
-}
-
-fn limits(profile: &Profile) -> Check {
-    let touchdown = &profile.touchdown_limits;
-    positive("touchdown_limits.x_m", touchdown.x_m)?;
-    finite("touchdown_limits.altitude_min_m", touchdown.altitude_min_m)?;
-    require(
-        touchdown.altitude_max_m.is_finite() && touchdown.altitude_max_m > touchdown.altitude_min_m,
-        "touchdown_limits.altitude_max_m",
-        touchdown.altitude_max_m,
-        "finite and above touchdown_limits.altitude_min_m",
-    )?;
-    positive("touchdown_limits.pitch_error_deg", touchdown.pitch_error_deg)?;
-    positive("touchdown_limits.u_m_s", touchdown.u_m_s)?;
-    positive("touchdown_limits.w_m_s", touchdown.w_m_s)?;
-    positive("touchdown_limits.pitch_rate_deg_s", touchdown.pitch_rate_deg_s)?;
-    let arming = &profile.arming;
-    positive("arming.tilt_max_deg", arming.tilt_max_deg)?;
-    positive("arming.rotation_max_deg_s", arming.rotation_max_deg_s)?;
-    positive("arming.speed_max_m_s", arming.speed_max_m_s)?;
-    let gate = &profile.gate;
-    positive("gate.tilt_max_deg", gate.tilt_max_deg)?;
-    positive("gate.pitch_rate_max_deg_s", gate.pitch_rate_max_deg_s)?;
-    positive("gate.speed_error_max_fraction", gate.speed_error_max_fraction)?;
-    positive("gate.height_disagreement_max_m", gate.height_disagreement_max_m)?;
-    positive("gate.fence_radius_m", gate.fence_radius_m)
 }
 
 fn scatter(profile: &Profile) -> Check {

@@ -4,6 +4,11 @@ mod plausible;
 mod rasp;
 mod rocksim;
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 
 pub use self::rasp::to_rasp;

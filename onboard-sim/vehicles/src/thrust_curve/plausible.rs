@@ -1,5 +1,6 @@
 //! Finds masses and sizes in the wrong unit: a motor with grams in the place of kilograms parses, but cannot exist.
 
+use alloc::format;
 use core::f64::consts::PI;
 
 use flight::vehicle::thrust_curve::ThrustCurve;

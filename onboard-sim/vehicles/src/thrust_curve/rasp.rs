@@ -7,6 +7,10 @@
 //!
 //! The point (0, 0) comes before the first point and is not in the file.
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use core::fmt::Write as _;
 
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};

@@ -1,6 +1,10 @@
 //! `RockSim` motor files: XML with one `engine` element. Its attributes hold the data (mm, g), its `eng-data` elements
 //! the points (s, N).
 
+use alloc::borrow::ToOwned as _;
+use alloc::string::ToString as _;
+use alloc::vec::Vec;
+
 use flight::vehicle::thrust_curve::MotorData;
 use roxmltree::{Document, Node};
 

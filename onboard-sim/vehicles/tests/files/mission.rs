@@ -82,14 +82,73 @@ fn mk3_flies_with_the_numbers_of_mk2() {
 fn an_expectation_out_of_range_is_named_in_the_error() {
     let (name, text) = BUILTIN[0];
     for (key, wrong, said) in [
-        ("shape_lasts_s", "0.0", "motor.shape_lasts_s is 0; a finite number above 0 is accepted"),
-        ("shape_sigma", "nan", "motor.shape_sigma is NaN; a finite number not below 0 is accepted"),
-        ("body_loss", "7.0", "exhaust.body_loss is 7; -1 to 1 is accepted"),
-        ("mounting_deg", "-2.0", "estimator: mounting_deg is -2, accepted is a finite number not below 0"),
+        ("shape_lasts_s", "0.0", "mk2: motor.shape_lasts_s = 0: must be a finite number above 0"),
+        ("shape_sigma", "nan", "mk2: motor.shape_sigma = NaN: must be a finite number not below 0"),
+        ("body_loss", "7.0", "mk2: exhaust.body_loss = 7: must be -1 to 1"),
+        (
+            "mounting_deg",
+            "-2.0",
+            "mk2: estimator: mounting_deg is -2, accepted is a finite number not below 0",
+        ),
     ] {
         let line = text.lines().find(|line| line.starts_with(&format!("{key} ="))).unwrap();
         let error = from_toml(&text.replace(line, &format!("{key} = {wrong}")), name).unwrap_err();
-        let source = std::error::Error::source(&error).unwrap().to_string();
-        assert_eq!(source, said);
+        assert_eq!(full(&error), said);
     }
+}
+
+/// Every number of a mission, by its path, with another value in its place.
+fn with_each_number(text: &str, value: f64, mut look: impl FnMut(&str, String)) {
+    fn paths(table: &dyn toml_edit::TableLike, path: &[String], found: &mut Vec<Vec<String>>) {
+        for (key, item) in table.iter() {
+            let path = [path, &[key.to_owned()]].concat();
+            match item {
+                _ if item.is_float() => found.push(path),
+                toml_edit::Item::Value(toml_edit::Value::Array(numbers)) => {
+                    found.extend((0..numbers.len()).map(|at| [&path[..], &[at.to_string()]].concat()));
+                }
+                _ => {
+                    if let Some(table) = item.as_table_like() {
+                        paths(table, &path, found);
+                    }
+                }
+            }
+        }
+    }
+    let document: toml_edit::DocumentMut = text.parse().unwrap();
+    let mut found = Vec::new();
+    paths(document.as_table(), &[], &mut found);
+    assert!(found.len() > 80, "{}", found.len());
+    for path in found {
+        let mut changed = document.clone();
+        let mut item = changed.as_item_mut();
+        for key in &path {
+            item = match key.parse::<usize>() {
+                Ok(at) => &mut item[at],
+                Err(_) => &mut item[key.as_str()],
+            };
+        }
+        *item = toml_edit::value(value);
+        look(&path.join("."), changed.to_string());
+    }
+}
+
+#[test]
+fn no_number_of_a_mission_may_be_nan_or_absurd() {
+    for name in ["mk2", "vlr"] {
+        let text = BUILTIN.iter().find(|(known, _)| *known == name).unwrap().1;
+        for value in [f64::NAN, f64::INFINITY, -1e9] {
+            with_each_number(text, value, |path, changed| {
+                let told = from_toml(&changed, "changed").err().map(|error| full(&error));
+                let key = path.split('.').rfind(|key| key.parse::<usize>().is_err()).unwrap();
+                assert!(told.as_ref().is_some_and(|told| told.contains(key)), "{path} = {value}: {told:?}");
+            });
+        }
+    }
+}
+
+/// An error with its causes.
+fn full(error: &dyn core::error::Error) -> String {
+    let causes = core::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }

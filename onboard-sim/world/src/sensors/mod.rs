@@ -106,6 +106,10 @@ pub struct SensorFaults {
     pub gyro_bias_step_rad_s: Vector3<f64>,
     /// Added to the accelerometer's bias, body, m/s^2.
     pub accelerometer_bias_step_m_s2: Vector3<f64>,
+    /// Every axis of the accelerometer reads nothing.
+    pub accelerometer_dead: bool,
+    /// Added to the barometer's height, m.
+    pub barometer_step_m: f64,
 }
 
 /// The true sensor errors that a filter estimates, for comparison.
@@ -214,7 +218,10 @@ impl Sensors {
         }
         Some(Measurements {
             imu: self.imu(truth.burning, faults),
-            pressure_altitude_m: self.barometer(truth).filter(|_| !faults.barometer_out),
+            pressure_altitude_m: self
+                .barometer(truth)
+                .filter(|_| !faults.barometer_out)
+                .map(|height_m| height_m + faults.barometer_step_m),
             gnss: self.arrived(),
             lidar_range_m: self.lidar(truth).filter(|_| !faults.lidar_out),
         })
@@ -274,6 +281,8 @@ impl Sensors {
             + self.errors.accelerometer_bias_m_s2
             + faults.accelerometer_bias_step_m_s2
             + force_white;
+
+        let force = if faults.accelerometer_dead { Vector3::zeros() } else { force };
 
         let clip = |value: Vector3<f64>, range: f64| value.map(|axis| axis.clamp(-range, range));
         ImuSample {

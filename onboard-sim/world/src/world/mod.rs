@@ -185,7 +185,10 @@ impl World {
                     servo.stick();
                 }
             }
-            Fault::AscentNoLight | Fault::AscentWeak { .. } | Fault::SeparationFails => {
+            Fault::AscentNoLight
+            | Fault::AscentSelfLights
+            | Fault::AscentWeak { .. }
+            | Fault::SeparationFails => {
                 if let Some(stack) = &mut self.stack {
                     stack.break_down(fault);
                 }

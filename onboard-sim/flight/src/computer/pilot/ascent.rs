@@ -26,6 +26,18 @@ const FALLING_FRAMES: u32 = 3;
 /// says. It is six times the noise of a barometer in its own exhaust or wake.
 const SUNK_M: f64 = 6.0;
 const SUNK_S: f64 = 0.2;
+/// A vehicle this far above its first pressure altitude, m, for [`RISEN_S`] has lifted off, whatever it feels. Gusts over the
+/// static ports show a metre or two.
+const RISEN_M: f64 = 15.0;
+const RISEN_S: f64 = 0.1;
+/// A pressure altitude that gained [`CLIMBED_M`] in [`CLIMBED_S`] climbs at 10 m/s or more: no estimate makes an apogee of
+/// that. Noise of a barometer gains 0.5 m.
+const CLIMBED_M: f64 = 2.0;
+const CLIMBED_S: f64 = 0.2;
+/// While the estimate still rises faster than this, m/s, the barometer's word needs [`SUNK_FAST_S`]: a pressure that jumps by
+/// 20 m is passed again after half a second at 40 m/s.
+const RISES_FAST_M_S: f64 = 15.0;
+const SUNK_FAST_S: f64 = 1.0;
 /// After the separation charge the pressure in the vehicle is not that of the air, s: three times its time of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
 
@@ -55,6 +67,13 @@ pub(super) struct AscentWatch {
     falling_frames: u32,
     highest_m: f64,
     sunk_s: f64,
+    /// The first pressure altitude.
+    ground_m: Option<f64>,
+    risen_s: f64,
+    /// Where and when the present window of [`CLIMBED_S`] began, and whether the last one gained [`CLIMBED_M`].
+    mark_m: f64,
+    marked_at_s: f64,
+    climbing: bool,
 }
 
 remembers!(AscentWatch {
@@ -64,7 +83,12 @@ remembers!(AscentWatch {
     separating_since_s,
     falling_frames,
     highest_m,
-    sunk_s
+    sunk_s,
+    ground_m,
+    risen_s,
+    mark_m,
+    marked_at_s,
+    climbing
 });
 
 impl Default for AscentWatch {
@@ -77,6 +101,11 @@ impl Default for AscentWatch {
             falling_frames: 0,
             highest_m: f64::NEG_INFINITY,
             sunk_s: 0.0,
+            ground_m: None,
+            risen_s: 0.0,
+            mark_m: f64::INFINITY,
+            marked_at_s: f64::NEG_INFINITY,
+            climbing: false,
         }
     }
 }
@@ -123,6 +152,11 @@ impl AscentWatch {
         if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
             return Some(Event::LiftOff);
         }
+        // The second opinion counts while a lift-off is expected: in a day on the pad the weather moves by 15 m.
+        if seen.phase == Phase::Boost && self.risen_s >= RISEN_S {
+            self.lifted_off = true;
+            return Some(Event::LiftOff);
+        }
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
     }
 
@@ -139,15 +173,26 @@ impl AscentWatch {
 
     fn has_passed_apogee(&mut self, seen: &AscentSeen) -> bool {
         self.falling_frames = if seen.vertical_m_s < 0.0 { self.falling_frames + 1 } else { 0 };
-        self.falling_frames >= FALLING_FRAMES || self.sunk_s >= SUNK_S
+        let climbs = self.climbing && seen.time_s - self.marked_at_s < CLIMBED_S;
+        let sunk_s = if seen.vertical_m_s > RISES_FAST_M_S { SUNK_FAST_S } else { SUNK_S };
+        (self.falling_frames >= FALLING_FRAMES && !climbs) || self.sunk_s >= sunk_s
     }
 
     fn feel_the_pressure(&mut self, seen: &AscentSeen) {
         let disturbed = self.separating_since_s.is_some_and(|since_s| seen.time_s - since_s < CHARGE_LASTS_S);
         if let Some(altitude_m) = seen.pressure_altitude_m.filter(|_| !disturbed) {
             self.highest_m = self.highest_m.max(altitude_m);
+            self.ground_m.get_or_insert(altitude_m);
+            let gained = altitude_m >= self.mark_m + CLIMBED_M;
+            if gained || seen.time_s - self.marked_at_s >= CLIMBED_S {
+                (self.climbing, self.mark_m, self.marked_at_s) = (gained, altitude_m, seen.time_s);
+            }
         }
         // Samples come in some frames only; between them the last one counts.
+        let ground_m = self.ground_m.unwrap_or(f64::INFINITY);
+        let risen =
+            seen.pressure_altitude_m.map_or(self.risen_s > 0.0, |altitude_m| altitude_m > ground_m + RISEN_M);
+        self.risen_s = if risen && !disturbed { self.risen_s + seen.frame_s } else { 0.0 };
         let sunk = seen
             .pressure_altitude_m
             .map_or(self.sunk_s > 0.0, |altitude_m| altitude_m < self.highest_m - SUNK_M);
@@ -192,6 +237,8 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec::Vec;
+
     use super::*;
 
     fn seen(time_s: f64, phase: Phase, force_m_s2: f64, vertical_m_s: f64) -> AscentSeen {
@@ -258,6 +305,46 @@ mod tests {
         let stuck = AscentSeen { booster_attached: true, ..seen(7.2, Phase::Coast, 0.0, -0.01) };
         let events: Vec<_> = (0..3).filter_map(|_| watch.look(&stuck)).collect();
         assert_eq!(events, [Event::Apogee { booster_attached: true }]);
+    }
+
+    /// An accelerometer that reads nothing, so that the estimate falls from the first frame on: the barometer alone sees the
+    /// lift-off, and no apogee is believed while it climbs.
+    #[test]
+    fn with_a_dead_accelerometer_the_barometer_sees_lift_off_and_apogee() {
+        let mut watch = AscentWatch::default();
+        let mut events = Vec::new();
+        // 60 m/s at once, then braking by 10 m/s^2: 180 m after 6 s.
+        for frame in 0..1_800 {
+            let time_s = 0.005 * f64::from(frame);
+            let altitude_m = 60.0 * time_s - 5.0 * time_s * time_s;
+            let dead = AscentSeen {
+                pressure_altitude_m: (frame % 4 == 0).then_some(altitude_m),
+                booster_attached: true,
+                ..seen(time_s, Phase::Boost, 0.0, -9.81 * time_s)
+            };
+            events.extend(watch.look(&dead).map(|event| (time_s, event)));
+        }
+        assert_eq!(events[0].1, Event::LiftOff);
+        // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
+        assert!((0.3..0.5).contains(&events[0].0), "{events:?}");
+        assert_eq!(events[1].1, Event::Apogee { booster_attached: true });
+        // From 10 m/s down nothing contradicts the estimate: one second before apogee.
+        assert!((4.9..5.5).contains(&events[1].0), "{events:?}");
+    }
+
+    /// A jump of the pressure by 20 m while it climbs at 40 m/s is no apogee.
+    #[test]
+    fn a_jump_of_the_pressure_is_no_apogee_while_the_estimate_rises_fast() {
+        let mut watch = lifted_off();
+        for frame in 0..400 {
+            let time_s = 0.005 * f64::from(frame);
+            let jump_m = if time_s < 1.0 { 0.0 } else { -20.0 };
+            let climbing = AscentSeen {
+                pressure_altitude_m: Some(100.0 + 40.0 * time_s + jump_m),
+                ..seen(time_s, Phase::Coast, -2.0, 40.0)
+            };
+            assert_eq!(watch.look(&climbing), None, "{time_s}");
+        }
     }
 
     /// The ejection charge raises the pressure: the barometer shows a fall that is none.

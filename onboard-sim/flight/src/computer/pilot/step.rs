@@ -439,7 +439,7 @@ impl Pilot {
     /// Whether the thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the
     /// gimbal holds it upright until the thrust ends.
     fn balances(&self, mode: &Mode) -> bool {
-        self.known.mission.powered.space.is_some() && mode.phase == Phase::Touchdown
+        self.known.mission.upright_after_contact && mode.phase == Phase::Touchdown
     }
 
     /// The gimbal's command that turns the nose as an aim wants.

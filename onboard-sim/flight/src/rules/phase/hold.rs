@@ -16,6 +16,8 @@ pub enum HoldCause {
     UplinkSilent = 1,
     /// A station asked for a hold.
     Commanded = 2,
+    /// Whoever confirmed the start has not tapped in time.
+    TapOverdue = 3,
 }
 
 /// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.

@@ -12,6 +12,8 @@ fn on_rail(tilt_deg: f64, truth: &Truth, ascent: &AscentTruth) -> World {
     let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
     let mut launch: Launch = mission.launch.unwrap();
     launch.rail.tilt_deg = tilt_deg;
+    // With which RocketPy gave the numbers below.
+    launch.rail.length_m = 2.5;
     let truth = Truth { gust_scale: 0.0, ..*truth };
     world("mk2", &truth, &RigidState::upright(1.0)).on_rail(&launch, ascent)
 }

@@ -9,7 +9,7 @@ use std::thread;
 ///
 /// # Errors
 /// A thread could not be started.
-pub(crate) fn in_parallel<T: Sync, R: Send>(
+pub fn in_parallel<T: Sync, R: Send>(
     items: &[T],
     jobs: usize,
     work: impl Fn(&T) -> R + Sync,
@@ -29,7 +29,7 @@ pub(crate) fn in_parallel<T: Sync, R: Send>(
     };
     thread::scope(|scope| {
         for job in 1..jobs.clamp(1, items.len().max(1)) {
-            thread::Builder::new().name(format!("motors-{job}")).spawn_scoped(scope, one_after_another)?;
+            thread::Builder::new().name(format!("job-{job}")).spawn_scoped(scope, one_after_another)?;
         }
         one_after_another();
         Ok::<(), std::io::Error>(())

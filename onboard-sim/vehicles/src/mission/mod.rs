@@ -2,10 +2,13 @@
 //!
 //! A mission contains its airframe as a table, or names a built-in airframe.
 
+mod validate;
+
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::{String, ToString as _};
+
 use flight::estimation::estimator::EstimatorConfigError;
-use flight::vehicle::airframe::BadValue;
-use flight::vehicle::drop::Drop;
-use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use serde::Deserialize;
@@ -14,21 +17,15 @@ use toml::Spanned;
 use super::airframe;
 use super::motors::{self, MotorError};
 
-/// Longest countdown, s.
-const COUNTDOWN_MAX_S: f64 = 600.0;
-
-/// Accepted altitudes of a pad, m: from the shore of the Dead Sea to above the highest road.
-const PAD_ALTITUDES_M: core::ops::RangeInclusive<f64> = -450.0..=6_000.0;
-
 /// The built-in missions: name and TOML text.
 pub const BUILTIN: &[(&str, &str)] = &[
-    ("mk2", include_str!("../missions/mk2.toml")),
-    ("mk3", include_str!("../missions/mk3.toml")),
-    ("mk2-h53", include_str!("../missions/mk2-h53.toml")),
-    ("mini-f10", include_str!("../missions/mini-f10.toml")),
-    ("vlr", include_str!("../missions/vlr.toml")),
-    ("vlr-f15", include_str!("../missions/vlr-f15.toml")),
-    ("vlr-f16", include_str!("../missions/vlr-f16.toml")),
+    ("mk2", include_str!("../../missions/mk2.toml")),
+    ("mk3", include_str!("../../missions/mk3.toml")),
+    ("mk2-h53", include_str!("../../missions/mk2-h53.toml")),
+    ("mini-f10", include_str!("../../missions/mini-f10.toml")),
+    ("vlr", include_str!("../../missions/vlr.toml")),
+    ("vlr-f15", include_str!("../../missions/vlr-f15.toml")),
+    ("vlr-f16", include_str!("../../missions/vlr-f16.toml")),
 ];
 
 /// Why a mission cannot be flown.
@@ -42,21 +39,16 @@ pub enum MissionError {
         /// The parser's words, with line, column and key.
         message: String,
     },
-    /// The airframe is out of range.
-    #[error("{origin}")]
-    Airframe {
+    /// A key holds a value outside its range.
+    #[error("{origin}: {key} = {found}: must be {required}")]
+    Value {
         /// Where the text came from.
         origin: String,
-        #[source]
-        source: BadValue,
-    },
-    /// What the mission expects of motor or exhaust is out of range.
-    #[error("{origin}")]
-    Expected {
-        /// Where the text came from.
-        origin: String,
-        #[source]
-        source: BadValue,
+        /// The key, with its section.
+        key: String,
+        found: String,
+        /// The accepted range, in words.
+        required: &'static str,
     },
     /// What the mission expects of the sensors is out of range.
     #[error("{origin}")]
@@ -65,32 +57,6 @@ pub enum MissionError {
         origin: String,
         #[source]
         source: EstimatorConfigError,
-    },
-    /// The countdown is out of range.
-    #[error("{origin}: start.countdown_s = {found}: must be 0 to {COUNTDOWN_MAX_S}")]
-    Countdown {
-        /// Where the text came from.
-        origin: String,
-        found: f64,
-    },
-    /// The pad's place is out of range.
-    #[error("{origin}: {key} = {found}: must be {required}")]
-    Site {
-        /// Where the text came from.
-        origin: String,
-        /// The key, with its section.
-        key: &'static str,
-        found: f64,
-        /// The accepted range, in words.
-        required: &'static str,
-    },
-    /// The launch or the drop is out of range.
-    #[error("{origin}")]
-    Start {
-        /// Where the text came from.
-        origin: String,
-        #[source]
-        source: BadValue,
     },
     /// The start needs a section that the mission does not have, or is not one of a mission.
     #[error("{origin}: start.at = \"{at}\" {problem}")]
@@ -120,29 +86,16 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     }
     .map_err(not_a_mission)?;
     mission
-        .airframe
-        .validate()
-        .map_err(|source| MissionError::Airframe { origin: origin.to_owned(), source })?;
-    mission
-        .motor
-        .validate()
-        .and_then(|()| mission.exhaust.validate())
-        .map_err(|source| MissionError::Expected { origin: origin.to_owned(), source })?;
-    mission
         .estimator
         .validate()
         .map_err(|source| MissionError::Estimator { origin: origin.to_owned(), source })?;
-    let countdown_s = mission.start.countdown_s;
-    if !(0.0..=COUNTDOWN_MAX_S).contains(&countdown_s) {
-        return Err(MissionError::Countdown { origin: origin.to_owned(), found: countdown_s });
-    }
+    validate::validate(&mission).map_err(|bad| MissionError::Value {
+        origin: origin.to_owned(),
+        key: bad.key,
+        found: bad.found,
+        required: bad.required,
+    })?;
     check_start(&mission, origin)?;
-    let altitude_m = mission.pad_altitude_m;
-    let nowhere =
-        (!PAD_ALTITUDES_M.contains(&altitude_m)).then_some(("pad_altitude_m", altitude_m, "-450 to 6000"));
-    if let Some((key, found, required)) = mission.site.bad_value().or(nowhere) {
-        return Err(MissionError::Site { origin: origin.to_owned(), key, found, required });
-    }
     let motor = mission.airframe.motor.clone();
     let mut mission = with_motor(mission, &motor)?;
     if let Some(launch) = &mut mission.launch {
@@ -153,11 +106,6 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
 
 /// Checks that the mission has what its start needs.
 fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
-    let of_sections =
-        [mission.launch.as_ref().map(Launch::validate), mission.drop.as_ref().map(Drop::validate)];
-    for checked in of_sections.into_iter().flatten() {
-        checked.map_err(|source| MissionError::Start { origin: origin.to_owned(), source })?;
-    }
     let refuse = |at, problem| Err(MissionError::StartAt { origin: origin.to_owned(), at, problem });
     match mission.start.at {
         StartPoint::Pad if mission.launch.is_none() => {

@@ -1,0 +1,46 @@
+//! The keys of a station: the one that all share, and that of the operator who sits here.
+
+use anyhow::Context as _;
+use protocol::crew_file::CrewFile;
+use protocol::key_file::KeyFile;
+use protocol::signing::Signing;
+
+use crate::cli::Cli;
+use crate::model::two_person::KeyOwner;
+
+/// A key file with its timestamps, what it signs and checks, and whose it is.
+pub(super) struct KeyRing {
+    pub(super) key: Option<(KeyFile, Signing)>,
+    pub(super) owner: Option<KeyOwner>,
+}
+
+impl KeyRing {
+    /// Reads the keys. An operator's frames have timestamps of their own, beside their key.
+    ///
+    /// # Errors
+    /// A file cannot be read, others can read it, or the crew has nobody of this name.
+    pub(super) fn open(cli: &Cli) -> anyhow::Result<Self> {
+        let Some(shared) = cli.key.as_deref() else {
+            anyhow::ensure!(
+                cli.crew.is_none(),
+                "--crew needs --key, the key that vehicle and stations share"
+            );
+            return Ok(Self { key: None, owner: None });
+        };
+        let crew = cli.crew.as_deref().map(CrewFile::open).transpose()?;
+        let member = match (&crew, cli.operator.as_deref()) {
+            (Some(crew), Some(name)) => Some(crew.member(name)?),
+            _ => None,
+        };
+        let Some((member, (number, path))) = member.and_then(|member| Some((member, member.key.as_ref()?)))
+        else {
+            return Ok(Self { key: Some(KeyFile::open(shared, "ground")?), owner: None });
+        };
+        let own = KeyFile::read_key(path)?;
+        let (file, mut signing) =
+            KeyFile::open(path, "ground").with_context(|| format!("the timestamps of {}", member.name))?;
+        signing = signing.checking_with(KeyFile::read_key(shared)?).as_operator(*number, own);
+        let owner = KeyOwner { number: *number, name: member.name.clone() };
+        Ok(Self { key: Some((file, signing)), owner: Some(owner) })
+    }
+}

@@ -1,0 +1,170 @@
+//! The flight computer as a process, and the comparison of what several machines answered.
+#![expect(clippy::print_stdout, reason = "what it found")]
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, ensure};
+use board::recorded::fly;
+use board::stream::{Answer, Link, receive};
+use clap::{Parser, Subcommand};
+use flight::rules::phase::Phase;
+
+/// The flight computer as a program for a board.
+#[derive(Parser)]
+#[command(name = "board")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Fly a recorded flight: frames from standard input, answers to standard output
+    Fly,
+    /// Compare what machines answered in recorded flights with what was recorded, frame by frame
+    ///
+    /// Each folder is a flight: the file `recorded`, and a file for each machine, with its name. Exit codes: 0 all
+    /// frames identical, 1 error, 2 usage, 3 a frame differs.
+    Compare {
+        /// A machine; may be repeated
+        #[arg(long, value_name = "NAME", required = true)]
+        machine: Vec<String>,
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+    },
+    /// Say what frames and plans cost, from the files `costs` and `recorded` of flights on a Cortex-M7
+    Costs {
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+    },
+}
+
+pub(super) fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Fly => fly_standard_input().map(|()| ExitCode::SUCCESS),
+        Command::Compare { machine, folders } => compare(&machine, &folders),
+        Command::Costs { folders } => costs(&folders).map(|()| ExitCode::SUCCESS),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("board: {error:#}");
+        ExitCode::FAILURE
+    })
+}
+
+/// Two streams of bytes as a link.
+struct Pipes<R, W>(R, W);
+
+impl<R: io::Read, W: io::Write> Link for Pipes<R, W> {
+    type Error = io::Error;
+
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        self.0.read(into)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.1.write_all(bytes)
+    }
+}
+
+fn fly_standard_input() -> Result<()> {
+    let mut link = Pipes(BufReader::new(io::stdin().lock()), BufWriter::new(io::stdout().lock()));
+    let frames = fly(&mut link, &mut ())?;
+    link.1.flush()?;
+    eprintln!("{frames} frames");
+    Ok(())
+}
+
+fn answers_of(path: &Path) -> Result<Vec<Answer>> {
+    let file = File::open(path).with_context(|| path.display().to_string())?;
+    let mut link = Pipes(BufReader::new(file), io::sink());
+    let (mut answers, mut buffer) = (Vec::new(), Vec::new());
+    while let Some(answer) = receive(&mut link, &mut buffer).with_context(|| path.display().to_string())? {
+        answers.push(answer);
+    }
+    Ok(answers)
+}
+
+fn compare(machines: &[String], folders: &[PathBuf]) -> Result<ExitCode> {
+    let (mut frames, mut identical) = (0, 0);
+    for folder in folders {
+        let expected = answers_of(&folder.join("recorded"))?;
+        ensure!(!expected.is_empty(), "{}: no frames", folder.display());
+        let mut same_here = vec![true; expected.len()];
+        for machine in machines {
+            let path = folder.join(machine);
+            let found = answers_of(&path)?;
+            if found.len() != expected.len() {
+                println!("{}: {} frames instead of {}", path.display(), found.len(), expected.len());
+            }
+            let differs =
+                |place: &usize| found.get(*place).map(bytes_of) != Some(bytes_of(&expected[*place]));
+            let different: Vec<usize> = (0..expected.len()).filter(differs).collect();
+            if let Some(first) = different.first() {
+                println!("{}: {} frames differ, first number {first}", path.display(), different.len());
+                println!("  recorded {:?}", expected[*first]);
+                println!("  here     {:?}", found.get(*first));
+            }
+            for place in different {
+                same_here[place] = false;
+            }
+        }
+        frames += expected.len();
+        identical += same_here.iter().filter(|same| **same).count();
+    }
+    let (flights, machines) = (folders.len(), machines.len());
+    println!("{identical} of {frames} frames identical on {machines} machines, in {flights} flights");
+    Ok(if identical == frames { ExitCode::SUCCESS } else { ExitCode::from(3) })
+}
+
+/// Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
+fn bytes_of(answer: &Answer) -> Vec<u8> {
+    prost::Message::encode_to_vec(answer)
+}
+
+fn costs(folders: &[PathBuf]) -> Result<()> {
+    let mut classes: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    for folder in folders {
+        let answers = answers_of(&folder.join("recorded"))?;
+        let path = folder.join("costs");
+        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        for (answer, (number, line)) in answers.iter().zip(text.lines().enumerate()) {
+            let wrong = || format!("{}, line {}: '{line}'", path.display(), number + 1);
+            let words: Vec<&str> = line.split(' ').collect();
+            let [_, planned, instructions, _] = words[..] else { anyhow::bail!("{}", wrong()) };
+            let class = if planned == "0" {
+                "frames without a plan"
+            } else if plans_a_landing(answer) {
+                "landings planned, from the arming of the motor on"
+            } else {
+                "other plans: outlook in the fall, rehearsal on the pad"
+            };
+            classes.entry(class).or_default().push(instructions.parse().with_context(wrong)?);
+        }
+    }
+    for (class, mut costs) in classes {
+        costs.sort_unstable();
+        let share = |percent: usize| costs[(costs.len() - 1) * percent / 100];
+        println!(
+            "{:>7} {class}: median {}, p99 {}, most {} instructions",
+            costs.len(),
+            share(50),
+            share(99),
+            share(100),
+        );
+    }
+    Ok(())
+}
+
+fn plans_a_landing(answer: &Answer) -> bool {
+    let phase = match (&answer.from_power_up, &answer.in_the_air) {
+        (Some(output), _) => output.phase,
+        (_, Some(output)) => output.phase,
+        _ => return false,
+    };
+    let phase = u8::try_from(phase).ok().and_then(Phase::from_index);
+    phase.is_some_and(|phase| phase == Phase::LandArmed || phase.in_landing_burn())
+}

@@ -1,0 +1,12 @@
+//! The flight computer as a program for a board.
+//!
+//! * [`port`]: what a board must offer, and the loop that flies it.
+//! * [`stream`]: a recorded flight as bytes for a board, and the board's answers.
+//! * [`recorded`]: flies a recorded flight, frame by frame, and answers each frame.
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+pub mod port;
+pub mod recorded;
+pub mod stream;

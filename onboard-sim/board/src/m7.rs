@@ -1,0 +1,158 @@
+//! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and `costs` in the folder of
+//! the emulator or debugger.
+
+use core::fmt::Write as _;
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use board::recorded::{Watch, fly};
+use board::stream::Link;
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::{entry, exception};
+use flight::computer::Output;
+use linked_list_allocator::LockedHeap;
+use semihosting::fs::File;
+use semihosting::io::{self, Read as _, Write as _};
+use semihosting::{eprintln, println, process};
+
+/// Heap, bytes: what the memory map leaves beside the static data.
+const HEAP_BYTES: usize = 920 * 1024;
+
+#[global_allocator]
+static HEAP: LockedHeap = LockedHeap::empty();
+
+/// How often the counter has gone through zero.
+static WRAPS: AtomicU32 = AtomicU32::new(0);
+
+/// Values of the counter: it has 24 bits.
+const COUNTS: u32 = 1 << 24;
+
+/// Instructions for one count: `qemu -icount shift=0` takes an instruction for 1 ns, and the counter of its board counts
+/// with 25 MHz. On hardware the numbers are clock cycles of that counter, and mean nothing else.
+const INSTRUCTIONS_PER_COUNT: u64 = 40;
+
+#[exception]
+fn SysTick() {
+    WRAPS.fetch_add(1, Ordering::Relaxed);
+}
+
+#[entry]
+fn main() -> ! {
+    static mut MEMORY: [MaybeUninit<u8>; HEAP_BYTES] = [const { MaybeUninit::uninit() }; HEAP_BYTES];
+    HEAP.lock().init_from_slice(MEMORY);
+    if let Some(peripherals) = cortex_m::Peripherals::take() {
+        let mut counter = peripherals.SYST;
+        counter.set_clock_source(SystClkSource::Core);
+        counter.set_reload(COUNTS - 1);
+        counter.clear_current();
+        counter.enable_counter();
+        counter.enable_interrupt();
+    }
+    process::exit(match fly_the_files() {
+        Ok(()) => 0,
+        Err(error) => {
+            eprintln!("board: {error}");
+            1
+        }
+    })
+}
+
+fn fly_the_files() -> io::Result<()> {
+    let mut files = Files { frames: File::open(c"frames")?, answers: File::create(c"answers")? };
+    let mut costs =
+        Costs { file: File::create(c"costs")?, begun: 0, set_up_bytes: 0, most_bytes: 0, failed: None };
+    let flown = fly(&mut files, &mut costs);
+    if let Some(error) = costs.failed {
+        return Err(error);
+    }
+    let stack_bytes = cortex_m_stack::stack_size();
+    println!(
+        "heap {} bytes of {HEAP_BYTES} after set-up, at most {} between frames; stack at most {} bytes of {stack_bytes}",
+        costs.set_up_bytes,
+        costs.most_bytes,
+        stack_bytes - cortex_m_stack::stack_painted(),
+    );
+    match flown {
+        Ok(frames) => println!("{frames} frames"),
+        Err(error) => {
+            eprintln!("board: {error}");
+            process::exit(1)
+        }
+    }
+    Ok(())
+}
+
+struct Files {
+    frames: File,
+    answers: File,
+}
+
+impl Link for Files {
+    type Error = io::Error;
+
+    fn read(&mut self, into: &mut [u8]) -> Result<usize, io::Error> {
+        self.frames.read(into)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> Result<(), io::Error> {
+        self.answers.write_all(bytes)
+    }
+}
+
+/// Writes a line for each frame: its number, 1 if it planned, its instructions, and the bytes on the heap after it.
+struct Costs {
+    file: File,
+    begun: u64,
+    set_up_bytes: usize,
+    most_bytes: usize,
+    failed: Option<io::Error>,
+}
+
+impl Watch for Costs {
+    fn is_set_up(&mut self) {
+        self.set_up_bytes = HEAP.lock().used();
+    }
+
+    fn begins(&mut self) {
+        self.begun = counted();
+    }
+
+    fn ended(&mut self, frame: u64, output: &Output) {
+        let instructions = (counted() - self.begun) * INSTRUCTIONS_PER_COUNT;
+        let bytes = HEAP.lock().used();
+        self.most_bytes = self.most_bytes.max(bytes);
+        let mut line = Line { text: [0; 80], length: 0 };
+        // The longest line has 64 characters.
+        let _ = writeln!(line, "{frame} {} {instructions} {bytes}", u8::from(output.planned));
+        if let Err(error) = self.file.write_all(&line.text[..line.length]) {
+            self.failed.get_or_insert(error);
+        }
+    }
+}
+
+/// Counts since the counter was started.
+fn counted() -> u64 {
+    loop {
+        let wraps = WRAPS.load(Ordering::Relaxed);
+        let down = SYST::get_current();
+        if wraps == WRAPS.load(Ordering::Relaxed) {
+            return u64::from(wraps) * u64::from(COUNTS) + u64::from(COUNTS - 1 - down);
+        }
+    }
+}
+
+/// A line of text without a heap.
+struct Line {
+    text: [u8; 80],
+    length: usize,
+}
+
+impl core::fmt::Write for Line {
+    fn write_str(&mut self, text: &str) -> core::fmt::Result {
+        let end = self.length + text.len();
+        self.text.get_mut(self.length..end).ok_or(core::fmt::Error)?.copy_from_slice(text.as_bytes());
+        self.length = end;
+        Ok(())
+    }
+}

@@ -1,0 +1,463 @@
+//! Two people at a vehicle's endpoint, with frames that are really signed: who may arm and start, and who may not.
+
+use flight::computer::crew::People;
+use flight::rules::operator::{Name, Operator, Role};
+use protocol::dialect::{TD_CREW_DATA, TdAct, TdHold};
+use protocol::hub::{Hub, News, Received};
+use protocol::signing::{Key, Memory, Signing};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+
+/// 2026-11-21, in the units of signatures.
+const CLOCK: u64 = 37_500_000_000_000;
+const FIRST_ASK: u16 = 40_000;
+
+const ARM: u16 = 400;
+const START: u16 = 300;
+const PAUSE: u16 = 193;
+const ABORT: u16 = 185;
+const TAP: u16 = 54_000;
+const TAKE_COMMAND: u16 = 54_001;
+
+/// The places of the stations.
+const RANGE: usize = 0;
+const FLIGHT: usize = 1;
+const FLIGHT_TOO: usize = 2;
+const PAD: usize = 3;
+/// Has the key that all share.
+const OBSERVER: usize = 4;
+/// Has no key of this launch.
+const STRANGER: usize = 5;
+
+fn operators() -> Vec<Operator> {
+    let people =
+        [("Ann", Role::RangeSafety), ("Bob", Role::Flight), ("Cat", Role::Flight), ("Dan", Role::Pad)];
+    let operator =
+        |(number, (name, role)): (u8, (&str, Role))| Operator { number, role, name: Name::new(name) };
+    (1..).zip(people).map(operator).collect()
+}
+
+fn key(number: u8) -> Key {
+    Key::new([number; Key::LEN])
+}
+
+struct Station {
+    encoder: Encoder,
+    signing: Signing,
+}
+
+/// A vehicle with a crew, and all who speak to it.
+struct Launch {
+    vehicle: Vehicle,
+    endpoint: VehicleEndpoint,
+    hub: Hub,
+    stations: Vec<Station>,
+    /// Stations that send heartbeats, ten a second.
+    speaking: Vec<usize>,
+    sent: Vec<Frame>,
+    /// The last TD_CREW.
+    crew: Option<TD_CREW_DATA>,
+    frames: u64,
+}
+
+impl Launch {
+    fn new(people: People) -> Self {
+        let operators = operators();
+        let numbers = operators.iter().map(|operator| operator.number);
+        let keys = numbers.map(|number| (number, key(number))).collect();
+        let signing = Signing::new(key(100), Memory::default()).with_operators(keys);
+        let station = |place: usize| {
+            let shared = if place == STRANGER { key(200) } else { key(100) };
+            let signing = Signing::new(shared, Memory::default());
+            let signing = match place {
+                OBSERVER | STRANGER => signing,
+                _ => signing.as_operator(place as u8 + 1, key(place as u8 + 1)),
+            };
+            let address = Address { system_id: 255 - place as u8, component_id: 190 };
+            Station { encoder: Encoder::new(address), signing }
+        };
+        let mut launch = Self {
+            vehicle: planar().with_crew(people, operators.clone()),
+            endpoint: VehicleEndpoint::sending_to_crew(&STANDARD, &operators),
+            hub: Hub::new(1, Some(signing)),
+            stations: (0..6).map(station).collect(),
+            speaking: vec![RANGE, FLIGHT, PAD],
+            sent: Vec::new(),
+            crew: None,
+            frames: 0,
+        };
+        launch.run(4.0);
+        launch
+    }
+
+    fn two() -> Self {
+        Self::new(People::Two { first_ask: FIRST_ASK })
+    }
+
+    fn clock(&self) -> u64 {
+        CLOCK + (1e5 * self.vehicle.time_s()) as u64
+    }
+
+    fn run(&mut self, duration_s: f64) {
+        let end_s = self.vehicle.time_s() + duration_s;
+        while self.vehicle.time_s() < end_s {
+            self.frame();
+        }
+    }
+
+    fn frame(&mut self) {
+        if self.frames.is_multiple_of(5) {
+            for station in self.speaking.clone() {
+                let beat = self.signed(station, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+                self.deliver(&beat);
+            }
+        }
+        self.frames += 1;
+        let (_, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
+        for Outgoing { frame, .. } in leaving {
+            if let Ok(MavMessage::TD_CREW(crew)) = frame.decode() {
+                self.crew = Some(crew);
+            }
+            self.sent.push(frame);
+        }
+    }
+
+    fn signed(&mut self, station: usize, message: &MavMessage) -> Frame {
+        let frame = self.stations[station].encoder.encode(message);
+        self.signed_for(station, &frame)
+    }
+
+    fn signed_for(&mut self, station: usize, frame: &Frame) -> Frame {
+        let clock = self.clock();
+        let signing = &mut self.stations[station].signing;
+        let link_id = signing.link_id(0);
+        signing.sign(frame, link_id, clock)
+    }
+
+    /// Through the hub, which checks the signature.
+    fn deliver(&mut self, frame: &Frame) {
+        let clock = self.clock();
+        let received = Received::Stream(0, frame.as_bytes().to_vec());
+        for news in self.hub.take(0, received, Duration::ZERO, clock) {
+            match news {
+                News::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle),
+                News::Rejected(frame, why) => self.endpoint.on_rejected(&frame, why),
+                _ => {}
+            }
+        }
+    }
+
+    fn command(&mut self, station: usize, command: u16, param1: f32, param3: f32) -> Frame {
+        let payload = COMMAND_LONG_DATA {
+            param1,
+            param3,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let mut bytes = [0; 255];
+        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
+        bytes[28..30].copy_from_slice(&command.to_le_bytes());
+        let encoder = &mut self.stations[station].encoder;
+        let frame = encoder.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
+        self.signed_for(station, &frame)
+    }
+
+    /// Sends a command; returns the answer to this station, if any, and what the vehicle said.
+    fn says(
+        &mut self,
+        station: usize,
+        command: u16,
+        param1: f32,
+        param3: f32,
+    ) -> (Option<MavResult>, String) {
+        let frame = self.command(station, command, param1, param3);
+        self.sent.clear();
+        self.deliver(&frame);
+        self.run(0.4);
+        let to = frame.source();
+        let mut answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
+        let answer = answers.rfind(|answer| answer.target == to);
+        let results = [
+            MavResult::MAV_RESULT_ACCEPTED,
+            MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+            MavResult::MAV_RESULT_DENIED,
+        ];
+        let result =
+            answer.map(|answer| results.into_iter().find(|result| *result as u8 == answer.result).unwrap());
+        (result, texts(&self.sent).join("; "))
+    }
+
+    fn asks(&mut self, station: usize, command: u16) -> (Option<MavResult>, String) {
+        self.says(station, command, 1.0, 0.0)
+    }
+
+    fn confirms(&mut self, station: usize, command: u16) -> (Option<MavResult>, String) {
+        let number = self.crew.as_ref().map_or(0, |crew| crew.ask_number);
+        self.says(station, command, 1.0, f32::from(number))
+    }
+
+    fn armed(&self) -> bool {
+        self.vehicle.mode().interlocks.armed
+    }
+
+    fn counts_down(&self) -> bool {
+        self.vehicle.mode().countdown_end_s.is_some()
+    }
+
+    /// Ready to be started.
+    fn armed_by_two() -> Self {
+        let mut launch = Self::two();
+        launch.asks(FLIGHT, ARM);
+        assert_eq!(launch.confirms(RANGE, ARM).0, ACCEPTED);
+        launch
+    }
+}
+
+const ACCEPTED: Option<MavResult> = Some(MavResult::MAV_RESULT_ACCEPTED);
+const NOT_NOW: Option<MavResult> = Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+const DENIED: Option<MavResult> = Some(MavResult::MAV_RESULT_DENIED);
+
+#[test]
+fn one_asks_another_confirms_and_both_are_named() {
+    let mut launch = Launch::two();
+    launch.speaking.push(FLIGHT_TOO);
+    launch.run(0.2);
+    // What any other client sends with one of the keys is an ask, and is refused with its reason.
+    let (answer, words) = launch.asks(FLIGHT, ARM);
+    assert_eq!(answer, NOT_NOW);
+    assert!(
+        words.contains("FLIGHT Bob asks to arm: RANGE SAFETY or PAD must confirm within 10 s"),
+        "{words}"
+    );
+    let crew = launch.crew.clone().unwrap();
+    assert_eq!((crew.people, crew.act, crew.asked_by), (2, TdAct::TD_ACT_ARM, 2));
+    assert_eq!(crew.ask_number, FIRST_ASK + 1);
+    for (station, reason) in [
+        (FLIGHT, "FLIGHT Bob asked: another role must confirm"),
+        (FLIGHT_TOO, "another role than FLIGHT must confirm"),
+        (OBSERVER, "only an operator with a key of their own commands"),
+    ] {
+        let (answer, words) = launch.confirms(station, ARM);
+        assert_eq!(answer, DENIED);
+        assert!(words.contains(reason), "{words}");
+    }
+    assert!(!launch.armed());
+    let (answer, words) = launch.confirms(RANGE, ARM);
+    assert_eq!(answer, ACCEPTED);
+    assert!(words.contains("arm: asked by FLIGHT Bob, confirmed by RANGE SAFETY Ann"), "{words}");
+    assert!(launch.armed());
+    // The one who asked is in command.
+    let crew = launch.crew.clone().unwrap();
+    assert_eq!((crew.commanded_by, crew.commanding_system), (2, 254));
+}
+
+#[test]
+fn two_asks_at_once_arm_nothing() {
+    let mut launch = Launch::two();
+    let asks = [launch.command(FLIGHT, ARM, 1.0, 0.0), launch.command(RANGE, ARM, 1.0, f32::NAN)];
+    for ask in &asks {
+        launch.deliver(ask);
+    }
+    launch.run(0.5);
+    assert!(!launch.armed());
+    assert_eq!(launch.crew.clone().unwrap().asked_by, 2, "the first one waits");
+}
+
+#[test]
+fn the_start_goes_on_while_the_confirmer_taps() {
+    let mut launch = Launch::armed_by_two();
+    launch.asks(FLIGHT, START);
+    assert!(!launch.counts_down());
+    assert_eq!(launch.confirms(PAD, START).0, ACCEPTED);
+    assert!(launch.counts_down());
+    let (answer, words) = launch.says(FLIGHT, TAP, 0.0, 0.0);
+    assert_eq!(answer, DENIED);
+    assert!(words.contains("tap refused: PAD Dan taps"), "{words}");
+    for _ in 0..2 {
+        launch.run(0.8);
+        assert_eq!(launch.says(PAD, TAP, 0.0, 0.0).0, ACCEPTED);
+    }
+    assert_eq!(launch.crew.clone().unwrap().tapped_by, 4);
+    launch.sent.clear();
+    launch.run(2.1);
+    assert!(launch.armed() && !launch.counts_down(), "held");
+    assert!(texts(&launch.sent).join("; ").contains("no tap of PAD Dan for 2 s"));
+    let held = launch.sent.iter().rev().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_FLIGHT_STATUS(status)) => Some(status.hold),
+        _ => None,
+    });
+    assert_eq!(held, Some(TdHold::TD_HOLD_TAP_OVERDUE));
+    assert_eq!(launch.crew.clone().unwrap().held_by, 4);
+}
+
+/// After the release a missing tap means nothing.
+#[test]
+fn taps_end_with_the_release() {
+    let mut launch = Launch::armed_by_two();
+    launch.asks(FLIGHT, START);
+    launch.confirms(RANGE, START);
+    while launch.vehicle.phase().on_pad() {
+        assert!(launch.counts_down() && launch.vehicle.time_s() < 40.0);
+        launch.says(RANGE, TAP, 0.0, 0.0);
+    }
+    launch.sent.clear();
+    launch.run(3.0);
+    assert!(!launch.vehicle.phase().on_pad());
+    assert!(!texts(&launch.sent).join("; ").contains("tap"));
+}
+
+#[test]
+fn anyone_with_a_key_holds_and_aborts_and_nobody_else() {
+    let mut launch = Launch::armed_by_two();
+    launch.asks(FLIGHT, START);
+    launch.confirms(RANGE, START);
+    for station in [OBSERVER, STRANGER] {
+        assert_ne!(launch.says(station, PAUSE, 0.0, 0.0).0, ACCEPTED);
+        assert_ne!(launch.says(station, ABORT, 1.0, 0.0).0, ACCEPTED);
+        launch.says(RANGE, TAP, 0.0, 0.0);
+    }
+    assert!(launch.counts_down() && !launch.vehicle.aborted());
+    let (answer, words) = launch.says(FLIGHT_TOO, PAUSE, 0.0, 0.0);
+    assert_eq!(answer, ACCEPTED);
+    assert!(words.contains("FLIGHT Cat, station 253/190 asks for a hold"), "{words}");
+    assert!(!launch.counts_down());
+    assert_eq!(launch.crew.clone().unwrap().held_by, 3);
+    let (answer, words) = launch.says(PAD, ABORT, 1.0, 0.0);
+    assert_eq!(answer, ACCEPTED);
+    assert!(words.contains("PAD Dan aborts"), "{words}");
+    assert!(launch.vehicle.aborted());
+}
+
+/// From the frame that arrives to the latch: one frame of the vehicle, with a crew as without.
+#[test]
+fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
+    let frames_to_latch = |people: Option<People>| {
+        let mut launch = Launch::two();
+        if people.is_none() {
+            (launch.vehicle, launch.endpoint) = (planar(), VehicleEndpoint::sending_signed(&STANDARD));
+            launch.hub = Hub::new(1, Some(Signing::new(key(1), Memory::default())));
+            launch.run(4.0);
+        }
+        let abort = launch.command(RANGE, ABORT, 1.0, 0.0);
+        launch.deliver(&abort);
+        let mut frames = 0;
+        while !launch.vehicle.aborted() {
+            launch.frame();
+            frames += 1;
+        }
+        frames
+    };
+    assert_eq!(frames_to_latch(Some(People::Two { first_ask: 1 })), 1);
+    assert_eq!(frames_to_latch(None), 1);
+}
+
+#[test]
+fn one_person_mode_needs_one_key() {
+    let mut launch = Launch::new(People::One);
+    assert_eq!(launch.asks(OBSERVER, ARM).0, DENIED);
+    assert_eq!(launch.asks(PAD, ARM).0, ACCEPTED);
+    assert!(launch.armed());
+    let crew = launch.crew.clone().unwrap();
+    assert_eq!((crew.people, crew.commanded_by), (1, 4));
+    assert_eq!(launch.asks(PAD, START).0, ACCEPTED);
+    launch.run(3.0);
+    assert!(launch.counts_down(), "no taps");
+}
+
+#[test]
+fn the_command_passes_only_from_a_silent_station_to_the_same_role_or_range_safety() {
+    let mut launch = Launch::armed_by_two();
+    launch.speaking = vec![RANGE, FLIGHT, FLIGHT_TOO, PAD];
+    let (answer, words) = launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0);
+    assert_eq!(answer, DENIED);
+    assert!(words.contains("FLIGHT Bob (254/190) is heard"), "{words}");
+    launch.speaking = vec![RANGE, FLIGHT_TOO, PAD];
+    launch.run(3.0);
+    let (answer, words) = launch.says(PAD, TAKE_COMMAND, 0.0, 0.0);
+    assert_eq!(answer, DENIED);
+    assert!(words.contains("only FLIGHT or RANGE SAFETY takes over from FLIGHT Bob"), "{words}");
+    assert_eq!(launch.says(OBSERVER, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
+    let (answer, words) = launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0);
+    assert_eq!(answer, ACCEPTED);
+    assert!(
+        words.contains("FLIGHT Cat (253/190) takes command from FLIGHT Bob (254/190), silent for"),
+        "{words}"
+    );
+    let crew = launch.crew.clone().unwrap();
+    assert_eq!((crew.commanded_by, crew.commanding_system), (3, 253));
+    assert!(launch.armed());
+    // A start needs two people again, and the new commander's silence holds it.
+    launch.asks(FLIGHT_TOO, START);
+    launch.confirms(RANGE, START);
+    assert!(launch.counts_down());
+    launch.speaking = vec![RANGE, PAD];
+    for _ in 0..3 {
+        launch.says(RANGE, TAP, 0.0, 0.0);
+        launch.run(0.5);
+    }
+    assert!(!launch.counts_down());
+}
+
+/// Random frames of everybody, with replays, wrong keys, forged numbers and races, at a vehicle that is disarmed again
+/// whenever it was armed. It is armed only in a frame in which the confirmation of another role arrived, of an ask that
+/// had been made in the ten seconds before.
+#[test]
+fn random_signed_frames_arm_nothing_without_two_keys() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let mut launch = Launch::two();
+    let mut recorded: Vec<Frame> = Vec::new();
+    let (mut armed, mut sent) = (0, 0);
+    for _ in 0..20_000 {
+        let dice = random.next_u32();
+        let waits = launch.vehicle.computer().crew().two_person.waiting(launch.vehicle.time_s());
+        let mut confirmed_by = None;
+        for _ in 0..(dice & 3) {
+            sent += 1;
+            let dice = random.next_u32();
+            let station = (dice & 0xFF) as usize % 6;
+            let number = match dice >> 8 & 3 {
+                0 => 0,
+                1 | 2 => waits.map_or(FIRST_ASK, |ask| ask.number),
+                _ => (dice >> 16) as u16,
+            };
+            if (dice >> 10).is_multiple_of(8) && !recorded.is_empty() {
+                // Heard before, or stolen and never heard.
+                let old = recorded[(dice >> 13) as usize % recorded.len()].clone();
+                launch.deliver(&old);
+                continue;
+            }
+            let frame = launch.command(station, ARM, 1.0, f32::from(number));
+            if (dice >> 13).is_multiple_of(8) {
+                // Signed with one key in the name of another.
+                let forger = &mut launch.stations[station].signing;
+                let forged =
+                    forger.sign(&frame.without_signature(), (dice >> 16 & 15) as u8, CLOCK + u64::from(dice));
+                recorded.push(forged.clone());
+                if forged.key_number() != launch.stations[station].signing.link_id(0) {
+                    launch.deliver(&forged);
+                }
+                continue;
+            }
+            recorded.push(frame.clone());
+            if waits.is_some_and(|ask| ask.number == number) && station <= PAD {
+                confirmed_by = confirmed_by.or(Some(()));
+            }
+            launch.deliver(&frame);
+        }
+        launch.frame();
+        if launch.armed() {
+            armed += 1;
+            let ask = waits.expect("an ask was waiting before this frame");
+            assert!(confirmed_by.is_some(), "armed without a confirmation of ask {}", ask.number);
+            let disarm = launch.command(RANGE, ARM, 0.0, 0.0);
+            launch.deliver(&disarm);
+            launch.frame();
+            assert!(!launch.armed());
+        }
+    }
+    assert!(armed > 50 && sent > 20_000, "{armed} times armed by {sent} frames: too few to show anything");
+    assert_eq!(launch.hub.signing().map(|counters| counters.wrong > 1_000), Some(true));
+}

@@ -1,0 +1,192 @@
+//! The sensors: their noises from differences that a smooth motion does not pass, and their biases as the flight computer's
+//! filter has them.
+
+use flight::computer::FRAME_S;
+use flight::estimation::estimator::GRAVITY_M_S2;
+use nalgebra::Vector3;
+
+use super::Parameter;
+use super::along::{commanded_s, falling, follows};
+use super::trace::{Frame, Trace};
+
+/// Fewer differences than this leave a noise uncertain by a third.
+const FEWEST: usize = 20;
+
+/// Sum of squares of differences of some order, and how many there are.
+#[derive(Debug, Clone, Copy, Default)]
+struct Differences {
+    sum: f64,
+    count: usize,
+}
+
+impl Differences {
+    /// Adds the third differences of a series without gaps. Each has 20 times the variance of a sample.
+    fn thirds(&mut self, values: &[f64]) {
+        for four in values.windows(4) {
+            let third = four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0];
+            self.sum += third * third;
+            self.count += 1;
+        }
+    }
+
+    /// Standard deviation of a sample, and that of this estimate. Neighbouring third differences are correlated by -15/20,
+    /// 6/20 and -1/20, so that `n` of them are worth `n / (1 + 2 (0.5625 + 0.09 + 0.0025)) = n / 2.31`.
+    fn sigma(&self) -> Option<(f64, f64)> {
+        if self.count < FEWEST {
+            return None;
+        }
+        let sigma = libm::sqrt(self.sum / (20.0 * self.count as f64));
+        let freedom = self.count as f64 / 2.31;
+        (sigma > 0.0).then(|| (sigma, sigma / libm::sqrt(2.0 * freedom)))
+    }
+}
+
+/// Splits frames where one is missing.
+fn unbroken(frames: &[Frame]) -> impl Iterator<Item = &[Frame]> {
+    frames.chunk_by(follows)
+}
+
+/// The noises and biases of a flight's sensors.
+pub(super) fn sensors(trace: &Trace) -> Vec<Parameter> {
+    let frames = falling(trace);
+    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
+    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
+    let burn = &frames[fall.len()..];
+    let mut found = Vec::new();
+    let root_hz = libm::sqrt(FRAME_S);
+    let milli_g = 1e-3 * GRAVITY_M_S2;
+    let gyro: fn(&Frame) -> Vector3<f64> = |frame| frame.measured.imu.gyro_rad_s;
+    let force: fn(&Frame) -> Vector3<f64> = |frame| frame.measured.imu.specific_force_m_s2;
+    let to_deg = 1.0_f64.to_degrees();
+    for (name, frames, of, unit, scale) in [
+        ("gyro_noise", fall, gyro, "deg/s/sqrt(Hz)", to_deg * root_hz),
+        ("accelerometer_noise", fall, force, "mg/sqrt(Hz)", root_hz / milli_g),
+        ("burning_gyro_noise", burn, gyro, "deg/s/sqrt(Hz)", to_deg * root_hz),
+        ("burning_accelerometer_noise", burn, force, "mg/sqrt(Hz)", root_hz / milli_g),
+    ] {
+        let mut differences = Differences::default();
+        for part in unbroken(frames) {
+            for axis in 0..3 {
+                differences.thirds(&part.iter().map(|frame| of(frame)[axis]).collect::<Vec<_>>());
+            }
+        }
+        found.extend(noise(name, unit, scale, differences));
+    }
+    found.extend(of_slow_sensors(frames));
+    let last = fall.last().or(frames.last());
+    if let Some(Frame { believed, .. }) = last {
+        let axes = ["x", "y", "z"];
+        for (axis, name) in axes.into_iter().enumerate() {
+            let (value, sigma) = (believed.gyro_bias_rad_s[axis], believed.sigmas.gyro_bias_rad_s[axis]);
+            let name = format!("gyro_bias_{name}");
+            found.push(Parameter::normal(&name, "deg/s", to_deg * value, to_deg * sigma));
+        }
+        for (axis, name) in axes.into_iter().enumerate() {
+            let (value, sigma) =
+                (believed.accelerometer_bias_m_s2[axis], believed.sigmas.accelerometer_bias_m_s2[axis]);
+            let name = format!("accelerometer_bias_{name}");
+            found.push(Parameter::normal(&name, "mg", value / milli_g, sigma / milli_g));
+        }
+    }
+    found
+}
+
+/// What third differences count as noise and is none: the fins' steps in the inertial unit's samples, and what a satellite
+/// position wanders between its fixes (1.5 m in 200 s is 0.07 m in a fifth of a second, which adds 1.7 % to 0.2 m).
+const NO_NOISE_SHARE: f64 = 0.01;
+
+fn noise(name: &str, unit: &'static str, scale: f64, differences: Differences) -> Option<Parameter> {
+    let (sigma, uncertain) = differences.sigma()?;
+    let uncertain = libm::hypot(uncertain, NO_NOISE_SHARE * sigma);
+    Some(Parameter::normal(name, unit, scale * sigma, scale * uncertain))
+}
+
+/// Barometer, satellite receiver and lidar against the motion that the inertial unit integrates between their samples.
+fn of_slow_sensors(frames: &[Frame]) -> Vec<Parameter> {
+    let [mut barometer, mut speed, mut level, mut height, mut lidar] = [Differences::default(); 5];
+    for part in unbroken(frames) {
+        let path = integrated(part);
+        let mut series: [Vec<f64>; 8] = Default::default();
+        let mut range: Vec<(usize, f64)> = Vec::new();
+        for (place, (frame, (_, position))) in part.iter().zip(&path).enumerate() {
+            if let Some(altitude_m) = frame.measured.pressure_altitude_m.filter(|value| value.is_finite()) {
+                series[0].push(altitude_m - position.z);
+            }
+            if let Some(range_m) = frame.measured.lidar_range_m.filter(|value| value.is_finite()) {
+                range.push((place, range_m));
+            }
+            if let Some(fix) = &frame.measured.gnss {
+                let back = libm::round((frame.time_s - fix.valid_at_s) / FRAME_S);
+                let at = if back >= 0.0 { place.checked_sub(back as usize) } else { None };
+                let Some((then_m_s, then_m)) = at.map(|at| path[at]) else { continue };
+                // A fix lies up to half a frame from the path's nearest point.
+                let part_s = frame.time_s - back * FRAME_S - fix.valid_at_s;
+                let acceleration = frame_acceleration(part, at.unwrap_or(place));
+                let missed_m_s = fix.velocity_m_s - then_m_s + acceleration * part_s;
+                let missed_m = fix.position_m - then_m + then_m_s * part_s;
+                for axis in 0..3 {
+                    series[1 + axis].push(missed_m_s[axis]);
+                    series[4 + axis].push(missed_m[axis]);
+                }
+            }
+        }
+        barometer.thirds(&series[0]);
+        (1..4).for_each(|axis| speed.thirds(&series[axis]));
+        (4..6).for_each(|axis| level.thirds(&series[axis]));
+        height.thirds(&series[6]);
+        for run in range.chunk_by(|one, two| two.0 - one.0 <= 2) {
+            lidar.thirds(&run.iter().map(|(_, range_m)| *range_m).collect::<Vec<_>>());
+        }
+    }
+    [
+        ("barometer_noise", "m", barometer),
+        ("gnss_velocity_noise", "m/s", speed),
+        ("gnss_horizontal_noise", "m", level),
+        ("gnss_vertical_noise", "m", height),
+        ("lidar_noise", "m", lidar),
+    ]
+    .into_iter()
+    .filter_map(|(name, unit, differences)| noise(name, unit, 1.0, differences))
+    .collect()
+}
+
+fn frame_acceleration(part: &[Frame], place: usize) -> Vector3<f64> {
+    part.get(place).map_or_else(Vector3::zeros, |frame| {
+        let felt = frame.measured.imu.specific_force_m_s2 - frame.believed.accelerometer_bias_m_s2;
+        frame.believed.state.world_from_body * felt - Vector3::z() * GRAVITY_M_S2
+    })
+}
+
+/// Velocity and position at the end of each frame from the inertial unit alone, along the estimated attitude.
+fn integrated(part: &[Frame]) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+    let Some(first) = part.first() else { return Vec::new() };
+    let (mut velocity, mut position) = (first.believed.state.velocity_m_s, first.believed.state.position_m);
+    let path = (0..part.len()).map(|place| {
+        if place > 0 {
+            let acceleration = frame_acceleration(part, place);
+            position += (velocity + 0.5 * acceleration * FRAME_S) * FRAME_S;
+            velocity += acceleration * FRAME_S;
+        }
+        (velocity, position)
+    });
+    path.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola has no third difference; a single 1 in zeros has 1, 3, 3 and 1, with squares of 20.
+    #[test]
+    fn val_hand_third_differences() {
+        let mut differences = Differences::default();
+        differences.thirds(&(0..40).map(|k| f64::from(k * k) * 0.3 - 2.0).collect::<Vec<_>>());
+        assert!(differences.sum < 1e-20 && differences.count == 37);
+        let mut series = vec![0.0; 43];
+        series[20] = 1.0;
+        let mut differences = Differences::default();
+        differences.thirds(&series);
+        let (sigma, _) = differences.sigma().unwrap();
+        assert!((sigma - libm::sqrt(1.0 / 40.0)).abs() < 1e-12, "{sigma}");
+    }
+}

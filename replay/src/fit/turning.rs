@@ -1,0 +1,281 @@
+//! Across the nose while the motor burns: how late and how far the gimbal follows its commands, and where it points when
+//! it is told to point along the axis.
+//!
+//! `I q' = -T l sin(g p + p0) + air + rest`, with the thrust `T` that was found along the nose, the arm `l` and the
+//! inertia `I` of the data, the servo's angle `p`, and a rest that wanders (gusts, what the exhaust does to the fins). The
+//! pilot's commands answer to that rest, so it has to be a part of the model: treated as noise without memory it would
+//! pass for an effect of the commands (L. Ljung, System Identification, 2nd edition, section 13.4).
+//!
+//! The data's inertia cannot be told from the gimbal's gain, and a centre of gravity beside the axis not from a crooked
+//! nozzle: gain and misalignment are those of the whole.
+
+use flight::computer::FRAME_S;
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::Air;
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::air_moment::air_moment_n_m;
+use super::along::{Along, BLOCK, FINS, IMPULSE, falling, follows, white_variance};
+use super::least_squares::{Prior, Solution, inflate, solve_from};
+use super::servo::{PARTS, ServoModel};
+use super::trace::Trace;
+use super::whiten::{NoiseStep, Whitener, lowest};
+
+pub(super) const DELAY: usize = 0;
+pub(super) const RATE: usize = 1;
+pub(super) const GAIN: usize = 2;
+pub(super) const PITCH: usize = 3;
+pub(super) const YAW: usize = 4;
+pub(super) const PLAY: usize = 5;
+
+/// Noise of a feedback potentiometer, rad: a tenth of a degree.
+const FEEDBACK_RAD: f64 = 0.001_745;
+/// Fewer frames of burn (half a second) tell nothing.
+const FEWEST_FRAMES: usize = 100;
+/// The frames before the thrust in which the servo may already move.
+const LEAD_FRAMES: usize = 60;
+const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
+
+/// What was found across the nose.
+#[derive(Debug, Clone)]
+pub(super) struct Turning {
+    pub(super) solution: Solution,
+    pub(super) priors: Vec<Prior>,
+    /// The log has the gimbal's own feedback.
+    pub(super) reported: bool,
+}
+
+/// A frame of the burn.
+struct Sample {
+    felt_rad_s: [f64; 2],
+    /// Angular acceleration about body y and z that the gimbal does not cause, rad/s^2.
+    known_rad_s2: [f64; 2],
+    /// Angular acceleration of a unit sine of the gimbal's angle, rad/s^2.
+    by_gimbal_rad_s2: f64,
+    burning: bool,
+    begins: bool,
+}
+
+/// Fits the gimbal over the burn; an error is the reason why it cannot be.
+pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'static str> {
+    let Some(begins_s) = along.begins_s().filter(|_| along.burn_seen_s > 0.0) else {
+        return Err("no burn was seen, and without thrust the gimbal turns nothing");
+    };
+    let frames = falling(trace);
+    let lit = frames.partition_point(|frame| frame.time_s < begins_s);
+    let first = lit.saturating_sub(LEAD_FRAMES).max(1);
+    if frames.len() < lit + FEWEST_FRAMES {
+        return Err("less than half a second of burn was recorded");
+    }
+    if !frames[first - 1..].windows(2).all(|pair| follows(&pair[0], &pair[1])) {
+        return Err("frames of the burn are lost, and with them the commands that the gimbal followed");
+    }
+    let samples = samples(trace, along, first, begins_s);
+    let frames = &frames[first..];
+    let commands_rad: [Vec<f64>; 2] =
+        [0, 1].map(|axis: usize| frames.iter().map(|frame| frame.gimbal_rad[axis]).collect());
+    let reported_rad: Vec<Option<[f64; 2]>> = frames.iter().map(|frame| frame.gimbal_reported_rad).collect();
+    let reported = reported_rad.iter().any(Option::is_some);
+    let gimbal = &trace.mission.airframe.gimbal;
+    let servo = &gimbal.servo;
+    let priors = [
+        Prior { mean: servo.delay_s, sigma: 0.05 },
+        // Hobby servos are sold with the rate of an unloaded one: a loaded one may have half of it.
+        Prior { mean: servo.rate_rad_s(), sigma: 0.5 * servo.rate_rad_s() },
+        Prior { mean: 1.0, sigma: 0.5 },
+        Prior { mean: 0.0, sigma: 0.1 },
+        Prior { mean: 0.0, sigma: 0.1 },
+        // Printed linkages have half a degree to a degree.
+        Prior { mean: servo.slop_rad(), sigma: 0.5_f64.to_radians() },
+    ];
+    let model = Model { samples: &samples, commands_rad: &commands_rad, limit_rad: gimbal.limit_rad() };
+    let felt = |axis: usize| samples.iter().map(|sample| sample.felt_rad_s[axis]).collect::<Vec<_>>();
+    let white = [0, 1].map(|axis| white_variance(&felt(axis)).unwrap_or(1e-6));
+    let white = 0.5 * (white[0] + white[1]);
+    let mut values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    let mut rest = Rest { sigma_rad_s2: 1.0, lasts_s: 0.3, rough: 0.01 };
+    let whitened = |rest: Rest| {
+        let (model, reported_rad) = (&model, &reported_rad);
+        let whitener = rest.whitener(&samples, white);
+        move |values: &[f64]| {
+            let [pitch, yaw] = model.missed(values);
+            let mut all = whitener.apply(&pitch);
+            all.extend(whitener.apply(&yaw));
+            all.extend(model.feedback(values, reported_rad));
+            all
+        }
+    };
+    for _ in 0..2 {
+        let found = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+        values = found.values;
+        rest = rest.most_likely(&samples, white, &model.missed(&values));
+    }
+    let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+    inflate(&mut solution, &priors, whitened(rest), BLOCK);
+    // The gain is that of thrust times arm over inertia, and the thrust has its own error.
+    let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
+        / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
+    solution.covariance[(GAIN, GAIN)] += of_thrust * solution.values[GAIN] * solution.values[GAIN];
+    Ok(Turning { solution, priors: priors.to_vec(), reported })
+}
+
+/// The process of the rotation that the model does not explain.
+#[derive(Clone, Copy)]
+struct Rest {
+    sigma_rad_s2: f64,
+    lasts_s: f64,
+    /// Density of what has no memory, rad/s^2/sqrt(Hz).
+    rough: f64,
+}
+
+impl Rest {
+    fn whitener(&self, samples: &[Sample], white: f64) -> Whitener {
+        let kept = libm::exp(-FRAME_S / self.lasts_s);
+        let variance = self.sigma_rad_s2 * self.sigma_rad_s2;
+        let steps = samples.iter().map(|sample| NoiseStep {
+            transition: Matrix2::new(1.0, FRAME_S, 0.0, kept),
+            process: Matrix2::new(
+                self.rough * self.rough * FRAME_S,
+                0.0,
+                0.0,
+                variance * (1.0 - kept * kept),
+            ),
+            // The rate at the beginning, and the gyro's bias with it, is free.
+            begins: sample.begins.then(|| Matrix2::new(1.0, 0.0, 0.0, variance)),
+            // The gyro has the mean over the frame.
+            seen: Vector2::new(1.0, -0.5 * FRAME_S),
+            white,
+        });
+        Whitener::new(steps)
+    }
+
+    /// The most likely process for these residuals, each number in turn.
+    fn most_likely(self, samples: &[Sample], white: f64, missed: &[Vec<f64>; 2]) -> Self {
+        let surprise = |rest: Self| {
+            let whitener = rest.whitener(samples, white);
+            missed.iter().map(|axis| whitener.surprise(axis)).sum::<f64>()
+        };
+        let mut rest = self;
+        for _ in 0..2 {
+            let of_sigma = |logarithm: f64| Self { sigma_rad_s2: libm::exp(logarithm), ..rest };
+            let sigma_rad_s2 =
+                libm::exp(lowest(libm::log(0.01), libm::log(30.0), 14, |at| surprise(of_sigma(at))));
+            rest = Self { sigma_rad_s2, ..rest };
+            let of_time = |logarithm: f64| Self { lasts_s: libm::exp(logarithm), ..rest };
+            let lasts_s = libm::exp(lowest(libm::log(0.02), libm::log(5.0), 14, |at| surprise(of_time(at))));
+            rest = Self { lasts_s, ..rest };
+            let of_rough = |logarithm: f64| Self { rough: libm::exp(logarithm), ..rest };
+            let rough = libm::exp(lowest(libm::log(1e-4), libm::log(1.0), 14, |at| surprise(of_rough(at))));
+            rest = Self { rough, ..rest };
+        }
+        rest
+    }
+}
+
+struct Model<'a> {
+    samples: &'a [Sample],
+    commands_rad: &'a [Vec<f64>; 2],
+    limit_rad: f64,
+}
+
+impl Model<'_> {
+    fn angles_rad(&self, values: &[f64], axis: usize) -> Vec<([f64; PARTS], f64)> {
+        let servo = ServoModel {
+            delay_s: values[DELAY],
+            rate_rad_s: values[RATE],
+            play_rad: values[PLAY],
+            limit_rad: self.limit_rad,
+        };
+        servo.angles_rad(&self.commands_rad[axis], FRAME_S)
+    }
+
+    /// The gyro's samples about y and z less the model's.
+    fn missed(&self, values: &[f64]) -> [Vec<f64>; 2] {
+        let both = [0, 1].map(|axis| self.angles_rad(values, axis));
+        [0, 1].map(|axis| {
+            let offset_rad = values[[PITCH, YAW][axis]];
+            let part_s = FRAME_S / PARTS as f64;
+            let mut rate_rad_s = 0.0;
+            let missed = self.samples.iter().enumerate().map(|(place, sample)| {
+                // The thrust turns about the pitch axis inside what the yaw axis leaves.
+                let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
+                let mut mean_rad_s = 0.0;
+                for angle_rad in both[axis][place].0 {
+                    let turn = if sample.burning {
+                        -sample.by_gimbal_rad_s2 * left * libm::sin(values[GAIN] * angle_rad + offset_rad)
+                    } else {
+                        0.0
+                    };
+                    let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
+                    rate_rad_s += by_rad_s;
+                    // As the simulated unit, which adds up the rates at the end of each millisecond.
+                    mean_rad_s += rate_rad_s / PARTS as f64;
+                }
+                sample.felt_rad_s[axis] - mean_rad_s
+            });
+            missed.collect()
+        })
+    }
+
+    /// The servos' own feedback less the model's, whitened.
+    fn feedback(&self, values: &[f64], reported_rad: &[Option<[f64; 2]>]) -> Vec<f64> {
+        if reported_rad.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        let of_axis = |axis: usize| {
+            let ends = self.angles_rad(values, axis);
+            let missed = reported_rad.iter().zip(ends).map(move |(reported_rad, (_, end_rad))| {
+                reported_rad.map_or(0.0, |angles_rad| (angles_rad[axis] - end_rad) / FEEDBACK_RAD)
+            });
+            missed.collect::<Vec<f64>>()
+        };
+        let mut all = of_axis(0);
+        all.extend(of_axis(1));
+        all
+    }
+}
+
+fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sample> {
+    let mission = &trace.mission;
+    let airframe = &mission.airframe;
+    let curve = &mission.motor_curve;
+    let mass_model = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
+    let burn = along.burn(trace);
+    let flow_kg_n_s = curve.propellant_mass_kg() / (curve.total_impulse_n_s() * burn.impulse_scale);
+    let frames = falling(trace);
+    let pairs = frames[first - 1..].windows(2).enumerate();
+    let samples = pairs.map(|(place, pair)| {
+        let (before, frame) = (&pair[0], &pair[1]);
+        let to_s = frame.time_s - begins_s;
+        let burning = to_s > 0.0;
+        let thrust_n = if burning { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
+        let mass = mass_model.at(if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 });
+        let in_body = |frame: &super::trace::Frame| {
+            let state = &frame.believed.state;
+            state.world_from_body.inverse_transform_vector(&frame.believed.velocity_through_air_m_s())
+        };
+        let through_air = 0.5 * (in_body(before) + in_body(frame));
+        let rate: Vector3<f64> = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
+        let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
+        let density =
+            Air::at_height_m(frame.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+        // What was found along the nose holds for the fins across it, too.
+        let air = along.solution.values[FINS]
+            * air_moment_n_m(airframe, mass.cg_station_m, density, &through_air, &rate, &fins_rad);
+        let inertia = mass.pitch_inertia_kg_m2;
+        let arm_m = mass.cg_station_m;
+        let damping = thrust_n * flow_kg_n_s * (arm_m * arm_m + mass.pitch_inertia_slope_m2) / inertia;
+        let coupling = (inertia - mass.roll_inertia_kg_m2) / inertia * rate.x;
+        Sample {
+            felt_rad_s: [frame.measured.imu.gyro_rad_s.y, frame.measured.imu.gyro_rad_s.z],
+            known_rad_s2: [
+                air.y / inertia + coupling * rate.z - damping * rate.y,
+                air.z / inertia - coupling * rate.y - damping * rate.z,
+            ],
+            by_gimbal_rad_s2: thrust_n * arm_m / inertia,
+            burning,
+            begins: place == 0,
+        }
+    });
+    samples.collect()
+}

@@ -1,0 +1,166 @@
+//! The mean wind, from the force of the air across the nose while the vehicle falls.
+//!
+//! In a fall only the air pushes sideways. Every tenth of a second the wind is solved for that makes the airframe's data,
+//! with the drag that was found along the nose, push as the accelerometer felt. The mean over the fall is that of a wind
+//! that grows by the power law, with horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one
+//! gust, and that is what makes the mean uncertain.
+
+use flight::computer::FRAME_S;
+use flight::estimation::estimator::VehicleNow;
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::Air;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use world::wind::gusts::GustScales;
+use world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
+
+use super::Parameter;
+use super::along::{Along, falling};
+use super::least_squares::{Prior, solve};
+use super::trace::{Frame, Trace};
+use super::whiten::{NoiseStep, Whitener};
+
+/// Frames of one sample of the wind.
+const FRAMES: usize = 20;
+/// Below this speed the force across is too weak, m/s.
+const SLOWEST_M_S: f64 = 15.0;
+/// Fewest samples: a second.
+const FEWEST: usize = 10;
+/// Height of the wind that the gusts are scaled by: 20 ft, m.
+const GUST_REFERENCE_M: f64 = 6.096;
+
+/// A sample of the wind.
+struct Sample {
+    height_m: f64,
+    wind_m_s: Vector2<f64>,
+    /// Way through the air since the last sample, m.
+    way_m: f64,
+    airspeed_m_s: f64,
+    /// Sideways force per mass for a metre per second of wind, 1/s.
+    by_wind: f64,
+}
+
+/// The mean wind 10 m above the ground, towards world x and y, m/s; an error is the reason why there is none.
+pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &'static str> {
+    let frames = falling(trace);
+    let lit_s = along.commanded_s.unwrap_or(f64::INFINITY);
+    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
+    let samples: Vec<Sample> = fall
+        .chunks_exact(FRAMES)
+        .filter(|chunk| chunk[0].believed.state.velocity_m_s.norm() > SLOWEST_M_S)
+        .filter_map(|chunk| sample(trace, along, chunk))
+        .collect();
+    if samples.len() < FEWEST {
+        return Err(
+            "the fall is slower than 15 m/s, or shorter than a second above that: too little air across the nose",
+        );
+    }
+    let mean_by_height: Vec<f64> = samples
+        .iter()
+        .map(|sample| libm::pow(sample.height_m.max(0.5) / REFERENCE_HEIGHT_M, EXPONENT))
+        .collect();
+    let mut wind = Vector2::zeros();
+    let mut variances = [0.0; 2];
+    for _ in 0..4 {
+        let at_20_ft_m_s = wind.norm() * libm::pow(GUST_REFERENCE_M / REFERENCE_HEIGHT_M, EXPONENT);
+        for axis in 0..2 {
+            let whitener = gusts(&samples, at_20_ft_m_s);
+            let prior = [Prior { mean: 0.0, sigma: 15.0 }];
+            let found = solve(&prior, |mean| {
+                let missed = samples.iter().zip(&mean_by_height);
+                let missed = missed.map(|(sample, by_height)| sample.wind_m_s[axis] - mean[0] * by_height);
+                whitener.apply(&missed.collect::<Vec<_>>())
+            });
+            let found = found.ok_or("the samples of the wind are no numbers")?;
+            wind[axis] = found.values[0];
+            variances[axis] = found.covariance[(0, 0)];
+        }
+    }
+    // What does not average out over a fall: a wrong attitude turns the fall's own speed into wind, a biased accelerometer
+    // feels wind, and the drag is known as well as it was found.
+    let of_last = fall.last().map(|frame| frame.believed.sigmas);
+    let count = samples.len() as f64;
+    let mean = |of: fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / count;
+    let (airspeed_m_s, by_wind) = (mean(|sample| sample.airspeed_m_s), mean(|sample| sample.by_wind));
+    let by_height = mean_by_height.iter().sum::<f64>() / count;
+    let systematic = of_last.map_or(0.0, |sigmas| {
+        let attitude = airspeed_m_s * sigmas.attitude_rad.xy().norm() / core::f64::consts::SQRT_2;
+        let bias = sigmas.accelerometer_bias_m_s2.yz().norm() / core::f64::consts::SQRT_2 / by_wind.max(1e-3);
+        libm::hypot(attitude, bias) / by_height
+    });
+    let found = ["wind_x", "wind_y"].into_iter().enumerate().map(|(axis, name)| {
+        let sigma = libm::sqrt(variances[axis] + systematic * systematic);
+        Parameter::normal(name, "m/s", wind[axis], sigma)
+    });
+    Ok(found.collect())
+}
+
+/// Horizontal gusts of a wind 20 ft above the ground, and the noise of a sample.
+fn gusts(samples: &[Sample], at_20_ft_m_s: f64) -> Whitener {
+    /// Noise of a sample from vibration and attitude, m/s.
+    const NOISE_M_S: f64 = 0.1;
+    let steps = samples.iter().enumerate().map(|(place, sample)| {
+        let scales = GustScales::at(sample.height_m, at_20_ft_m_s);
+        let kept = libm::exp(-sample.way_m / scales.horizontal_m);
+        NoiseStep {
+            transition: Matrix2::new(kept, 0.0, 0.0, 0.0),
+            process: Matrix2::new(1.0 - kept * kept, 0.0, 0.0, 0.0),
+            begins: (place == 0).then(|| Matrix2::new(1.0, 0.0, 0.0, 0.0)),
+            seen: Vector2::new(scales.horizontal_m_s.max(0.02), 0.0),
+            white: NOISE_M_S * NOISE_M_S,
+        }
+    });
+    Whitener::new(steps)
+}
+
+/// The wind over some frames; `None` if the force tells none.
+fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
+    let mission = &trace.mission;
+    let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg()).at(0.0);
+    let middle = &frames[frames.len() / 2];
+    let density = Air::at_height_m(middle.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+    let (total, _) = along.drag();
+    let of = |frame: &Frame| {
+        let vehicle = VehicleNow::of(&mission.airframe, &mass, density * total, frame.fins_rad, false, 0.0);
+        (vehicle, frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s)
+    };
+    let felt_at = |frame: &Frame, wind_m_s: Vector2<f64>| -> Vector2<f64> {
+        let (vehicle, rate) = of(frame);
+        let state = &frame.believed.state;
+        let through_air =
+            state.world_from_body.inverse_transform_vector(&(state.velocity_m_s - wind_m_s.push(0.0)));
+        vehicle.air_force_n(&through_air, &rate).yz() / mass.mass_kg
+    };
+    let mean = |wind_m_s: Vector2<f64>| -> Vector2<f64> {
+        frames.iter().map(|frame| felt_at(frame, wind_m_s)).sum::<Vector2<f64>>() / frames.len() as f64
+    };
+    let felt: Vector2<f64> = frames
+        .iter()
+        .map(|frame| {
+            let imu = &frame.measured.imu;
+            (imu.specific_force_m_s2 - frame.believed.accelerometer_bias_m_s2).yz()
+        })
+        .sum::<Vector2<f64>>()
+        / frames.len() as f64;
+    let mut wind_m_s = middle.believed.wind_m_s;
+    let mut slope = Matrix2::zeros();
+    for _ in 0..8 {
+        let here = mean(wind_m_s);
+        let beside = |by: Vector2<f64>| (mean(wind_m_s + by) - mean(wind_m_s - by)) / 0.2;
+        slope = Matrix2::from_columns(&[beside(Vector2::new(0.1, 0.0)), beside(Vector2::new(0.0, 0.1))]);
+        let step: Vector2<f64> = slope.try_inverse()? * (felt - here);
+        // Beyond 5 m/s in a step the force is not linear any more.
+        wind_m_s += step * (5.0 / step.norm().max(5.0));
+        if step.norm() < 1e-3 {
+            break;
+        }
+    }
+    let state = &middle.believed.state;
+    let airspeed_m_s = (state.velocity_m_s - Vector3::new(wind_m_s.x, wind_m_s.y, 0.0)).norm();
+    wind_m_s.iter().all(|speed| speed.is_finite() && speed.abs() < 100.0).then(|| Sample {
+        height_m: state.position_m.z,
+        wind_m_s,
+        way_m: airspeed_m_s * FRAME_S * FRAMES as f64,
+        airspeed_m_s,
+        by_wind: libm::sqrt(slope.determinant().abs()),
+    })
+}

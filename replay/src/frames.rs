@@ -1,0 +1,145 @@
+//! Writes a recorded flight as the stream that a board reads, and its recorded decisions as the answers to be expected.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::Path;
+
+use board::stream::{Answer, Begin, Frame, Link, StreamError, send};
+use flight::guidance::baseline::Controller;
+
+use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
+use crate::log::{Entry, FlightLog, LogError};
+
+/// Why a flight cannot be given to a board.
+#[derive(Debug, thiserror::Error)]
+pub enum FramesError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("{file}: {reason}")]
+    NotWhole { file: String, reason: &'static str },
+    #[error("{path}: {source}")]
+    Write { path: String, source: StreamError<io::Error> },
+}
+
+/// A file that is written only.
+struct NewFile<'p> {
+    path: &'p Path,
+    file: BufWriter<File>,
+    buffer: Vec<u8>,
+}
+
+impl Link for NewFile<'_> {
+    type Error = io::Error;
+
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        Ok(0)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)
+    }
+}
+
+impl<'p> NewFile<'p> {
+    fn create(path: &'p Path) -> Result<Self, FramesError> {
+        let file = File::create_new(path).map_err(|error| failed(path, StreamError::Link(error)))?;
+        Ok(Self { path, file: BufWriter::new(file), buffer: Vec::new() })
+    }
+
+    fn send(&mut self, record: &impl prost::Message) -> Result<(), FramesError> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        let sent = send(self, record, &mut buffer).map_err(|error| failed(self.path, error));
+        self.buffer = buffer;
+        sent
+    }
+
+    fn finish(mut self) -> Result<(), FramesError> {
+        self.file.flush().map_err(|error| failed(self.path, StreamError::Link(error)))
+    }
+}
+
+fn failed(path: &Path, source: StreamError<io::Error>) -> FramesError {
+    FramesError::Write { path: path.display().to_string(), source }
+}
+
+/// Writes the frames of the flight in `log` to `frames`, and what it decided in them to `answers`. Returns the number of
+/// frames. No file is overwritten.
+///
+/// # Errors
+/// The log cannot be read, is damaged, or does not hold one flight from its start on; or a file cannot be written.
+pub fn write_frames(log: &Path, frames: &Path, answers: &Path) -> Result<u64, FramesError> {
+    let mut log = FlightLog::open(log)?;
+    let (mut inputs, mut expected) = (NewFile::create(frames)?, NewFile::create(answers)?);
+    let (mut started, mut from_power_up, mut written) = (false, false, 0);
+    let not_whole =
+        |log: &FlightLog<_>, reason| FramesError::NotWhole { file: log.name().to_owned(), reason };
+    while let Some(stamped) = log.next_entry()? {
+        match stamped.entry {
+            Entry::ComputerStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::ComputerStart(start) => {
+                (started, from_power_up) = (true, true);
+                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                inputs.send(&Begin { at_power_up: Some(*start), ..begin })?;
+            }
+            // The computer of a flight from power-up needs no other start.
+            Entry::PilotStart(_) if from_power_up => {}
+            Entry::PilotStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::PilotStart(start) => {
+                started = true;
+                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                inputs.send(&Begin { in_the_air: Some(*start), ..begin })?;
+            }
+            Entry::ComputerFrame(frame) if from_power_up => {
+                inputs.send(&Frame { from_power_up: Some(frame.input), in_the_air: None })?;
+                let (output, state_digest) = (Some(frame.output), frame.state_digest);
+                expected.send(&Answer { from_power_up: output, in_the_air: None, state_digest })?;
+                written += 1;
+            }
+            Entry::PilotTick(tick) if started && !from_power_up => {
+                inputs.send(&Frame { from_power_up: None, in_the_air: Some(tick.input) })?;
+                let (output, state_digest) = (Some(tick.output), tick.state_digest);
+                expected.send(&Answer { from_power_up: None, in_the_air: output, state_digest })?;
+                written += 1;
+            }
+            // Its part of a frame from power-up.
+            Entry::PilotTick(_) if from_power_up => {}
+            Entry::ComputerFrame(_) | Entry::PilotTick(_) => {
+                return Err(not_whole(&log, "the start of its flight is missing"));
+            }
+            Entry::Unreadable { .. } => {
+                return Err(not_whole(&log, "has a record that this build cannot read"));
+            }
+            _ => {}
+        }
+    }
+    if log.damage().is_some() {
+        return Err(not_whole(&log, "is damaged"));
+    }
+    if written == 0 {
+        return Err(not_whole(&log, "has no frames of a flight computer from its start on"));
+    }
+    inputs.finish()?;
+    expected.finish()?;
+    Ok(written)
+}
+
+/// What the computer of a log is built from, besides its record of the start.
+fn beginning<R: io::Read>(log: &FlightLog<R>) -> Result<Begin, &'static str> {
+    let head = log.head();
+    if head.run.contains_key(SETTINGS_IN_FLIGHT) {
+        return Err("its settings were changed in flight");
+    }
+    if head.run.contains_key(REFLOWN_BY) {
+        return Err("another law took over in flight");
+    }
+    let Some(Ok(toml)) = &head.profile_toml else {
+        return Err("has no mission or profile before its first frame");
+    };
+    let controller = head.run.get("controller").cloned();
+    Ok(Begin {
+        toml: toml.clone(),
+        controller: controller.unwrap_or_else(|| Controller::default().name().to_owned()),
+        at_power_up: None,
+        in_the_air: None,
+    })
+}

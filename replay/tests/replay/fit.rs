@@ -1,0 +1,165 @@
+//! What a flight's log tells of its vehicle, through the command and the library.
+
+use std::io::Cursor;
+use std::process::Command;
+use std::sync::LazyLock;
+
+use proptest::prelude::*;
+use replay::fit::{Fit, Trace, fit};
+use replay::log::FlightLog;
+use sim::draw::draw;
+use sim::recipe::Recipe;
+
+use crate::command_line::run;
+use crate::from_apogee::LANDED;
+use crate::simulated::{MK2, NOMINAL};
+
+fn asked(arguments: &[&str]) -> (i32, String, String) {
+    run(Command::new(env!("CARGO_BIN_EXE_replay")).arg("fit").args(arguments))
+}
+
+fn fits(arguments: &[&str]) -> (Vec<Fit>, serde_json::Value) {
+    let (code, stdout, stderr) = asked(&[arguments, ["--json"].as_slice()].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    (serde_json::from_value(answer["fits"].clone()).unwrap(), answer)
+}
+
+fn close(fit: &Fit, name: &str, truth: f64, bar: f64) {
+    let found = fit.get(name).unwrap_or_else(|| panic!("{name} in {:?}", fit.not_found));
+    assert!((found.value - truth).abs() <= bar, "{name}: {found:?}, truth {truth}");
+    assert!(found.low < found.value && found.value < found.high, "{found:?}");
+}
+
+#[test]
+fn val_simulation_a_field_flight_is_known_within_the_bars() {
+    let recipe = Recipe::built_in("mk2", "field").unwrap();
+
+    let truth = draw(&recipe.mission, &recipe.dispersion, 1, 3).truth;
+    let (found, _) = fits(&[LANDED.log.to_str().unwrap()]);
+    let fit = &found[0];
+    let per_mass = |scale: f64| scale / truth.mass_scale;
+    close(fit, "thrust_scale", per_mass(truth.impulse_scale), 0.01);
+    close(fit, "burn_time_scale", truth.burn_time_scale, 0.01);
+    close(fit, "drag_scale", per_mass(truth.drag_scale), 0.03);
+    close(fit, "ignition_delay", truth.ignition_delay_s, 0.005);
+    close(fit, "gimbal_delay", 0.020, 0.005);
+    close(fit, "gimbal_gain", 1.0, 0.02);
+    close(fit, "gimbal_play", 0.5, 0.1);
+    let (sin, cos) = libm::sincos(truth.wind_towards_rad);
+    close(fit, "wind_x", truth.wind_m_s * cos, 1.0);
+    close(fit, "wind_y", truth.wind_m_s * sin, 1.0);
+    close(fit, "accelerometer_noise", 0.65, 0.05);
+    close(fit, "gyro_noise", 0.05, 0.005);
+    assert!(fit.not_found.iter().any(|lack| lack.name == "mass"), "{:?}", fit.not_found);
+}
+
+/// The vehicle's own log has the gimbal's feedback, which shows its rate.
+#[test]
+fn val_simulation_the_gimbals_feedback_shows_its_delay_and_rate() {
+    let trace = Trace::open(&MK2.log).unwrap();
+    assert!(trace.frames.iter().all(|frame| frame.gimbal_reported_rad.is_some()));
+    let fit = fit(&trace);
+    close(&fit, "gimbal_delay", 0.020, 0.001);
+    close(&fit, "gimbal_rate", 250.0, 10.0);
+}
+
+#[test]
+fn the_mission_with_what_was_found_can_be_loaded_and_is_not_overwritten() {
+    let directory = tempfile::tempdir().unwrap();
+    let patch = directory.path().join("patch.toml");
+    let log = LANDED.log.to_str().unwrap();
+    let write = ["--write-mission", patch.to_str().unwrap()];
+    let (found, _) = fits(&[[log].as_slice(), &write].concat());
+    let text = std::fs::read_to_string(&patch).unwrap();
+    let mission = vehicles::mission::from_toml(&text, "patch").unwrap();
+    let delay_s = mission.airframe.gimbal.servo.delay_s;
+    assert!((delay_s - found[0].get("gimbal_delay").unwrap().value).abs() < 1e-9, "{delay_s}");
+    assert!(text.starts_with("# mk2 with what was found in"), "{text}");
+    let (code, _, stderr) = asked(&[[log].as_slice(), &write].concat());
+    assert_eq!(code, 2);
+    assert!(stderr.contains("exists already"), "{stderr}");
+    assert_eq!(std::fs::read_to_string(&patch).unwrap(), text);
+}
+
+#[test]
+fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
+    let (landed, mk2) = (LANDED.log.to_str().unwrap(), MK2.log.to_str().unwrap());
+    let (found, answer) = fits(&[landed, mk2]);
+    assert_eq!(found.len(), 2);
+    let together = answer["together"].as_array().unwrap();
+    let delay = together.iter().find(|one| one["mean"]["name"] == "gimbal_delay").unwrap();
+    assert_eq!(delay["flights"], 2);
+    let (code, stdout, stderr) = asked(&[landed, "none.mcap"]);
+    assert_eq!(code, 2);
+    assert!(stdout.contains("thrust_scale") && stderr.contains("none.mcap: cannot be read"), "{stderr}");
+}
+
+#[test]
+fn a_planar_log_is_refused_with_the_reason() {
+    let (code, _, stderr) = asked(&[NOMINAL.log.to_str().unwrap()]);
+    assert_eq!(code, 2);
+    assert!(stderr.contains("it is the planar vehicle's"), "{stderr}");
+}
+
+#[test]
+fn a_stands_table_needs_its_motor() {
+    let directory = tempfile::tempdir().unwrap();
+    let table = directory.path().join("burn.csv");
+    let curve = vehicles::motors::builtin("H45W").unwrap();
+    let rows = (0..3500).map(|row| f64::from(row) * 2e-3);
+    let rows = rows.map(|time_s| format!("{time_s},{}\n", 0.97 * curve.thrust_at_n(time_s - 0.12)));
+    std::fs::write(&table, format!("time_s,thrust_n\n{}", rows.collect::<String>())).unwrap();
+    let table = table.to_str().unwrap();
+    let (code, _, stderr) = asked(&[table]);
+    assert!(code == 2 && stderr.contains("--motor is missing"), "{stderr}");
+    let (found, _) = fits(&[table, "--motor", "H45W"]);
+    close(&found[0], "thrust_scale", 0.97, 0.005);
+    close(&found[0], "ignition_delay", 0.12, 0.002);
+    let (code, _, stderr) = asked(&[table, "--motor", "G99"]);
+    assert!(code == 2 && stderr.contains("is neither a built-in motor"), "{stderr}");
+}
+
+/// The log of a flight, for damage.
+static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| std::fs::read(&LANDED.log).unwrap());
+
+/// Frames of a flight without the rest of its log, for cuts and losses.
+static TRACE: LazyLock<Trace> = LazyLock::new(|| Trace::open(&LANDED.log).unwrap());
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn no_damage_to_a_log_panics(at in 0.0..1.0_f64, bit in 0..8_u8, cut in 0.0..1.0_f64) {
+        let mut bytes = BYTES[..(cut * BYTES.len() as f64) as usize].to_vec();
+        let place = (at * bytes.len() as f64) as usize;
+        if let Some(byte) = bytes.get_mut(place) {
+            *byte ^= 1 << bit;
+        }
+        if let Ok(mut log) = FlightLog::read("test.mcap".to_owned(), Cursor::new(bytes))
+            && let Ok(trace) = Trace::read(&mut log)
+        {
+            prop_assert!(fit(&trace).found.iter().all(|found| found.value.is_finite()));
+        }
+    }
+
+    #[test]
+    fn lost_frames_and_wild_numbers_do_not_panic(
+        from in 0.0..1.0_f64,
+        lost in 0..2000_usize,
+        wild in -1e9..1e9_f64,
+        at in 0.0..1.0_f64,
+    ) {
+        let mut trace = TRACE.clone();
+        let place = |share: f64, length: usize| (share * length as f64) as usize;
+        let first = place(from, trace.frames.len());
+        let last = (first + lost).min(trace.frames.len());
+        trace.frames.drain(first..last);
+        let at = place(at, trace.frames.len());
+        if let Some(frame) = trace.frames.get_mut(at) {
+            frame.measured.imu.specific_force_m_s2.x = wild;
+            frame.gimbal_rad[0] = wild;
+        }
+        prop_assert!(fit(&trace).found.iter().all(|found| found.value.is_finite()));
+    }
+}
