@@ -39,7 +39,13 @@ pub(super) struct Stuck {
 impl FollowingWatch {
     /// Takes a command and an angle, degrees. Returns whether the servo is stuck: it stands still although its command is
     /// elsewhere. It says so once.
-    pub(super) fn take(&mut self, time_s: f64, commanded_deg: f64, measured_deg: f64, shown_by: Stuck) -> bool {
+    pub(super) fn take(
+        &mut self,
+        time_s: f64,
+        commanded_deg: f64,
+        measured_deg: f64,
+        shown_by: Stuck,
+    ) -> bool {
         let Some((then_s, wanted_deg, then_deg)) = self.last else {
             self.last = Some((time_s, commanded_deg, measured_deg));
             return false;
