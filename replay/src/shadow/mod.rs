@@ -33,16 +33,16 @@ pub use self::coverage::{Coverage, NOT_CARRIED};
 pub use self::flag::{Check, Flag};
 
 use self::coverage::Rates;
-use self::following::FollowingWatch;
+use self::following::{FollowingWatch, Stuck};
 use self::heard::{Attitude, Descent, Heard, Motion, boot_s, degrees};
 use self::strength::{StrengthWatch, Weak};
 use self::thrust::{Felt, ThrustWatch};
 use self::turning::{Axis, TurningWatch};
 
-/// A servo that stands still this far from its command is stuck, degrees ([`following`] for the gimbal). Fins are commanded
-/// in larger steps: what the flight computer calls "not there" is 0.1 rad.
-const GIMBAL_GAP_DEG: f64 = 3.0;
-const FIN_GAP_DEG: f64 = 6.0;
+/// A servo that stands still this far from its command is stuck ([`following`]). Fins are commanded in larger steps: what the
+/// flight computer calls "not there" is 0.1 rad.
+const STUCK_GIMBAL: Stuck = Stuck { gap_deg: 3.0, pairs: 1 };
+const STUCK_FIN: Stuck = Stuck { gap_deg: 6.0, pairs: 2 };
 /// The thrust is found by two frames above a tenth of the peak, s.
 const FOUND_AFTER_S: f64 = 0.01;
 /// A longer time between two phases heard does not say when the second one began, s. The status is sent five times a
@@ -335,7 +335,7 @@ impl Shadow {
         }
         let servos = self.gimbal.iter_mut().zip(angles).zip(axes);
         let stuck = servos.filter_map(|((servo, angle), (_, _, signal))| {
-            stuck(servo, at_s, angle, GIMBAL_GAP_DEG, (Check::Gimbal, signal))
+            stuck(servo, at_s, angle, STUCK_GIMBAL, (Check::Gimbal, signal))
         });
         stuck.collect()
     }
@@ -357,7 +357,7 @@ impl Shadow {
         let servos = self.fins.iter_mut().zip(angles).zip(SIGNALS);
         let stuck = servos.filter_map(|((servo, (commanded, measured)), signal)| {
             let angle = Axis { commanded_deg: degrees(commanded), measured_deg: degrees(measured) };
-            stuck(servo, at_s, angle, FIN_GAP_DEG, (Check::Fins, signal))
+            stuck(servo, at_s, angle, STUCK_FIN, (Check::Fins, signal))
         });
         stuck.collect()
     }
@@ -376,11 +376,11 @@ fn stuck(
     servo: &mut FollowingWatch,
     at_s: f64,
     angle: Axis,
-    gap_deg: f64,
+    shown_by: Stuck,
     (check, signal): (Check, &'static str),
 ) -> Option<Flag> {
     let Axis { commanded_deg, measured_deg } = angle;
-    servo.take(at_s, commanded_deg, measured_deg, gap_deg).then(|| Flag {
+    servo.take(at_s, commanded_deg, measured_deg, shown_by).then(|| Flag {
         time_s: 0.0,
         boot_s: at_s,
         check,
