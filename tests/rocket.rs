@@ -39,7 +39,7 @@ fn a_lift_off_that_nobody_asked_for_is_flown_to_the_parachute() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
     let mut command = vehicle(folder.path(), &[&ground.link()]);
-    let fault = ["--fault", "ascent-self-lights@8"];
+    let fault = ["--fault", "ascent-self-lights@pad+5"];
     let flight = ["--profile", "mk2", "--start", "pad", "--stay", "--speed", "2"];
     let vehicle = Running::start(command.args(flight).args(fault));
     ground.wait_for_status("a boost", |status| status.phase == TdPhase::TD_PHASE_BOOST);

@@ -37,10 +37,14 @@ impl Injector {
         self.entered_s[usize::from(phase.index())].get_or_insert(time_s);
         let entered_s = self.entered_s;
         let due = |fault: &TimedFault| match fault.when {
-            When::Time(at_s) => time_s >= at_s,
+            // The start is the release.
+            When::Time(at_s) => !phase.on_pad() && time_s >= at_s,
             // The delay was drawn together with the flight.
-            When::PhaseBetween(phase, [delay_s, _]) | When::Phase(phase, delay_s) => {
-                entered_s[usize::from(phase.index())].is_some_and(|entered_s| time_s >= entered_s + delay_s)
+            When::PhaseBetween(since, [delay_s, _]) | When::Phase(since, delay_s) => {
+                let entered_s = entered_s[usize::from(since.index())];
+                // The time begins anew with the release.
+                since.on_pad() == phase.on_pad()
+                    && entered_s.is_some_and(|entered_s| time_s >= entered_s + delay_s)
             }
         };
         let (now, later): (Vec<_>, Vec<_>) = self.waiting.drain(..).partition(due);

@@ -126,6 +126,8 @@ const NAMES: &[(&str, &str, Build)] = &[
 
 /// The phases, with their names in the text of a fault.
 const PHASES: &[(&str, Phase)] = &[
+    ("pad", Phase::PadIdle),
+    ("pad-armed", Phase::PadArmed),
     ("boost", Phase::Boost),
     ("coast", Phase::Coast),
     ("apogee", Phase::Deploy),
@@ -264,7 +266,7 @@ mod tests {
             "gimbal-stuck@powered",
             "accelerometer-dead@boost",
             "barometer-step:-20@coast+1",
-            "ascent-self-lights@12",
+            "ascent-self-lights@pad-armed+3",
             "gimbal-jams:3@powered+0.5..2",
             "ascent-weak:0.6@boost",
             "ascent-no-light@0",

@@ -172,6 +172,10 @@ impl Sortie {
 
     /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
     fn begin(&mut self) {
+        // A motor that lit itself is on its way already.
+        if self.world.booster_thrust_n() > 0.0 {
+            return;
+        }
         // Both were already set up at power-up, which would have found any error.
         if let Ok(world) = start::world(&self.mission, &self.drawn) {
             self.world = world;
@@ -189,14 +193,11 @@ impl Sortie {
 
     /// Flies one frame.
     pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Flown {
-        if self.computer.released_at_s().is_some() {
-            let due = self.injector.due(self.world.time_s(), self.computer.mode().phase);
-            for breakage in due {
-                self.break_down(&breakage);
-            }
-        } else if let Some(rehearsal) =
-            self.rehearsal.as_mut().filter(|_| self.computer.mode().phase != Phase::Safe)
-        {
+        for breakage in self.injector.due(self.world.time_s(), self.computer.mode().phase) {
+            self.break_down(&breakage);
+        }
+        let waits = self.computer.released_at_s().is_none() && self.computer.mode().phase != Phase::Safe;
+        if let Some(rehearsal) = self.rehearsal.as_mut().filter(|_| waits) {
             rehearsal.step();
         }
         self.let_go_when_cleared();
