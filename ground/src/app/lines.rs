@@ -8,6 +8,7 @@ use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 use protocol::log::recorder::RecorderError;
 
 use crate::model::Model;
+use crate::model::judgement::Standard;
 use crate::model::motor::KeepAway;
 use crate::model::vehicle::Verdict;
 use crate::view::limit_rows::limit_rows;
@@ -96,7 +97,9 @@ fn verdict_table(verdict: &Verdict, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -
         );
     }
     let (word, _) = verdict_word(verdict.landed);
-    let _ = writeln!(text, "{word}");
+    // By one standard only: the vehicle says in its own words what the other one makes of it.
+    let whose = if verdict.landed { format!(" of {}", Standard::whose(limits)) } else { String::new() };
+    let _ = writeln!(text, "{word}{whose}");
     text
 }
 
