@@ -81,7 +81,9 @@ pub(super) struct Along {
 
 impl Along {
     pub(super) fn begins_s(&self) -> Option<f64> {
-        self.commanded_s.map(|at_s| at_s + self.solution.values[DELAY])
+        // A log that ends right after the command has no burn to find it in.
+        let delay_s = self.solution.values.get(DELAY)?;
+        Some(self.commanded_s? + delay_s)
     }
 
     /// Drag of body and fins together, as they were opened in this fall, over that of the data, and its standard deviation.
