@@ -10,6 +10,7 @@
 //! launch sites ask of a second person.
 
 use super::operator::Operator;
+use crate::computer::memory::remembers;
 
 /// How long an ask waits for its confirmation, s.
 pub const CONFIRM_WITHIN_S: f64 = 10.0;
@@ -215,15 +216,7 @@ impl TwoPerson {
     }
 }
 
-impl crate::computer::memory::Remembers for TwoPerson {
-    fn remember(&self, memory: &mut crate::computer::memory::Memory) {
-        let Self { asks, ask, armed, tapping } = self;
-        asks.remember(memory);
-        ask.remember(memory);
-        armed.remember(memory);
-        tapping.remember(memory);
-    }
-}
+remembers!(TwoPerson { asks, ask, armed, tapping });
 
 #[cfg(test)]
 mod tests;
