@@ -162,7 +162,7 @@ impl AscentWatch {
 
     fn has_burnt_out(&mut self, seen: &AscentSeen) -> bool {
         let braking = seen.axial_specific_force_m_s2 < 0.0;
-        self.braking_s = if braking { self.braking_s + seen.frame_s } else { 0.0 };
+        self.braking_s = lasts_s(self.braking_s, Some(braking), seen.frame_s);
         self.braking_s >= BRAKING_S
     }
 
@@ -188,16 +188,21 @@ impl AscentWatch {
                 (self.climbing, self.mark_m, self.marked_at_s) = (gained, altitude_m, seen.time_s);
             }
         }
-        // Samples come in some frames only; between them the last one counts.
         let ground_m = self.ground_m.unwrap_or(f64::INFINITY);
-        let risen =
-            seen.pressure_altitude_m.map_or(self.risen_s > 0.0, |altitude_m| altitude_m > ground_m + RISEN_M);
-        self.risen_s = if risen && !disturbed { self.risen_s + seen.frame_s } else { 0.0 };
-        let sunk = seen
-            .pressure_altitude_m
-            .map_or(self.sunk_s > 0.0, |altitude_m| altitude_m < self.highest_m - SUNK_M);
-        self.sunk_s = if sunk && !disturbed { self.sunk_s + seen.frame_s } else { 0.0 };
+        let is_now = |compare: &dyn Fn(f64) -> bool| {
+            if disturbed { Some(false) } else { seen.pressure_altitude_m.map(compare) }
+        };
+        let risen = is_now(&|altitude_m| altitude_m > ground_m + RISEN_M);
+        let sunk = is_now(&|altitude_m| altitude_m < self.highest_m - SUNK_M);
+        self.risen_s = lasts_s(self.risen_s, risen, seen.frame_s);
+        self.sunk_s = lasts_s(self.sunk_s, sunk, seen.frame_s);
     }
+}
+
+/// For how long something has been so, s, after one more frame. Samples come in some frames only; between them the last one
+/// counts.
+fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
+    if is_now.unwrap_or(before_s > 0.0) { before_s + frame_s } else { 0.0 }
 }
 
 /// What is felt along the axis, m/s^2.
