@@ -61,8 +61,6 @@ pub struct VehicleEndpoint {
     warned_of_twin: bool,
     /// The known stations, and how well each is heard.
     stations: Stations,
-    /// Who may command, by the numbers of their keys; empty without operators.
-    operators: Vec<Operator>,
     /// Whether the vehicle starts by itself, so that no station has to be heard.
     starts_by_itself: bool,
     /// Commands that the vehicle decides in its next frame.
@@ -130,9 +128,9 @@ impl VehicleEndpoint {
 
     /// The same for a vehicle with operators. A frame's signature must have been checked with the key that its link id
     /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
-    pub fn sending_to_crew(standard: &'static [Standard], operators: &[Operator]) -> Self {
+    pub fn sending_to_crew(standard: &'static [Standard]) -> Self {
         let endpoint = Self::over(Streams::with_crew(standard), SIGNATURE_LEN);
-        Self { operators: operators.to_vec(), stations: Stations::of_a_crew(), ..endpoint }
+        Self { stations: Stations::of_a_crew(), ..endpoint }
     }
 
     fn over(streams: Streams, signature_len: usize) -> Self {
@@ -146,7 +144,6 @@ impl VehicleEndpoint {
             warned_of_twin: false,
             known: BTreeSet::new(),
             stations: Stations::default(),
-            operators: Vec::new(),
             starts_by_itself: false,
             waiting: Vec::new(),
             refusals: Refusals::default(),
@@ -208,7 +205,7 @@ impl VehicleEndpoint {
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
-                let by = self.operator_of(frame);
+                let by = operator_of(frame, vehicle);
                 self.on_command(link, (&request, by), vehicle);
             }
             return;
@@ -308,7 +305,7 @@ impl VehicleEndpoint {
 
     /// Reports an ask, a confirmation, a tap and a take-over at once.
     fn watch_the_crew(&mut self, vehicle: &Vehicle) {
-        if self.operators.is_empty() {
+        if vehicle.operators().is_empty() {
             return;
         }
         let memory = vehicle.computer().crew();
@@ -327,11 +324,6 @@ impl VehicleEndpoint {
     fn lane(&mut self, link: usize) -> &mut Lane {
         let place = self.lanes.iter().position(|lane| lane.links.contains(&link)).unwrap_or(0);
         &mut self.lanes[place]
-    }
-
-    /// The operator whose key has signed a frame.
-    fn operator_of(&self, frame: &Frame) -> Option<Operator> {
-        self.operators.iter().find(|operator| operator.number == frame.key_number()).copied()
     }
 
     fn on_command(
@@ -375,7 +367,7 @@ impl VehicleEndpoint {
     /// Why this station may not set rates now, if so. While the vehicle is armed, only the station that armed it may
     /// set them; if the vehicle armed itself, every station may.
     fn rates_forbidden(&self, station: Address, by: Option<Operator>, vehicle: &Vehicle) -> Option<String> {
-        if !self.operators.is_empty() && by.is_none() {
+        if !vehicle.operators().is_empty() && by.is_none() {
             return Some("only an operator with a key of their own sets rates".to_owned());
         }
         let Address { system_id, component_id } =
@@ -461,6 +453,11 @@ impl VehicleEndpoint {
             }
         }
     }
+}
+
+/// The operator whose key has signed a frame.
+fn operator_of(frame: &Frame, vehicle: &Vehicle) -> Option<Operator> {
+    vehicle.operators().iter().find(|operator| operator.number == frame.key_number()).copied()
 }
 
 /// Whether a forced disarm is an abort, as in the air. Other ground stations call it an emergency stop or a kill.

@@ -5,8 +5,8 @@ use protocol::frame::Frame;
 use protocol::ftp::FileRequest;
 use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
-use super::VehicleEndpoint;
 use super::lists::ListQuestion;
+use super::{VehicleEndpoint, operator_of};
 use crate::parameters;
 use crate::vehicle::Vehicle;
 use flight::computer::news::Severity;
@@ -27,7 +27,7 @@ impl VehicleEndpoint {
         if !self.us.accepts(request.target) {
             return true;
         }
-        let (asker, by) = (frame.source(), self.operator_of(frame));
+        let (asker, by) = (frame.source(), operator_of(frame, vehicle));
         match request.question {
             ParamQuestion::List => self.lane(link).list_parameters(),
             ParamQuestion::Read(key) => {

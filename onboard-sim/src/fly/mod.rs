@@ -21,7 +21,7 @@ use protocol::log::v1::LandingVerdict;
 use protocol::transport::LinkAddress;
 use sim::recipe::RecipeError;
 use tokio::sync::watch;
-use vehicles::profile::ProfileError;
+use vehicles::file_error::FileError;
 
 pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
@@ -132,7 +132,7 @@ pub enum FlyError {
     },
     /// The profile is wrong.
     #[error(transparent)]
-    Profile(#[from] ProfileError),
+    Profile(#[from] FileError),
     /// The mission is wrong.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
@@ -229,7 +229,7 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
 /// The vehicle's endpoint, set up from the options.
 fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEndpoint {
     let endpoint = match (&options.crew, &options.key_file) {
-        (Some(crew), _) => VehicleEndpoint::sending_to_crew(standard, &crew::operators_of(crew)),
+        (Some(_), _) => VehicleEndpoint::sending_to_crew(standard),
         (None, Some(_)) => VehicleEndpoint::sending_signed(standard),
         (None, None) => VehicleEndpoint::sending(standard),
     };

@@ -69,18 +69,18 @@ impl Launch {
         let keys = numbers.map(|number| (number, key(number))).collect();
         let signing = Signing::new(key(100), Memory::default()).with_operators(keys);
         let station = |place: usize| {
-            let shared = if place == STRANGER { key(200) } else { key(100) };
-            let signing = Signing::new(shared, Memory::default());
+            let with = |key| Signing::new(key, Memory::default());
             let signing = match place {
-                OBSERVER | STRANGER => signing,
-                _ => signing.as_operator(place as u8 + 1, key(place as u8 + 1)),
+                STRANGER => with(key(200)),
+                OBSERVER => with(key(100)),
+                _ => with(key(place as u8 + 1)).as_operator(place as u8 + 1, key(100)),
             };
             let address = Address { system_id: 255 - place as u8, component_id: 190 };
             Station { encoder: Encoder::new(address), signing }
         };
         let mut launch = Self {
-            vehicle: planar().with_crew(people, operators.clone()),
-            endpoint: VehicleEndpoint::sending_to_crew(&STANDARD, &operators),
+            vehicle: planar().with_crew(people, operators),
+            endpoint: VehicleEndpoint::sending_to_crew(&STANDARD),
             hub: Hub::new(1, Some(signing)),
             stations: (0..6).map(station).collect(),
             speaking: vec![RANGE, FLIGHT, PAD],
