@@ -213,19 +213,21 @@ impl Streams {
     }
 
     fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64, crew: bool) -> Self {
-        let mut place = 0;
+        let mut place = 0_usize;
         let streams = messages.iter().map(|standard| {
-            place += usize::from(crew || !standard.of_crew);
+            let carried = crew || !standard.of_crew;
             let rate_max_hz = if is_vital(standard.message_id) { f64::INFINITY } else { rate_max_hz };
-            let sent = standard.rate_hz > 0.0 && (crew || !standard.of_crew);
-            let interval_s = sent.then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
+            let interval_s =
+                (carried && standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
+            // Spread in time, so that the slow messages are not all due at the same instant.
+            let due_s = 0.02 * place as f64;
+            place += usize::from(carried);
             Stream {
                 message_id: standard.message_id,
                 frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
                 default_interval_s: interval_s,
                 interval_s,
-                // Spread in time, so that the slow messages are not all due at the same instant.
-                due_s: 0.02 * (place - 1) as f64,
+                due_s,
                 sent_s: f64::NEG_INFINITY,
             }
         });
