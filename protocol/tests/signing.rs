@@ -214,9 +214,12 @@ fn crew() -> (Signing, [Signing; 3]) {
     let [shared, ann, bob] = [1, 2, 3].map(|byte| Key::new([byte; Key::LEN]));
     let vehicle = Signing::new(shared.clone(), Memory::default())
         .with_operators([(1, ann.clone()), (2, bob.clone())].into());
-    let station = |shared: &Key| Signing::new(shared.clone(), Memory::default());
-    let stations =
-        [station(&shared), station(&shared).as_operator(1, ann), station(&shared).as_operator(2, bob)];
+    let station = |key: &Key| Signing::new(key.clone(), Memory::default());
+    let stations = [
+        station(&shared),
+        station(&ann).as_operator(1, shared.clone()),
+        station(&bob).as_operator(2, shared),
+    ];
     (vehicle, stations)
 }
 

@@ -36,10 +36,9 @@ impl KeyRing {
         else {
             return Ok(Self { key: Some(KeyFile::open(shared, "ground")?), owner: None });
         };
-        let own = KeyFile::read_key(path)?;
-        let (file, mut signing) =
+        let (file, signing) =
             KeyFile::open(path, "ground").with_context(|| format!("the timestamps of {}", member.name))?;
-        signing = signing.checking_with(KeyFile::read_key(shared)?).as_operator(*number, own);
+        let signing = signing.as_operator(*number, KeyFile::read_key(shared)?);
         let owner = KeyOwner { number: *number, name: member.name.clone() };
         Ok(Self { key: Some((file, signing)), owner: Some(owner) })
     }

@@ -150,7 +150,7 @@ fn nobody_turns_another_one_s_frame_into_a_copy() {
     let vehicle = Signing::new(shared.clone(), Memory::default()).with_operators([(1, ann.clone())].into());
     let mut hub = Hub::new(2, Some(vehicle));
     let mut observer = Signing::new(shared.clone(), Memory::default());
-    let mut ann = Signing::new(shared, Memory::default()).as_operator(1, ann);
+    let mut ann = Signing::new(ann, Memory::default()).as_operator(1, shared);
     let abort = Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     let take = |hub: &mut Hub, link: usize, frame: Frame| {
         hub.take(link, Received::Stream(0, frame.as_bytes().to_vec()), Duration::ZERO, 6_000_000)

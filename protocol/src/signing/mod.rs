@@ -185,16 +185,10 @@ impl Signing {
         }
     }
 
-    /// Checks what the vehicle sends with this key, the one that all share.
+    /// Signs as the operator of this number from now on; what the vehicle sends is checked with the key that all share.
     #[must_use]
-    pub fn checking_with(self, shared: Key) -> Self {
-        Self { shared, ..self }
-    }
-
-    /// Signs with an operator's key from now on; what the vehicle sends is still checked with the shared one.
-    #[must_use]
-    pub fn as_operator(self, number: u8, key: Key) -> Self {
-        Self { own: (key_number(number), key), ..self }
+    pub fn as_operator(self, number: u8, shared: Key) -> Self {
+        Self { own: (key_number(number), self.own.1), shared, ..self }
     }
 
     /// Checks frames that name an operator with that operator's key. A frame that names an unknown one is refused.
