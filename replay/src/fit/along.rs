@@ -13,9 +13,11 @@
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
-use flight::vehicle::airframe::MassModel;
+use flight::vehicle::airframe::{MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
+use flight::vehicle::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
+use world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
 use super::least_squares::{Prior, Solution, inflate, solve, solve_from};
@@ -81,7 +83,7 @@ pub(super) struct Along {
 
 impl Along {
     pub(super) fn begins_s(&self) -> Option<f64> {
-        // A log that ends right after the command has no burn to find it in.
+        // Without thrust the fit has no burn to find it in.
         let delay_s = self.solution.values.get(DELAY)?;
         Some(self.commanded_s? + delay_s)
     }
@@ -143,10 +145,12 @@ pub(super) fn follows(before: &Frame, frame: &Frame) -> bool {
     frame.time_s - before.time_s < 1.5 * FRAME_S
 }
 
-fn samples(trace: &Trace, frames: &[Frame], thrust_along: &dyn Fn(f64) -> f64) -> Vec<Sample> {
-    let mission = &trace.mission;
-    let mass_model = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
-    let mass = mass_model.at(0.0);
+fn samples(
+    mission: &Mission,
+    mass: &MassProperties,
+    frames: &[Frame],
+    thrust_along: &dyn Fn(f64) -> f64,
+) -> Vec<Sample> {
     let pairs = frames.first().map(|first| (first, first)).into_iter();
     let pairs = pairs.chain(frames.windows(2).map(|pair| (&pair[0], &pair[1])));
     let sampled = pairs.map(|(before, frame)| {
@@ -161,7 +165,7 @@ fn samples(trace: &Trace, frames: &[Frame], thrust_along: &dyn Fn(f64) -> f64) -
         let state = &frame.believed.state;
         let height_m = state.position_m.z;
         let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
-        let vehicle = VehicleNow::of(&mission.airframe, &mass, density, fins_rad, false, 0.0);
+        let vehicle = VehicleNow::of(&mission.airframe, mass, density, fins_rad, false, 0.0);
         let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
         let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
         let rate = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
@@ -173,16 +177,12 @@ fn samples(trace: &Trace, frames: &[Frame], thrust_along: &dyn Fn(f64) -> f64) -
             body_n: body.air_force_n(&through_air, &rate).x,
             fins_n: fins.air_force_n(&through_air, &rate).x,
             by_updraught: 0.5 * (in_updraught(1.0) - in_updraught(-1.0)),
-            way: near.then(|| through_air.norm() * FRAME_S / gust_length_m(height_m)),
+            // The length does not depend on the wind.
+            way: near.then(|| through_air.norm() * FRAME_S / GustScales::at(height_m, 0.0).vertical_m),
             thrust_along: thrust_along(frame.time_s),
         }
     });
     sampled.collect()
-}
-
-/// Length of vertical gusts: the height, between 10 and 1,000 ft.
-fn gust_length_m(height_m: f64) -> f64 {
-    height_m.clamp(3.048, 304.8)
 }
 
 /// Vertical gusts of unit intensity: two equal lags in a row, over a fraction of the length.
@@ -219,6 +219,7 @@ pub(super) fn white_variance(values: &[f64]) -> Option<f64> {
 /// The samples with what the fits of them share.
 struct Series<'a> {
     trace: &'a Trace,
+    frames: &'a [Frame],
     samples: Vec<Sample>,
     /// How many of them are before the igniter was fired.
     fallen: usize,
@@ -233,19 +234,21 @@ struct Series<'a> {
 impl<'a> Series<'a> {
     fn new(trace: &'a Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Self, &'static str> {
         let commanded_s = commanded_s(trace);
-        let samples = samples(trace, falling(trace), thrust_along);
+        let frames = falling(trace);
+        let mission = &trace.mission;
+        let mass_model = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
+        let loaded = mass_model.at(0.0);
+        let samples = samples(mission, &loaded, frames, thrust_along);
         let fallen = samples.partition_point(|sample| commanded_s.is_none_or(|at_s| sample.end_s <= at_s));
         if fallen < FEWEST_FRAMES {
             return Err("the flight has less than half a second of free fall");
         }
-        let propellant_kg = trace.mission.motor_curve.propellant_mass_kg();
-        let mass_model = MassModel::new(&trace.mission.airframe.mass, propellant_kg);
         let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.felt_m_s2).collect::<Vec<_>>();
         let quiet =
             white_variance(&felt(&samples[..fallen])).ok_or("the accelerometer's samples do not change")?;
         let shaken = white_variance(&felt(&samples[fallen..])).unwrap_or(quiet).max(quiet);
-        let loaded_kg = mass_model.at(0.0).mass_kg;
-        Ok(Self { trace, samples, fallen, commanded_s, mass_model, loaded_kg, quiet, shaken })
+        let loaded_kg = loaded.mass_kg;
+        Ok(Self { trace, frames, samples, fallen, commanded_s, mass_model, loaded_kg, quiet, shaken })
     }
 
     fn fall(&self) -> &[Sample] {
@@ -313,7 +316,7 @@ impl<'a> Series<'a> {
 pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, &'static str> {
     let series = Series::new(trace, thrust_along)?;
     let mission = &trace.mission;
-    let at_ignition = &falling(trace)[series.fallen - 1].believed;
+    let at_ignition = &series.frames[series.fallen - 1].believed;
     let bias = Prior {
         mean: at_ignition.accelerometer_bias_m_s2.x,
         sigma: at_ignition.sigmas.accelerometer_bias_m_s2.x.max(1e-4),
@@ -372,12 +375,7 @@ const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples"
 
 /// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over what was felt when the
 /// igniter was fired, for three frames. `None` if they do not, or if the burn is not seen for half a second.
-fn thrust_seen_s(
-    samples: &[Sample],
-    commanded_s: f64,
-    mass_kg: f64,
-    mission: &flight::vehicle::mission::Mission,
-) -> Option<f64> {
+fn thrust_seen_s(samples: &[Sample], commanded_s: f64, mass_kg: f64, mission: &Mission) -> Option<f64> {
     const SEEN_FRAMES: usize = 100;
     let rise_m_s2 = 0.1 * mission.motor_curve.peak_thrust_n() / mass_kg;
     let before = samples.first()?.felt_m_s2;

@@ -54,6 +54,16 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
     assert!(fit.not_found.iter().any(|lack| lack.name == "mass"), "{:?}", fit.not_found);
 }
 
+/// Fired, but without thrust: there is no burn to fit.
+#[test]
+fn a_motor_that_did_not_light_is_told_as_that() {
+    let dark = crate::from_apogee::fly(&["no-light@0"]);
+    let fit = fit(&Trace::open(&dark.log).unwrap());
+    let lack = fit.not_found.iter().find(|lack| lack.name == "thrust_scale").unwrap();
+    assert_eq!(lack.reason, "no thrust was seen after the igniter was fired");
+    assert!(fit.get("drag_scale").is_some() && fit.get("gimbal_delay").is_none());
+}
+
 /// The vehicle's own log has the gimbal's feedback, which shows its rate.
 #[test]
 fn val_simulation_the_gimbals_feedback_shows_its_delay_and_rate() {
