@@ -10,7 +10,7 @@ use replay::learn::{self, learn};
 use replay::print::{print_json, print_learn};
 use serde::Deserialize;
 
-use super::{Answer, answer, refuse_existing, say, warn_of_damage, write_new};
+use super::{Answer, answer, refuse_existing, say, text_of, warn_of_damage, write_new};
 
 #[derive(Debug, Args)]
 pub(super) struct Ask {
@@ -112,15 +112,4 @@ impl Ask {
         answer(|output| if self.json { print_json(&learnt, output) } else { print_learn(&learnt, output) })?;
         Ok(Answer::Compared { within: learnt.go })
     }
-}
-
-/// The text of a built-in, or of a file.
-fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> Result<String> {
-    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
-        return Ok((*text).to_owned());
-    }
-    std::fs::read_to_string(name).with_context(|| {
-        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
-    })
 }

@@ -207,6 +207,17 @@ fn refuse_existing(path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The text of a built-in, or of a file.
+fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> Result<String> {
+    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
+        return Ok((*text).to_owned());
+    }
+    std::fs::read_to_string(name).with_context(|| {
+        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
+    })
+}
+
 /// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second
 /// one ends the program.
 fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {

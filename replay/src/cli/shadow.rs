@@ -18,7 +18,7 @@ use replay::log::{Entry, FlightLog};
 use replay::print::{ShadowReport, print_flag, print_json, print_shadow};
 use replay::shadow::{Flag, Shadow};
 
-use super::{Answer, answer, say, stop_on_interrupt};
+use super::{Answer, answer, say, stop_on_interrupt, text_of};
 
 /// How often a silent link is left to look for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
@@ -142,18 +142,10 @@ impl Ask {
 
     /// The shadow of the profile asked for, or of the log's; with the profile's text.
     fn shadow(&self, recorded: Option<String>) -> Result<(Shadow, String)> {
-        let builtins = || vehicles::mission::BUILTIN.iter().chain(vehicles::profile::BUILTIN);
         let (origin, text) = match (&self.profile, recorded) {
             (Some(name), _) => {
-                let known = builtins().find(|(known, _)| known == name).map(|(_, text)| (*text).to_owned());
-                let text = match known {
-                    Some(text) => text,
-                    None => std::fs::read_to_string(name).with_context(|| {
-                        let names = builtins().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-                        format!("--profile {name}: not a file, and the built-in ones are {names}")
-                    })?,
-                };
-                (name.clone(), text)
+                let built_in = [vehicles::mission::BUILTIN, vehicles::profile::BUILTIN].concat();
+                (name.clone(), text_of(name, &built_in, "profile")?)
             }
             (None, Some(text)) => (self.connect.clone(), text),
             (None, None) => {

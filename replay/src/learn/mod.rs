@@ -12,6 +12,7 @@ pub mod posterior;
 pub mod rate;
 
 use std::num::NonZeroUsize;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flight::guidance::baseline::{Controller, Law};
@@ -257,9 +258,7 @@ fn fly(ask: &Ask<'_>, lots: &[Lot], day: &Day) -> Result<Vec<Trial>, LearnError>
         let workers: Vec<_> = (0..ask.jobs.get().min(ask.flights.max(1))).map(|_| scope.spawn(one)).collect();
         let mut landed = vec![false; motors.len()];
         for worker in workers {
-            // A worker that panicked has said so; its flights count as not landed.
-            let Ok(flown) = worker.join() else { continue };
-            for (number, legs) in flown? {
+            for (number, legs) in worker.join().unwrap_or_else(|panic| resume_unwind(panic))? {
                 landed[number] = legs;
             }
         }
