@@ -2,6 +2,7 @@
 
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
+use vehicles::file_error::FileError;
 use vehicles::mission::MissionError;
 
 use crate::dispersion::{Dispersion, DispersionError};
@@ -84,7 +85,7 @@ impl Recipe {
 /// The text is not TOML.
 pub fn toml_starting_at(mission_toml: &str, origin: &str, start: StartPoint) -> Result<String, MissionError> {
     let mut document: toml_edit::DocumentMut =
-        mission_toml.parse().map_err(|error: toml_edit::TomlError| MissionError::Parse {
+        mission_toml.parse().map_err(|error: toml_edit::TomlError| FileError::Parse {
             origin: origin.to_owned(),
             message: error.to_string(),
         })?;

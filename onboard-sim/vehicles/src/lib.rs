@@ -8,6 +8,7 @@
 //! * [`motors`]: the built-in motors, by name.
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
 //! * [`profile`]: profiles of planar landings, from TOML.
+//! * [`file_error`]: why a mission or a profile cannot be used.
 
 // The unit tests of `flight` compile these files as one of their modules, which cannot say this.
 #![cfg_attr(not(test), no_std)]
@@ -17,6 +18,7 @@ extern crate alloc;
 // The unit tests of `flight` compile these files as one of their own modules, so paths here start with `super` or
 // `flight`.
 pub mod airframe;
+pub mod file_error;
 pub mod mission;
 pub mod motors;
 pub mod profile;

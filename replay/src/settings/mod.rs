@@ -21,7 +21,7 @@ use std::str::FromStr;
 
 use flight::guidance::baseline::UnknownController;
 use flight::vehicle::profile::Profile;
-use vehicles::profile::ProfileError;
+use vehicles::file_error::FileError;
 
 use self::names::Names;
 
@@ -73,7 +73,7 @@ pub enum SettingError {
     Profile {
         settings: String,
         /// What is wrong.
-        source: ProfileError,
+        source: FileError,
     },
 }
 

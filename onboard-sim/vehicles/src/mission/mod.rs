@@ -6,7 +6,7 @@ mod validate;
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
-use alloc::string::{String, ToString as _};
+use alloc::string::String;
 
 use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::mission::Mission;
@@ -15,6 +15,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::airframe;
+use super::file_error::FileError;
 use super::motors::{self, MotorError};
 
 /// The built-in missions: name and TOML text.
@@ -31,25 +32,9 @@ pub const BUILTIN: &[(&str, &str)] = &[
 /// Why a mission cannot be flown.
 #[derive(Debug, thiserror::Error)]
 pub enum MissionError {
-    /// The text is not a mission.
-    #[error("{origin}: {message}")]
-    Parse {
-        /// Where the text came from (a path or a built-in's name).
-        origin: String,
-        /// The parser's words, with line, column and key.
-        message: String,
-    },
-    /// A key holds a value outside its range.
-    #[error("{origin}: {key} = {found}: must be {required}")]
-    Value {
-        /// Where the text came from.
-        origin: String,
-        /// The key, with its section.
-        key: String,
-        found: String,
-        /// The accepted range, in words.
-        required: &'static str,
-    },
+    /// The text is not a mission, or a key holds a value outside its range.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// What the mission expects of the sensors is out of range.
     #[error("{origin}")]
     Estimator {
@@ -76,10 +61,7 @@ pub enum MissionError {
 /// # Errors
 /// [`MissionError`] names the key and what would be accepted.
 pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
-    let not_a_mission = |error: toml::de::Error| MissionError::Parse {
-        origin: origin.to_owned(),
-        message: error.to_string(),
-    };
+    let not_a_mission = |error: toml::de::Error| FileError::not_toml(origin, &error);
     let mission: Mission = match with_the_named_airframe(text).map_err(not_a_mission)? {
         Some(expanded) => toml::from_str(&expanded),
         None => toml::from_str(text),
@@ -89,12 +71,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         .estimator
         .validate()
         .map_err(|source| MissionError::Estimator { origin: origin.to_owned(), source })?;
-    validate::validate(&mission).map_err(|bad| MissionError::Value {
-        origin: origin.to_owned(),
-        key: bad.key,
-        found: bad.found,
-        required: bad.required,
-    })?;
+    validate::validate(&mission).map_err(|bad| FileError::bad_value(origin, bad))?;
     check_start(&mission, origin)?;
     let motor = mission.airframe.motor.clone();
     let mut mission = with_motor(mission, &motor)?;
