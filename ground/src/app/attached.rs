@@ -6,6 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
+use protocol::mission::MissionHash;
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
@@ -17,8 +18,6 @@ use super::server::read_one;
 use super::signals::Signals;
 use super::stations;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
-use protocol::mission::MissionHash;
-
 use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
 use crate::attach::socket;
 use crate::config::Config;

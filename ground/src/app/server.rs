@@ -7,14 +7,13 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::mission::MissionHash;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
 
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
-use protocol::mission::MissionHash;
-
 use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
 use crate::attach::socket;
 use crate::model::Model;
