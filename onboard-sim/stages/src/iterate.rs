@@ -48,6 +48,15 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         self.intervals.resize(intervals);
     }
 
+    /// Moves to the point of another iterate of the same size. The intervals there are not evaluated yet.
+    pub(crate) fn move_to(&mut self, point: &Self) {
+        self.states.copy_from_slice(&point.states);
+        self.inputs.copy_from_slice(&point.inputs);
+        self.costates.copy_from_slice(&point.costates);
+        self.limits.copy_from_slice(&point.limits);
+        self.elastics.copy_from_slice(&point.elastics);
+    }
+
     /// Evaluates every interval at the iterate, with derivatives if asked for.
     pub(crate) fn evaluate(&mut self, model: &M, derivatives: bool) {
         model.evaluate(&self.states, &self.inputs, &self.costates, derivatives, &mut self.intervals);

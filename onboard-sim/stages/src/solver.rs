@@ -20,6 +20,11 @@ const RAISING_FACTOR: f64 = 100.0;
 /// Largest number of times that the barrier is raised.
 const RAISES: u32 = 4;
 
+/// How much longer the descent may be that begins where the best cold one ended at its cap beside a saddle: there the
+/// residual grows by a hundredth in each iteration. Of 10,000 cold starts in the box around the landing paper's problem 3 need
+/// it and converge with it. Of 10,000 others 2 still end at the cap, with their conditions missed.
+const LONGER: usize = 10;
+
 /// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between limits.
 const JAMMED: f64 = 0.1;
 
@@ -123,8 +128,23 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 core::mem::swap(&mut self.current, &mut self.other);
             }
         }
+        let Some((best, price)) = best else {
+            core::mem::swap(&mut self.current, &mut self.other);
+            return SolveEnd { iterations, sweeps, ..SolveEnd::BAD };
+        };
+        if best.status != Status::Converged && best.miss <= settings.acceptable_miss {
+            // It creeps along a saddle. From where it ended, with the slacks opened again, it gets time to find the way down.
+            self.current.move_to(&self.other);
+            start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
+            let mut again = self.descend(model, RAISED_BARRIER, LONGER * cap);
+            iterations += again.iterations;
+            sweeps += again.sweeps;
+            again.miss = self.current.worst_violation(&self.conditions);
+            if again.status == Status::Converged && self.current.price(model, &self.conditions) <= price {
+                return SolveEnd { iterations, sweeps, ..again };
+            }
+        }
         core::mem::swap(&mut self.current, &mut self.other);
-        let best = best.map_or(SolveEnd::BAD, |(outcome, _)| outcome);
         SolveEnd { iterations, sweeps, ..best }
     }
 

@@ -9,7 +9,7 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
     let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     let mut draw = draws(1);
     let mut between = |least: f64, most: f64| least + (most - least) * draw();
-    let (mut landed, mut converged, mut refused) = (0, 0, 0);
+    let (mut landed, mut converged, mut refused) = (0, 0, 0_u32);
     for _ in 0..STARTS {
         let nominal = nominal_start();
         let start = PlanarState {
@@ -31,7 +31,22 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
         }
     }
     println!("{converged} of {STARTS} converged, {landed} of them to a landing; {refused} cannot be landed");
-    assert!(converged + refused >= 995, "{converged} {refused}");
+    assert_eq!(converged + refused, STARTS);
+}
+
+/// Of the first 10,000 starts of the test above, the three whose best descent ends at its cap, beside a saddle.
+#[test]
+fn cold_starts_beside_a_saddle_converge() {
+    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
+    for [z_m, theta_rad, u_m_s, w_m_s, q_rad_s] in [
+        [16.22560892850365, 1.3105094576391754, -5.901864912327085, -0.24307258640049278, 0.5615218355014445],
+        [14.65673607093224, 1.8092409016018125, -4.885615713195906, -1.5468186905254295, -0.9743911716491331],
+        [14.293374950411154, 2.0065004305881566, -4.89431329694815, -2.830417487264049, 0.18806751024634996],
+    ] {
+        let start = PlanarState { z_m, theta_rad, u_m_s, w_m_s, q_rad_s, ..nominal_start() };
+        let solution = solve(&from_ignition(&profile, start), None);
+        assert_eq!(solution.status, SolveStatus::Converged, "{start:?}");
+    }
 }
 
 /// Uniform numbers from 0 to 1 from a seed: a `SplitMix64` stream.
@@ -52,7 +67,7 @@ fn no_solve_fails_in_the_disturbed_closed_loop() {
     let flown = vehicles::profile::builtin("paper-calibrated").unwrap();
     for profile in [&paper_profile(), &flown] {
         let model = profile.planar_model();
-        let mut draw = draws(2);
+        let mut draw = draws(1);
         let mut normal = || (0..12).map(|_| draw()).sum::<f64>() - 6.0;
         let (mut workspace, mut solution, mut solves) = (Workspace::default(), Solution::default(), 0);
         for (name, start, _) in BEST_COSTS {
