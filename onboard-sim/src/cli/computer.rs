@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
@@ -45,9 +46,15 @@ async fn answer(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
     let mut link = HilLink::open(arguments.link, VEHICLE).await?;
     writeln!(std::io::stdout(), "computer at {}", link.address())?;
     let mut stopped = std::pin::pin!(interrupted());
+    let mut heartbeat = tokio::time::interval(Duration::from_secs(1));
+    heartbeat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
     loop {
         let brought = tokio::select! {
             () = &mut stopped => break,
+            _ = heartbeat.tick() => {
+                link.send(&[end.heartbeat()]);
+                continue;
+            }
             brought = link.receive() => brought,
         };
         let messages = match brought {

@@ -4,7 +4,7 @@ use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
 use hil::computer::{Counts, RemoteComputer};
 use hil::start::{Pace, Start};
-use protocol::dialect::MavMessage;
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType};
 use protocol::mission::MissionHash;
 
 use super::assembly::{FrameAssembly, ToComputer};
@@ -80,6 +80,22 @@ impl ComputerEnd {
         self.flying = Some((*start, computer));
         events.push(Event::Began { flight_id: start.flight_id, pace: start.pace });
         events
+    }
+
+    /// The heartbeat, which tells a world that listens where its computer is.
+    pub fn heartbeat(&self) -> MavMessage {
+        let phase = self.flying.as_ref().map_or(0, |(_, computer)| computer.answer().phase.index());
+        MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: u32::from(phase),
+            mavtype: MavType::MAV_TYPE_ROCKET,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            base_mode: MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED,
+            system_status: match self.flying {
+                Some(_) => MavState::MAV_STATE_ACTIVE,
+                None => MavState::MAV_STATE_STANDBY,
+            },
+            mavlink_version: 3,
+        })
     }
 
     /// The number of the present flight, and what became of its frames.

@@ -10,7 +10,7 @@
 //! * [`report`]: what a flight was like on the wire.
 //!
 //! A frame is TD_HIL_VEHICLE, then HIL_GPS and DISTANCE_SENSOR if they have something new, then HIL_SENSOR. Its answer is
-//! TD_HIL_COMPUTER and HIL_ACTUATOR_CONTROLS. Over UDP each of them is one datagram.
+//! TD_HIL_COMPUTER and HIL_ACTUATOR_CONTROLS. Over UDP each of them is one datagram. The computer sends a HEARTBEAT once a second.
 
 pub mod assembly;
 pub mod computer;
