@@ -50,9 +50,9 @@ fn a_world_that_listens_finds_its_computer_by_its_heartbeat() {
 fn lost_doubled_and_overtaken_datagrams_change_nothing_in_lockstep() {
     let proxy = UdpProxy::new();
     proxy.impair(Impairment {
-        lost_per_1000: 10,
+        lost_per_1000: 3,
         duplicated_per_1000: 100,
-        delay_max: Duration::from_millis(2),
+        delay_max: Duration::from_millis(1),
         ..Impairment::default()
     });
     let _computer = computer(&proxy.vehicle_link());

@@ -6,7 +6,6 @@
 use flight::computer::Commands;
 use flight::rules::phase::Phase;
 
-use crate::carried::CarriedCommands;
 use crate::computer::Answer;
 
 /// Without an answer for this many frames no current flows any more: 100 ms.
@@ -52,9 +51,7 @@ impl RealTime {
         let age = frame.saturating_sub(self.newest.frame);
         self.counts.by_age[usize::try_from(age).map_or(OLDEST, |age| age.min(OLDEST))] += 1;
         let commands = self.newest.commands;
-        let carried: CarriedCommands =
-            if age > CURRENT_FRAMES { commands.without_currents() } else { commands };
-        carried.widen()
+        if age > CURRENT_FRAMES { commands.without_currents().widen() } else { commands.widen() }
     }
 
     /// The phase that the computer last told.
@@ -79,8 +76,10 @@ impl RealTime {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use flight::computer::pilot::BoosterCommands;
+
+    use super::*;
+    use crate::carried::CarriedCommands;
 
     fn answer(frame: u64, pitch_quarter_turns: f32) -> Answer {
         let commands = CarriedCommands {
