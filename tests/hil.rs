@@ -1,6 +1,5 @@
 //! Hardware in the loop between two processes, over every kind of link and over links that fail. Each flight is compared
 //! frame by frame with the same one in the world's process.
-#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::time::Duration;
 

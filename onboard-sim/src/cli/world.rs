@@ -106,7 +106,7 @@ async fn fly_all(arguments: WorldArguments) -> anyhow::Result<ExitCode> {
     let first_id = OnTheWire::drawn().boot_number.get();
     for number in arguments.first..arguments.first + arguments.flights {
         let flight_id = first_id.wrapping_add((number - arguments.first) as u32);
-        let report = match fly(&mut link, &recipe, number, flight_id, &manner).await {
+        let report = match Box::pin(fly(&mut link, &recipe, number, flight_id, &manner)).await {
             Err(error @ (HilError::NoComputer { .. } | HilError::Silent { .. } | HilError::LinkEnded)) => {
                 writeln!(out, "flight {number}: LINK LOST: {error}")?;
                 return Ok(ExitCode::from(5));

@@ -65,9 +65,9 @@ pub async fn fly(
     match manner.pace {
         Pace::Lockstep => {
             let shadow = manner.compare.then(|| Sortie::new(recipe, number)).transpose()?;
-            session.in_lockstep(number, first, lockstep, shadow).await
+            Box::pin(session.in_lockstep(number, first, lockstep, shadow)).await
         }
-        Pace::RealTime => session.in_real_time(number, first, manner.patience).await,
+        Pace::RealTime => Box::pin(session.in_real_time(number, first, manner.patience)).await,
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Badness {
     pub(super) lost: u32,
     /// Of 1000 messages so many arrive twice.
     pub(super) doubled: u32,
-    /// A message takes up to this time, ms: messages overtake each other.
+    /// What is sent together takes up to this time, ms: it overtakes what was sent before it.
     pub(super) late_ms: u32,
     /// From and until when nothing is carried, ms.
     pub(super) unplugged_ms: (u64, u64),
@@ -48,6 +48,7 @@ impl BadWire {
     pub(super) fn send(&mut self, messages: &[MavMessage], now: Duration) {
         let (from_ms, until_ms) = self.badness.unplugged_ms;
         let unplugged = (u128::from(from_ms)..u128::from(until_ms)).contains(&now.as_millis());
+        let late_ms = self.below(self.badness.late_ms + 1);
         for message in messages {
             let bytes = self.encoder.encode(message).as_bytes().to_vec();
             let copies = match self.below(1000) {
@@ -57,8 +58,7 @@ impl BadWire {
                 _ => 1,
             };
             for _ in 0..copies {
-                let late = Duration::from_millis(u64::from(self.below(self.badness.late_ms + 1)));
-                self.carried.push((now + late, bytes.clone()));
+                self.carried.push((now + Duration::from_millis(u64::from(late_ms)), bytes.clone()));
             }
         }
     }

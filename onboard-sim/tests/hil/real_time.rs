@@ -78,7 +78,7 @@ fn a_wire_that_is_unplugged_for_a_quarter_of_a_second_in_the_fall_costs_no_landi
 
 /// How many landings a bad wire costs in real time, for the page of the builder.
 #[test]
-#[ignore = "prints a table of 700 flights"]
+#[ignore = "prints a table of 900 flights"]
 fn landings_by_the_state_of_the_wire() {
     for (name, badness) in [
         ("good", Badness::default()),
@@ -86,6 +86,7 @@ fn landings_by_the_state_of_the_wire() {
         ("10 of 1000 lost", Badness { lost: 10, ..Badness::default() }),
         ("50 of 1000 lost", Badness { lost: 50, ..Badness::default() }),
         ("up to 4 ms late", Badness { late_ms: 4, ..Badness::default() }),
+        ("up to 12 ms late: frames overtake each other", Badness { late_ms: 12, ..Badness::default() }),
         ("unplugged for 0.25 s in the fall", Badness { unplugged_ms: (3_000, 3_250), ..Badness::default() }),
         ("unplugged for 1 s in the fall", Badness { unplugged_ms: (3_000, 4_000), ..Badness::default() }),
         ("unplugged for 0.25 s under power", Badness { unplugged_ms: (9_500, 9_750), ..Badness::default() }),

@@ -214,7 +214,7 @@ impl Sortie {
             outside.requests
         };
         let feedback = self.surroundings.feedback(self.computer.released_at_s().is_some(), outside.pin_out);
-        let (feeling, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(sensed, feedback);
+        let (feeling, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(&sensed, feedback);
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
@@ -247,12 +247,12 @@ impl Sortie {
     }
 
     /// What the computer is told, after a way over a wire if there is one.
-    fn carried(&self, sensed: Sensed, feedback: Feedback) -> (Feeling, Feedback) {
+    fn carried(&self, sensed: &Sensed, feedback: Feedback) -> (Feeling, Feedback) {
         let (Some(wire), Sensed::Measured(measured)) = (&self.wire, sensed) else {
-            return (Feeling::InSpace(sensed), feedback);
+            return (Feeling::InSpace(*sensed), feedback);
         };
         let Feedback { gimbal_rad, fins_rad, switches } = feedback;
-        let told = wire.carry(&Readings { measured, gimbal_rad, fins_rad, switches });
+        let told = wire.carry(&Readings { measured: *measured, gimbal_rad, fins_rad, switches });
         let feedback =
             Feedback { gimbal_rad: told.gimbal_rad, fins_rad: told.fins_rad, switches: told.switches };
         (Feeling::InSpace(Sensed::Measured(told.measured)), feedback)
