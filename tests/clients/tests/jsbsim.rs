@@ -146,7 +146,14 @@ fn medians(outcomes: &[Outcome]) -> [f64; 6] {
     })
 }
 
-fn fly(wind_m_s: f64) -> (Vec<Outcome>, Vec<Outcome>) {
+/// The same flights in JSBSim, in our world, and in our world with the noise of the sensors drawn anew.
+struct Flown {
+    theirs: Vec<Outcome>,
+    ours: Vec<Outcome>,
+    again: Vec<Outcome>,
+}
+
+fn fly(wind_m_s: f64) -> Flown {
     let (_, mission_toml) = *vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
     let mission = vehicles::mission::from_toml(mission_toml, "mk2").unwrap();
     let dispersion = day(wind_m_s);
@@ -168,16 +175,28 @@ fn fly(wind_m_s: f64) -> (Vec<Outcome>, Vec<Outcome>) {
         theirs.extend(told.map(|line| judged(&mission, &serde_json::from_str(line).unwrap())));
     }
     assert_eq!(theirs.len(), draws.len());
-    let ours: Vec<Outcome> = draws
-        .iter()
-        .map(|drawn| Sortie::drawn_as(&mission, &dispersion, drawn, Law::Nmpc).unwrap().run())
-        .collect();
-    (theirs, ours)
+    let in_our_world =
+        |drawn: &Draw| Sortie::drawn_as(&mission, &dispersion, drawn, Law::Nmpc).unwrap().run();
+    let ours = draws.iter().map(in_our_world).collect();
+    let anew = |drawn: &Draw| in_our_world(&Draw { flight_seed: drawn.flight_seed ^ 1, ..*drawn });
+    Flown { theirs, ours, again: draws.iter().map(anew).collect() }
+}
+
+/// Mean and standard deviation of the differences of the touchdowns' values.
+fn differences(some: &[Outcome], others: &[Outcome]) -> [(f64, f64); 6] {
+    core::array::from_fn(|column| {
+        let pairs = some.iter().zip(others);
+        let found: Vec<f64> =
+            pairs.map(|(some, other)| values(some)[column] - values(other)[column]).collect();
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let spread = found.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (found.len() - 1) as f64;
+        (mean, spread.sqrt())
+    })
 }
 
 fn compare(wind_m_s: f64, fewest: usize) {
     generate_dialect();
-    let (theirs, ours) = fly(wind_m_s);
+    let Flown { theirs, ours, again } = fly(wind_m_s);
     println!("wind {wind_m_s} m/s: vertical m/s, lateral m/s, tilt deg, rate deg/s, distance m, time s");
     for (number, (theirs, ours)) in theirs.iter().zip(&ours).enumerate() {
         let failed = |outcome: &Outcome| outcome.failure.map_or("landed", sim::outcome::Failure::name);
@@ -193,6 +212,8 @@ fn compare(wind_m_s: f64, fewest: usize) {
     let legs = |outcomes: &[Outcome]| outcomes.iter().filter(|outcome| outcome.legs).count();
     println!("legs: JSBSim {} of {FLIGHTS}, ours {} of {FLIGHTS}", legs(&theirs), legs(&ours));
     println!("medians: JSBSim {:.2?}, ours {:.2?}", medians(&theirs), medians(&ours));
+    println!("JSBSim less ours, mean and standard deviation: {:.3?}", differences(&theirs, &ours));
+    println!("ours again less ours, mean and standard deviation: {:.3?}", differences(&again, &ours));
     assert!(legs(&theirs) >= fewest, "only {} of {FLIGHTS} land in JSBSim", legs(&theirs));
     // The same draw falls for the same time in both, within half a second.
     for (theirs, ours) in theirs.iter().zip(&ours).filter(|(theirs, ours)| theirs.legs && ours.legs) {
