@@ -22,7 +22,7 @@ fn expect_identical(ended: &Ended, flights: u64) {
 
 #[test]
 fn over_udp_tcp_and_a_serial_line_a_flight_is_the_one_in_one_process() {
-    let line = SerialLine::new(921_600);
+    let line = SerialLine::new(4_000_000);
     let mut udp = computer("udpin:127.0.0.1:0");
     let mut tcp = computer("tcpin:127.0.0.1:0");
     let serial = computer(&line.near_link());
@@ -88,8 +88,8 @@ fn a_serial_line_that_was_unplugged_is_opened_again_and_changes_nothing() {
             std::os::unix::fs::symlink(end, device).unwrap();
         }
     };
-    let link = |device: &std::path::Path| format!("serial:{}:921600", device.display());
-    let first = SerialLine::new(921_600);
+    let link = |device: &std::path::Path| format!("serial:{}:4000000", device.display());
+    let first = SerialLine::new(4_000_000);
     plug(&first);
     let mut computer = computer(&link(&far));
     let world = world(&link(&near), &["--compare", "--give-up", "60"]);
@@ -97,7 +97,7 @@ fn a_serial_line_that_was_unplugged_is_opened_again_and_changes_nothing() {
     // Both ends hang up.
     drop(first);
     computer.wait_for_line("link down");
-    let second = SerialLine::new(921_600);
+    let second = SerialLine::new(4_000_000);
     plug(&second);
     expect_identical(&world.wait(), 1);
 }
