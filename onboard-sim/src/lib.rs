@@ -9,6 +9,7 @@
 //! * [`stations`]: how well the vehicle hears each ground station. Pure.
 //! * [`telemetry`] and [`streams`]: the vehicle's state as MAVLink messages, and their rates. Pure.
 //! * [`parameters`]: values that a ground station may read by name, and the few that it may set. Pure.
+//! * [`hil`]: hardware in the loop: a world and a flight computer as two processes.
 //! * [`solve_times`]: statistics of the controller's solve times.
 //! * [`figure`]: curves and maps as SVG.
 //! * [`landability`]: maps of where a landing exists.
@@ -18,6 +19,7 @@ pub mod commands;
 pub mod endpoint;
 pub mod figure;
 pub mod fly;
+pub mod hil;
 pub mod landability;
 pub mod paper;
 pub mod parameters;

@@ -51,6 +51,14 @@ enum Command {
     Card(cli::card::CardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     Paper(cli::paper::PaperArguments),
+    /// Hardware in the loop: simulate the world of flights whose flight computer is another process.
+    ///
+    /// Each flight begins released, at apogee or on its rail. In lockstep it is the same, bit for bit, as a campaign's flight
+    /// with `wire_resolution`. Exit codes: 0 all flown, and identical if compared; 1 error; 2 usage; 3 a flight differs;
+    /// 5 the computer does not answer.
+    World(cli::world::WorldArguments),
+    /// Hardware in the loop: a flight computer whose world is another process; it answers until it is stopped.
+    Computer(cli::computer::ComputerArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     Keygen {
         /// The file; an existing one is not overwritten.
@@ -88,6 +96,8 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Motors(arguments) => cli::motors::run(&arguments),
         Command::Card(arguments) => cli::card::run(&arguments),
         Command::Paper(arguments) => cli::paper::run(&arguments),
+        Command::World(arguments) => cli::world::run(arguments),
+        Command::Computer(arguments) => cli::computer::run(arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),

@@ -8,6 +8,8 @@
 //! * [`draw`]: the random values of one flight, from a seed and the flight's number.
 //! * [`fault`]: what breaks in a flight, and when.
 //! * [`sortie`]: the flight itself.
+//! * `surroundings`: everything of it but its flight computer.
+//! * [`remote`]: the same flight with its flight computer elsewhere.
 //! * [`outside`]: the input from the crew and the ground in one frame.
 //! * [`limits`]: what counts as a landing.
 //! * [`ending`]: how the flight ended, in words.
@@ -23,4 +25,6 @@ pub mod outcome;
 pub mod outside;
 pub mod plane;
 pub mod recipe;
+pub mod remote;
 pub mod sortie;
+mod surroundings;

@@ -37,6 +37,9 @@ pub(crate) struct CampaignArguments {
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
+    /// Sensors deliver and servos get what the messages of hardware in the loop can carry.
+    #[arg(long)]
+    wire_resolution: bool,
     /// Number of flights; they are numbered from 0.
     #[arg(long, default_value_t = 1000, value_name = "N")]
     flights: u64,
@@ -150,7 +153,10 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
     if mission.ignition.fixed_height_m.is_none() {
         mission.ignition.fixed_height_m = timing::fixed_height_m(arguments.controller, &mission)?;
     }
-    let dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+    let mut dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+    if arguments.wire_resolution {
+        dispersion_toml = Dispersion::toml_with_wire_resolution(&dispersion_toml, &arguments.dispersion)?;
+    }
     let mut faults = arguments.faults.clone();
     let mut expected = None;
     if let Some(path) = &arguments.scenario {

@@ -200,7 +200,7 @@ pub(super) fn with_wind(toml: &str, wind_m_s: f64) -> String {
 }
 
 /// Waits for Ctrl-C or a request to terminate.
-async fn interrupted() {
+pub(super) async fn interrupted() {
     use tokio::signal::unix::{SignalKind, signal};
     let Ok(mut terminate) = signal(SignalKind::terminate()) else {
         let _ = tokio::signal::ctrl_c().await;

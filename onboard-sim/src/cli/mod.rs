@@ -3,6 +3,7 @@
 pub(crate) mod campaign;
 pub(crate) mod card;
 mod choices;
+pub(crate) mod computer;
 mod cost;
 pub(crate) mod fly;
 pub(crate) mod landability;
@@ -10,3 +11,4 @@ pub(crate) mod motors;
 pub(crate) mod output;
 pub(crate) mod paper;
 mod single;
+pub(crate) mod world;

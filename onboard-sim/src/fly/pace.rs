@@ -37,11 +37,11 @@ impl Lateness {
     const STEP: Duration = Duration::from_micros(100);
     const STEPS: usize = 500;
 
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { frames: vec![0; Self::STEPS], worst: Duration::ZERO }
     }
 
-    fn add(&mut self, late: Duration) {
+    pub(crate) fn add(&mut self, late: Duration) {
         let step = (late.as_nanos() / Self::STEP.as_nanos()) as usize;
         self.frames[step.min(Self::STEPS - 1)] += 1;
         self.worst = self.worst.max(late);

@@ -26,6 +26,7 @@ use protocol::dialect::{
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 
+pub(crate) use self::ours::td_phase;
 use crate::vehicle::Snapshot;
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.

@@ -74,7 +74,7 @@ fn td_motor(status: MotorStatus) -> TdMotor {
     }
 }
 
-fn td_phase(phase: Phase) -> TdPhase {
+pub(crate) fn td_phase(phase: Phase) -> TdPhase {
     match phase {
         Phase::Safe => TdPhase::TD_PHASE_SAFE,
         Phase::PadIdle => TdPhase::TD_PHASE_PAD_IDLE,

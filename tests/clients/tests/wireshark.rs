@@ -7,6 +7,14 @@ use std::process::Command;
 
 use clients::{PYMAVLINK, dialect, tshark, tshark_folder};
 use e2e::{BareGround, Program, Running, program, raw_frames_of};
+use hil::start::{Pace, Start};
+use onboard_sim::hil::computer::ComputerEnd;
+use onboard_sim::hil::messages::{of_frame, of_start};
+use protocol::frame::Encoder;
+use protocol::identity::VEHICLE;
+use protocol::mission::MissionHash;
+use sim::recipe::Recipe;
+use sim::remote::RemoteFlight;
 
 /// A dissector that pymavlink's generator made of our XML reads every frame of whole flights. The flights of the two
 /// vehicles together contain every message of ours but those of a crew.
@@ -34,13 +42,14 @@ fn val_wireshark_finds_no_malformed_frame() {
     let ours = text.split("<message id=\"").skip(1).filter_map(|rest| rest.split('"').next()?.parse().ok());
     // TD_CREW and TD_OPERATOR are sent by a vehicle with operators only, and that one does not start by itself.
     let ours: BTreeSet<u32> = ours.filter(|id| ![54_010, 54_011].contains(id)).collect();
-    let seen: BTreeSet<u32> = planar.union(&spatial).copied().collect();
+    let bench = read_by_wireshark(folder.path(), "bench", &frames_of_a_bench());
+    let seen: BTreeSet<u32> = planar.iter().chain(&spatial).chain(&bench).copied().collect();
     assert!(!ours.is_empty() && ours.is_subset(&seen), "{ours:?} of ours, {seen:?} seen");
 }
 
 /// Flies this profile and lets Wireshark read every frame of the vehicle; returns the message ids.
 fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
-    let (log, capture) = (format!("{profile}.mcap"), format!("{profile}.pcap"));
+    let log = format!("{profile}.mcap");
     let flown = Running::to_end(
         program(Program::OnboardSim)
             .args(["fly", "--profile", profile, "--speed", "max", "--auto-start", "--log", &log])
@@ -50,7 +59,36 @@ fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
     assert_eq!(flown.code, Some(0), "{}", flown.output);
     let frames = raw_frames_of(&folder.join(&log), "tx");
     assert!(frames.len() > 500, "{} frames", frames.len());
-    std::fs::write(folder.join(&capture), capture_of(&frames)).unwrap();
+    read_by_wireshark(folder, profile, &frames)
+}
+
+/// The start, a hundred frames and their answers of hardware in the loop.
+fn frames_of_a_bench() -> Vec<Vec<u8>> {
+    let recipe = Recipe::built_in("mk2", "field").unwrap();
+    let mut flight = RemoteFlight::new(&recipe, 0).unwrap();
+    let mut computer = ComputerEnd::new(&recipe.mission, &recipe.mission_toml);
+    let start = Start { flight_id: 9, believed: *flight.believed(), pace: Pace::Lockstep };
+    let hash = MissionHash::of(&recipe.mission_toml);
+    let mut sent = vec![of_start(&start, hash)];
+    let mut all = Vec::new();
+    for _ in 0..100 {
+        let mut answers = vec![computer.heartbeat()];
+        for message in &sent {
+            computer.take(message, &mut answers);
+        }
+        all.append(&mut sent);
+        all.append(&mut answers);
+        let readings = flight.sense();
+        sent = of_frame(9, flight.frame(), &readings);
+    }
+    let mut encoder = Encoder::new(VEHICLE);
+    all.iter().map(|message| encoder.encode(message).as_bytes().to_vec()).collect()
+}
+
+/// Lets Wireshark read these frames; returns their message ids.
+fn read_by_wireshark(folder: &Path, name: &str, frames: &[Vec<u8>]) -> BTreeSet<u32> {
+    let capture = format!("{name}.pcap");
+    std::fs::write(folder.join(&capture), capture_of(frames)).unwrap();
     let read = |filter: &[&str]| {
         let mut command = tshark(folder);
         command

@@ -9,9 +9,9 @@ use crate::fault::Breakage;
 impl Sortie {
     pub(super) fn break_down(&mut self, breakage: &Breakage) {
         let every = Vector3::from_element(1.0);
-        let sensors = &mut self.sensor_faults;
+        let sensors = &mut self.surroundings.faults;
         match *breakage {
-            Breakage::Vehicle(fault) => self.world.inject(&fault),
+            Breakage::Vehicle(fault) => self.surroundings.world.inject(&fault),
             Breakage::GnssOut => sensors.gnss_out = true,
             Breakage::BarometerOut => sensors.barometer_out = true,
             Breakage::LidarOut => sensors.lidar_out = true,

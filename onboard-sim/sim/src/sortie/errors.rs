@@ -36,14 +36,14 @@ impl Sortie {
     ///
     /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
     pub fn nees_of_motion(&self) -> Option<f64> {
-        self.measured.filter(|_| !self.dead)?;
+        self.measured().filter(|_| !self.dead)?;
         self.pilot().estimator().nees_of_motion(&self.over_the_ground())
     }
 
     /// The true state with its height above the ground below it, which is what a landing needs and what the lidar shows.
     fn over_the_ground(&self) -> RigidState {
-        let mut state = *self.world.state();
-        state.position_m.z -= self.world.truth().ground_m(state.position_m.x, state.position_m.y);
+        let mut state = *self.world().state();
+        state.position_m.z -= self.world().truth().ground_m(state.position_m.x, state.position_m.y);
         state
     }
 
@@ -53,10 +53,10 @@ impl Sortie {
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
-        self.measured.filter(|_| !self.dead)?;
+        self.measured().filter(|_| !self.dead)?;
         let motor = self.pilot().motor();
         motor.ignition_s()?;
-        let truth = self.world.truth();
+        let truth = self.world().truth();
         motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
     }
 
@@ -75,6 +75,6 @@ impl Sortie {
 }
 
 /// The truth, in the form of an estimate.
-pub(super) fn known(world: &World) -> Estimate {
+pub(crate) fn known(world: &World) -> Estimate {
     Estimate::exact(world.time_s(), *world.state(), *world.specific_force_m_s2(), world.wind_m_s().xy())
 }

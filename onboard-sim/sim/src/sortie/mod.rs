@@ -4,9 +4,9 @@
 //! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
 
 mod breakage;
-mod errors;
+pub(crate) mod errors;
 mod rehearsal;
-mod start;
+pub(crate) mod start;
 
 use std::time::Duration;
 
@@ -14,18 +14,20 @@ pub use self::errors::EstimatorErrors;
 use self::rehearsal::Rehearsal;
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::{Pilot, Sensed};
-use flight::computer::{Commands, Computer, FRAME_MS, FRAME_S, Feeling, Input, Rehearsed, flight_time_s};
-use flight::estimation::estimator::{Measurements, StartUncertainty};
+use flight::computer::{Commands, Computer, FRAME_S, Feeling, Input, Rehearsed, flight_time_s};
+use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
 use flight::guidance::powered::PoweredReport;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
+use hil::carried::{CarriedCommands, Wire};
+use hil::readings::Readings;
 use nalgebra::Vector3;
-use world::sensors::{SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start};
+use world::World;
+use world::sensors::SensorParamError;
 use world::world::WorldError;
-use world::{Actuators, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw};
@@ -33,9 +35,10 @@ use crate::fault::Injector;
 use crate::outcome::{Ending, Outcome, judge};
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
+use crate::surroundings::{Feedback, Surroundings};
 
 /// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
-const LONGEST_S: f64 = 150.0;
+pub(crate) const LONGEST_S: f64 = 150.0;
 
 /// Why a flight cannot be set up.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +49,12 @@ pub enum SetUpError {
     /// A sensor parameter is out of its range.
     #[error(transparent)]
     Sensors(#[from] SensorParamError),
+    /// A wire carries sensors, not the truth.
+    #[error("the set of dispersions has no sensors, so there is nothing that a wire could carry")]
+    NoSensors,
+    /// A computer at the other end of a wire cannot be broken from this one.
+    #[error("no fault can be injected into a flight whose computer is elsewhere: {0}")]
+    Fault(String),
 }
 
 /// The radio between vehicle and ground, in both directions. Nothing on board waits for it.
@@ -65,14 +74,11 @@ pub struct Sortie {
     drawn: Draw,
     computer: Computer,
     rehearsal: Option<Rehearsal>,
-    world: World,
+    surroundings: Surroundings,
+    /// Narrows what the computer is told and what it commands.
+    wire: Option<Wire>,
     /// The state in which the fall began.
     fall: Option<RigidState>,
-    sensors: Option<Sensors>,
-    sensor_faults: SensorFaults,
-    /// The sensor samples of the last frame.
-    measured: Option<Measurements>,
-    actuators: Actuators,
     injector: Injector,
     radio: Radio,
     /// Frames until the dead flight computer starts again.
@@ -120,12 +126,14 @@ impl Sortie {
         let standing = RigidState::upright(airframe.above_feet_m(cg_station_m));
         let started = Self::of(&mission, &recipe.dispersion, &drawn, law)?;
         let world = match (mission.start.at, drawn.hanging) {
-            (StartPoint::Pad, _) => started.world.clone(),
-            (StartPoint::Drone, Some(hanging)) => started.world.clone().hanging(hanging),
+            (StartPoint::Pad, _) => started.surroundings.world.clone(),
+            (StartPoint::Drone, Some(hanging)) => started.surroundings.world.clone().hanging(hanging),
             _ => start::world_at(&mission, &drawn, &standing)?,
         };
+        let mut surroundings = started.surroundings.clone();
+        surroundings.world = world;
         Ok(Self {
-            world,
+            surroundings,
             rehearsal: Some(Rehearsal::new(recipe)?),
             injector: Injector::new(&recipe.faults, recipe.seed, number),
             ..started
@@ -134,24 +142,17 @@ impl Sortie {
 
     /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
-        let drawn = Draw { apogee: start::falling(mission, drawn)?, ..*drawn };
-        let world = start::world(mission, &drawn)?;
-        let (sensors, believed) = if dispersion.sensors {
-            let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
-            let uncertainty = StartUncertainty::at_start(mission.start.at);
-            (Some(sensors), believed_start(world.state(), &uncertainty, drawn.flight_seed))
-        } else {
-            (None, *world.state())
-        };
+        let drawn = start::falling_as(mission, drawn)?;
+        let (surroundings, believed) = Surroundings::at_start(mission, dispersion, &drawn)?;
+        if dispersion.wire_resolution && !dispersion.sensors {
+            return Err(SetUpError::NoSensors);
+        }
         Ok(Self {
             computer: Computer::in_space(mission, law, &believed),
             rehearsal: None,
-            world,
+            surroundings,
+            wire: dispersion.wire_resolution.then(|| Wire::new(mission)),
             fall: None,
-            sensors,
-            sensor_faults: SensorFaults::default(),
-            measured: None,
-            actuators: at_rest(mission),
             injector: Injector::default(),
             radio: Radio::default(),
             frames_down: 0,
@@ -173,17 +174,10 @@ impl Sortie {
     /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
     fn begin(&mut self) {
         // A motor that lit itself is on its way already.
-        if self.world.booster_thrust_n() > 0.0 {
+        if self.surroundings.world.booster_thrust_n() > 0.0 {
             return;
         }
-        // Both were already set up at power-up, which would have found any error.
-        if let Ok(world) = start::world(&self.mission, &self.drawn) {
-            self.world = world;
-        }
-        if self.dispersion.sensors {
-            self.sensors = Sensors::new(&self.dispersion.sensor_params, self.drawn.flight_seed, 0.0).ok();
-        }
-        self.actuators = at_rest(&self.mission);
+        self.surroundings.begin(&self.mission, &self.dispersion, &self.drawn);
     }
 
     /// Flies one frame without a crew.
@@ -193,7 +187,7 @@ impl Sortie {
 
     /// Flies one frame.
     pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Flown {
-        for breakage in self.injector.due(self.world.time_s(), self.computer.mode().phase) {
+        for breakage in self.injector.due(self.surroundings.world.time_s(), self.computer.mode().phase) {
             self.break_down(&breakage);
         }
         let waits = self.computer.released_at_s().is_none() && self.computer.mode().phase != Phase::Safe;
@@ -201,7 +195,7 @@ impl Sortie {
             rehearsal.step();
         }
         self.let_go_when_cleared();
-        let feeling = self.feel();
+        let sensed = self.surroundings.feel();
         self.frame += 1;
         self.dead = self.frames_down > 0;
         if self.dead {
@@ -219,24 +213,18 @@ impl Sortie {
         } else {
             outside.requests
         };
-        let fed_back_rad = self.world.fins_feedback_rad();
-        let touched = self.computer.released_at_s().is_some() && self.world.touchdown().is_some();
-        let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
-            Some(sensors) => {
-                (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity())
-            }
-            None => (fed_back_rad, touched, true),
-        };
+        let feedback = self.surroundings.feedback(self.computer.released_at_s().is_some(), outside.pin_out);
+        let (feeling, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(&sensed, feedback);
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             feeling,
-            gimbal_rad: self.world.gimbal_feedback_rad(),
+            gimbal_rad,
             fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached: self.world.booster_attached(),
-            pin_out: outside.pin_out,
+            contact: switches.contact,
+            igniter_continuity: switches.igniter_continuity,
+            booster_attached: switches.booster_attached,
+            pin_out: switches.pin_out,
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
@@ -258,31 +246,30 @@ impl Sortie {
         Flown { output: Some(output), took }
     }
 
-    /// The world moves for one frame, and the sensors measure it.
-    fn feel(&mut self) -> Feeling {
-        let mut measured = None;
-        for _ in 0..FRAME_MS {
-            self.world.step(&self.actuators);
-            if let Some(sensors) = &mut self.sensors {
-                measured = sensors.observe(&SensorTruth::of(&self.world), &self.sensor_faults).or(measured);
-            }
-        }
-        self.measured = measured;
-        let sensed = measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured);
-        Feeling::InSpace(sensed)
+    /// What the computer is told, after a way over a wire if there is one.
+    fn carried(&self, sensed: &Sensed, feedback: Feedback) -> (Feeling, Feedback) {
+        let (Some(wire), Sensed::Measured(measured)) = (&self.wire, sensed) else {
+            return (Feeling::InSpace(*sensed), feedback);
+        };
+        let Feedback { gimbal_rad, fins_rad, switches } = feedback;
+        let told = wire.carry(&Readings { measured: *measured, gimbal_rad, fins_rad, switches });
+        let feedback =
+            Feedback { gimbal_rad: told.gimbal_rad, fins_rad: told.fins_rad, switches: told.switches };
+        (Feeling::InSpace(Sensed::Measured(told.measured)), feedback)
     }
 
     fn command(&mut self, commands: &Commands) {
-        let Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = *commands;
-        let (ignite_booster, separate) = (booster.ignite, booster.separate);
-        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute, ignite_booster, separate };
+        let carried = self.wire.map(|_| CarriedCommands::narrow(commands).widen());
+        let commands = carried.as_ref().unwrap_or(commands);
+        self.surroundings.command(commands);
         let falls = !self.computer.mode().phase.before_apogee();
         if falls && self.fall.is_none() {
-            self.fall = Some(*self.world.state());
+            self.fall = Some(*self.surroundings.world.state());
         }
-        self.finite &= self.world.state().is_finite()
-            && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());
-        if falls && self.world.touchdown().is_none() && self.world.height_m() < 10.0 {
+        self.finite &= self.surroundings.world.state().is_finite()
+            && commands.gimbal_rad.iter().chain(&commands.fins_rad).all(|angle| angle.is_finite());
+        if falls && self.surroundings.world.touchdown().is_none() && self.surroundings.world.height_m() < 10.0
+        {
             self.largest_errors = self.largest_errors.or_larger(&self.errors());
         }
     }
@@ -291,9 +278,10 @@ impl Sortie {
     fn let_go_when_cleared(&mut self) {
         let after_s = self.mission.drop.map_or(0.0, |drop| drop.release_after_s);
         let ended_s = self.computer.mode().countdown_end_s;
-        if self.world.hangs() && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
+        if self.surroundings.world.hangs()
+            && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
         {
-            self.world.let_go();
+            self.surroundings.world.let_go();
         }
     }
 
@@ -305,7 +293,10 @@ impl Sortie {
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
         let stays = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
-        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S && !stays
+        self.finite
+            && self.surroundings.world.rest().is_none()
+            && self.surroundings.world.time_s() < LONGEST_S
+            && !stays
     }
 
     /// Flies to the end.
@@ -359,17 +350,17 @@ impl Sortie {
 
     /// The truth.
     pub fn world(&self) -> &World {
-        &self.world
+        &self.surroundings.world
     }
 
     /// The truth, for a caller that replaces it.
     pub fn world_mut(&mut self) -> &mut World {
-        &mut self.world
+        &mut self.surroundings.world
     }
 
     /// The sensor samples of the last frame; `None` if the computer gets the truth.
     pub fn measured(&self) -> Option<&Measurements> {
-        self.measured.as_ref()
+        self.surroundings.measured()
     }
 
     /// The drawn differences.
@@ -416,12 +407,12 @@ impl Sortie {
     /// The outcome so far.
     pub fn outcome(&self) -> Outcome {
         let ending = Ending {
-            touchdown: self.world.touchdown().copied(),
-            rest: self.world.rest().map(|rest| rest.outcome),
+            touchdown: self.surroundings.world.touchdown().copied(),
+            rest: self.surroundings.world.rest().map(|rest| rest.outcome),
             phase: self.computer.mode().phase,
             ignited: self.pilot().ignited_at_s().is_some(),
-            lit: self.world.thrust_begins_s().is_some(),
-            parachute: self.world.parachute_ejected(),
+            lit: self.surroundings.world.thrust_begins_s().is_some(),
+            parachute: self.surroundings.world.parachute_ejected(),
             finite: self.finite,
         };
         judge(&self.mission, &ending)
@@ -429,15 +420,10 @@ impl Sortie {
 }
 
 /// The mission, its law and the draw.
-fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
+pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
     let mut mission = recipe.mission.clone();
     let law = Law::of(recipe.controller, &mission);
     mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
     (mission, law, drawn)
-}
-
-fn at_rest(mission: &Mission) -> Actuators {
-    let closed_rad = mission.airframe.fins.closed_rad();
-    Actuators { fins_rad: [closed_rad; 4], ..Actuators::NONE }
 }

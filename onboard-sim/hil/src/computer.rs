@@ -1,0 +1,301 @@
+//! The computer's end of the wire: a flight computer that is told of frames in whatever order they arrive.
+//!
+//! What becomes of a frame:
+//!
+//! | frame | in lockstep | in real time |
+//! |---|---|---|
+//! | the next one | flown and answered | flown and answered |
+//! | the last one again | answered again, not flown | answered again, not flown |
+//! | an older one | ignored | ignored |
+//! | one that leaves out up to [`MOST_HELD`] frames | ignored: the world sends the missing one again | the missing frames are flown with the last inertial sample and nothing else, then this one |
+//! | one that leaves out more | ignored | ignored: the flight is over |
+//! | one of another flight | ignored | ignored |
+
+use flight::computer::pilot::Sensed;
+use flight::computer::{Commands, Computer, Feeling, Input, LogState, Output, flight_time_s};
+use flight::estimation::estimator::Measurements;
+use flight::guidance::baseline::Law;
+use flight::rules::arming::Uplink;
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::Mission;
+
+use crate::carried::{CarriedCommands, CarriedReadings, Wire};
+use crate::readings::Readings;
+use crate::start::{Pace, Start};
+
+/// In real time at most this many lost frames in a row are flown: 5 s.
+pub const MOST_HELD: u64 = 1000;
+
+/// The answer to a frame. The start is answered as frame 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    pub flight_id: u32,
+    pub frame: u64,
+    pub commands: CarriedCommands,
+    pub phase: Phase,
+    /// Digest of the computer's memory.
+    pub digest: u64,
+    /// Lost frames of this flight that were flown with the last inertial sample.
+    pub held: u64,
+}
+
+/// What became of the frames of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Frames flown as they came.
+    pub flown: u64,
+    /// Lost frames that were flown with the last inertial sample.
+    pub held: u64,
+    /// Frames that came again and were answered again.
+    pub repeated: u64,
+    /// Frames that came after a later one was flown.
+    pub late: u64,
+    /// Frames that left out one that this computer waits for.
+    pub ahead: u64,
+    /// Frames and starts of another flight.
+    pub foreign: u64,
+}
+
+/// A flight computer at the end of a wire.
+#[derive(Debug, Clone)]
+pub struct RemoteComputer {
+    wire: Wire,
+    start: Start,
+    computer: Computer,
+    last: Option<Readings>,
+    answer: Answer,
+    counts: Counts,
+}
+
+impl RemoteComputer {
+    /// The computer of a flight, which has just started.
+    pub fn new(mission: &Mission, law: Law, start: &Start) -> Self {
+        let computer = Computer::in_space(mission, law, &start.believed).released();
+        let answer = Answer {
+            flight_id: start.flight_id,
+            frame: 0,
+            commands: CarriedCommands::narrow(computer.commands()),
+            phase: computer.mode().phase,
+            digest: computer.digest(),
+            held: 0,
+        };
+        let counts = Counts::default();
+        Self { wire: Wire::new(mission), start: *start, computer, last: None, answer, counts }
+    }
+
+    /// The start has come again: it is answered as long as no frame is flown.
+    pub fn start_again(&mut self, start: &Start) -> Option<Answer> {
+        if start.flight_id != self.start.flight_id {
+            self.counts.foreign += 1;
+            return None;
+        }
+        self.counts.repeated += 1;
+        (self.answer.frame == 0).then_some(self.answer)
+    }
+
+    /// A whole frame has arrived. Returns the answer, if there is one.
+    pub fn take(&mut self, flight_id: u32, frame: u64, carried: &CarriedReadings) -> Option<Answer> {
+        if flight_id != self.start.flight_id {
+            self.counts.foreign += 1;
+            return None;
+        }
+        let flown = self.answer.frame;
+        if frame <= flown {
+            let again = frame == flown && frame > 0;
+            *(if again { &mut self.counts.repeated } else { &mut self.counts.late }) += 1;
+            return again.then_some(self.answer);
+        }
+        let missing = frame - flown - 1;
+        match (missing, self.start.pace, self.last) {
+            (0, ..) => {}
+            (1..=MOST_HELD, Pace::RealTime, Some(last)) => self.hold(&last, missing),
+            _ => {
+                self.counts.ahead += 1;
+                return None;
+            }
+        }
+        let readings = self.wire.widen(carried);
+        self.counts.flown += 1;
+        self.fly(frame, &readings);
+        self.last = Some(readings);
+        Some(self.answer)
+    }
+
+    /// Flies lost frames: the vehicle is taken to turn and to accelerate as it did last.
+    fn hold(&mut self, last: &Readings, missing: u64) {
+        let imu = last.measured.imu;
+        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
+        let held = Readings { measured, ..*last };
+        for _ in 0..missing {
+            self.counts.held += 1;
+            self.fly(self.answer.frame + 1, &held);
+        }
+    }
+
+    fn fly(&mut self, frame: u64, readings: &Readings) {
+        let output = self.step(frame, readings);
+        self.answer = Answer {
+            frame,
+            commands: CarriedCommands::narrow(&output.commands),
+            phase: self.computer.mode().phase,
+            digest: self.computer.digest(),
+            held: self.counts.held,
+            ..self.answer
+        };
+    }
+
+    fn step(&mut self, frame: u64, readings: &Readings) -> Output {
+        let switches = &readings.switches;
+        self.computer.step(&Input {
+            frame,
+            time_s: flight_time_s(frame),
+            feeling: Feeling::InSpace(Sensed::Measured(readings.measured)),
+            gimbal_rad: readings.gimbal_rad,
+            fins_rad: readings.fins_rad,
+            contact: switches.contact,
+            igniter_continuity: switches.igniter_continuity,
+            booster_attached: switches.booster_attached,
+            pin_out: switches.pin_out,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            people: None,
+            requests: &[],
+            rehearsed: None,
+            late: false,
+        })
+    }
+
+    /// The answer to the last frame that was flown.
+    pub fn answer(&self) -> &Answer {
+        &self.answer
+    }
+
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// What the computer commands now, in full precision.
+    pub fn commands(&self) -> &Commands {
+        self.computer.commands()
+    }
+
+    pub fn computer(&self) -> &Computer {
+        &self.computer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flight::vehicle::rigid::RigidState;
+
+    use super::*;
+    use crate::readings::Switches;
+
+    fn computer(pace: Pace) -> RemoteComputer {
+        let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let start = Start { flight_id: 7, believed: RigidState::upright(300.0), pace };
+        RemoteComputer::new(&mission, Law::Nmpc, &start)
+    }
+
+    /// A falling vehicle whose rotation rate tells the frames apart.
+    fn frame(number: u64) -> CarriedReadings {
+        CarriedReadings {
+            gyro_rad_s: [0.0, 1e-3 * number as f32, 0.0],
+            specific_force_m_s2: [0.1, 0.0, 0.0],
+            pressure_altitude_m: number.is_multiple_of(4).then_some(300.0),
+            fix: None,
+            range_cm: None,
+            gimbal_rad: [0.0; 2],
+            fins_rad: [0.0; 4],
+            switches: Switches { igniter_continuity: true, pin_out: true, ..Switches::default() },
+        }
+    }
+
+    /// What the computer remembers after these frames have arrived in this order.
+    fn after(pace: Pace, frames: &[u64]) -> RemoteComputer {
+        let mut computer = computer(pace);
+        for number in frames {
+            computer.take(7, *number, &frame(*number));
+        }
+        computer
+    }
+
+    #[test]
+    fn doubled_and_old_frames_change_nothing_in_either_pace() {
+        for pace in [Pace::Lockstep, Pace::RealTime] {
+            let once = after(pace, &[1, 2, 3, 4]);
+            let disturbed = after(pace, &[1, 1, 2, 1, 3, 3, 3, 2, 4, 1]);
+            assert_eq!(disturbed.answer(), once.answer());
+            let counts = disturbed.counts();
+            assert_eq!((counts.flown, counts.repeated, counts.late, counts.held), (4, 3, 3, 0));
+        }
+    }
+
+    #[test]
+    fn a_doubled_frame_is_answered_again_with_the_same_answer() {
+        let mut computer = after(Pace::Lockstep, &[1, 2]);
+        let answer = *computer.answer();
+        assert_eq!(computer.take(7, 2, &frame(2)), Some(answer));
+        assert_eq!(computer.take(7, 1, &frame(1)), None);
+    }
+
+    #[test]
+    fn in_lockstep_a_frame_waits_for_the_one_before_it() {
+        let mut computer = after(Pace::Lockstep, &[1, 2]);
+        assert_eq!(computer.take(7, 4, &frame(4)), None);
+        assert_eq!(computer.answer().frame, 2);
+        assert_eq!(computer.take(7, 3, &frame(3)).map(|answer| answer.frame), Some(3));
+        assert_eq!(computer.take(7, 4, &frame(4)).map(|answer| answer.frame), Some(4));
+        assert_eq!(computer.answer(), after(Pace::Lockstep, &[1, 2, 3, 4]).answer());
+        assert_eq!(computer.counts().ahead, 1);
+    }
+
+    #[test]
+    fn in_real_time_lost_frames_are_flown_with_the_last_inertial_sample() {
+        let lost = after(Pace::RealTime, &[1, 2, 5]);
+        assert_eq!((lost.answer().frame, lost.answer().held), (5, 2));
+        assert_eq!(lost.counts().flown, 3);
+        let mut held = frame(2);
+        held.pressure_altitude_m = None;
+        let mut by_hand = after(Pace::RealTime, &[1, 2]);
+        for (number, readings) in [(3, held), (4, held), (5, frame(5))] {
+            by_hand.take(7, number, &readings);
+        }
+        assert_eq!(lost.answer().digest, by_hand.answer().digest);
+    }
+
+    #[test]
+    fn in_real_time_a_frame_that_was_overtaken_is_lost() {
+        let overtaken = after(Pace::RealTime, &[1, 3, 2, 4]);
+        assert_eq!(overtaken.answer().digest, after(Pace::RealTime, &[1, 3, 4]).answer().digest);
+        assert_eq!((overtaken.counts().late, overtaken.counts().held), (1, 1));
+    }
+
+    #[test]
+    fn a_gap_that_is_too_long_is_not_flown() {
+        let mut computer = after(Pace::RealTime, &[1]);
+        assert_eq!(computer.take(7, MOST_HELD + 3, &frame(9)), None);
+        assert_eq!(computer.take(7, u64::MAX, &frame(9)), None);
+        assert_eq!((computer.answer().frame, computer.counts().ahead), (1, 2));
+        assert!(computer.take(7, MOST_HELD + 2, &frame(9)).is_some());
+    }
+
+    #[test]
+    fn another_flight_is_not_this_one() {
+        let mut computer = after(Pace::Lockstep, &[1]);
+        assert_eq!(computer.take(8, 2, &frame(2)), None);
+        let other = Start { flight_id: 8, ..computer.start };
+        assert_eq!(computer.start_again(&other), None);
+        assert_eq!(computer.counts().foreign, 2);
+    }
+
+    #[test]
+    fn the_start_is_answered_again_until_a_frame_is_flown() {
+        let mut computer = computer(Pace::Lockstep);
+        let start = computer.start;
+        assert_eq!(computer.start_again(&start), Some(*computer.answer()));
+        computer.take(7, 1, &frame(1));
+        assert_eq!(computer.start_again(&start), None);
+    }
+}

@@ -1,0 +1,123 @@
+//! One simulated flight whose flight computer is elsewhere: hardware in the loop.
+//!
+//! It is the flight that [`Sortie`](crate::sortie::Sortie) flies with the same recipe and number, released at once and
+//! with `wire_resolution`. Of the computer it hears commands and the phase.
+
+use flight::computer::pilot::Sensed;
+use flight::computer::{Commands, flight_time_s};
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use hil::carried::{CarriedReadings, Wire};
+use hil::readings::Readings;
+use world::World;
+
+use crate::outcome::{Ending, Outcome, judge};
+use crate::recipe::Recipe;
+use crate::sortie::{LONGEST_S, SetUpError, prepared, start};
+use crate::surroundings::Surroundings;
+
+/// One flight, seen from the world.
+#[derive(Debug, Clone)]
+pub struct RemoteFlight {
+    mission: Mission,
+    surroundings: Surroundings,
+    believed: RigidState,
+    wire: Wire,
+    frame: u64,
+    phase: Phase,
+    ignited: bool,
+    finite: bool,
+}
+
+impl RemoteFlight {
+    /// Flight `number` of a recipe.
+    ///
+    /// # Errors
+    /// It cannot be set up, or its set of dispersions has no sensors or a fault that the wire does not carry.
+    pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
+        if !recipe.dispersion.sensors {
+            return Err(SetUpError::NoSensors);
+        }
+        if let Some(fault) = recipe.faults.first() {
+            return Err(SetUpError::Fault(fault.to_string()));
+        }
+        let (mission, _, drawn) = prepared(recipe, number);
+        let drawn = start::falling_as(&mission, &drawn)?;
+        let (surroundings, believed) = Surroundings::at_start(&mission, &recipe.dispersion, &drawn)?;
+        Ok(Self {
+            wire: Wire::new(&mission),
+            mission,
+            surroundings,
+            believed,
+            frame: 0,
+            phase: Phase::Deploy,
+            ignited: false,
+            finite: true,
+        })
+    }
+
+    /// The computer's estimate of its state at the start.
+    pub fn believed(&self) -> &RigidState {
+        &self.believed
+    }
+
+    /// The world moves for one frame; returns what the wire carries of it.
+    pub fn sense(&mut self) -> CarriedReadings {
+        let sensed = self.surroundings.feel();
+        self.frame += 1;
+        let feedback = self.surroundings.feedback(true, true);
+        let Sensed::Measured(measured) = sensed else { unreachable!("a flight with sensors") };
+        self.wire.narrow(&Readings {
+            measured,
+            gimbal_rad: feedback.gimbal_rad,
+            fins_rad: feedback.fins_rad,
+            switches: feedback.switches,
+        })
+    }
+
+    /// The computer's commands, and its phase.
+    pub fn act(&mut self, commands: &Commands, phase: Phase) {
+        self.surroundings.command(commands);
+        self.phase = phase;
+        self.ignited |= commands.ignite;
+        self.finite &= self.world().state().is_finite()
+            && commands.gimbal_rad.iter().chain(&commands.fins_rad).all(|angle| angle.is_finite());
+    }
+
+    /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
+    pub fn goes_on(&self) -> bool {
+        let world = self.world();
+        self.finite && world.rest().is_none() && world.time_s() < LONGEST_S && !self.phase.on_pad()
+    }
+
+    /// The truth.
+    pub fn world(&self) -> &World {
+        &self.surroundings.world
+    }
+
+    /// Frames since the start.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        flight_time_s(self.frame)
+    }
+
+    /// The outcome so far.
+    pub fn outcome(&self) -> Outcome {
+        let world = self.world();
+        let ending = Ending {
+            touchdown: world.touchdown().copied(),
+            rest: world.rest().map(|rest| rest.outcome),
+            phase: self.phase,
+            ignited: self.ignited,
+            lit: world.thrust_begins_s().is_some(),
+            parachute: world.parachute_ejected(),
+            finite: self.finite,
+        };
+        judge(&self.mission, &ending)
+    }
+}

@@ -1,0 +1,106 @@
+//! Everything of a flight but its flight computer: the world, the sensors that look at it, and the actuators that move it.
+
+use flight::computer::pilot::Sensed;
+use flight::computer::{Commands, FRAME_MS};
+use flight::estimation::estimator::{Measurements, StartUncertainty};
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use hil::readings::Switches;
+use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
+use world::{Actuators, World};
+
+use crate::dispersion::Dispersion;
+use crate::draw::Draw;
+use crate::sortie::{SetUpError, errors, start};
+
+/// The world of one flight, and what is between it and its flight computer.
+#[derive(Debug, Clone)]
+pub(crate) struct Surroundings {
+    pub(crate) world: World,
+    sensors: Option<Sensors>,
+    pub(crate) faults: SensorFaults,
+    actuators: Actuators,
+    /// The sensor samples of the last frame.
+    measured: Option<Measurements>,
+}
+
+/// The feedback and the switches at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Feedback {
+    pub(crate) gimbal_rad: [f64; 2],
+    pub(crate) fins_rad: [f64; 4],
+    pub(crate) switches: Switches,
+}
+
+impl Surroundings {
+    /// The start of a flight, and the flight computer's estimate of its state there.
+    pub(crate) fn at_start(
+        mission: &Mission,
+        dispersion: &Dispersion,
+        drawn: &Draw,
+    ) -> Result<(Self, RigidState), SetUpError> {
+        let world = start::world(mission, drawn)?;
+        let (sensors, believed) = if dispersion.sensors {
+            let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
+            let uncertainty = StartUncertainty::at_start(mission.start.at);
+            (Some(sensors), believed_start(world.state(), &uncertainty, drawn.flight_seed))
+        } else {
+            (None, *world.state())
+        };
+        let actuators = start::at_rest(mission);
+        let faults = SensorFaults::default();
+        Ok((Self { world, sensors, faults, actuators, measured: None }, believed))
+    }
+
+    /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
+    /// would have found any error.
+    pub(crate) fn begin(&mut self, mission: &Mission, dispersion: &Dispersion, drawn: &Draw) {
+        if let Ok(world) = start::world(mission, drawn) {
+            self.world = world;
+        }
+        if dispersion.sensors {
+            self.sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0).ok();
+        }
+        self.actuators = start::at_rest(mission);
+    }
+
+    /// The world moves for one frame, and the sensors measure it.
+    pub(crate) fn feel(&mut self) -> Sensed {
+        let mut measured = None;
+        for _ in 0..FRAME_MS {
+            self.world.step(&self.actuators);
+            if let Some(sensors) = &mut self.sensors {
+                measured = sensors.observe(&SensorTruth::of(&self.world), &self.faults).or(measured);
+            }
+        }
+        self.measured = measured;
+        measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured)
+    }
+
+    /// What feedback and switches say after the frame; `released`: contact counts.
+    pub(crate) fn feedback(&mut self, released: bool, pin_out: bool) -> Feedback {
+        let fed_back_rad = self.world.fins_feedback_rad();
+        let touched = released && self.world.touchdown().is_some();
+        let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
+            Some(sensors) => {
+                (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity())
+            }
+            None => (fed_back_rad, touched, true),
+        };
+        let booster_attached = self.world.booster_attached();
+        let switches = Switches { contact, igniter_continuity, booster_attached, pin_out };
+        Feedback { gimbal_rad: self.world.gimbal_feedback_rad(), fins_rad, switches }
+    }
+
+    /// Commands for the next frame.
+    pub(crate) fn command(&mut self, commands: &Commands) {
+        let Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = *commands;
+        let (ignite_booster, separate) = (booster.ignite, booster.separate);
+        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute, ignite_booster, separate };
+    }
+
+    /// The sensor samples of the last frame; `None` if the computer gets the truth.
+    pub(crate) fn measured(&self) -> Option<&Measurements> {
+        self.measured.as_ref()
+    }
+}

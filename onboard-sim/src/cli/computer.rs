@@ -1,0 +1,118 @@
+//! `onboard-sim computer`: a flight computer whose world is another process.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use flight::vehicle::profile::StartPoint;
+use hil::computer::Counts;
+use hil::start::Pace;
+use onboard_sim::hil::computer::{ComputerEnd, Event};
+use onboard_sim::hil::link::{Brought, HilLink};
+use protocol::identity::VEHICLE;
+use protocol::transport::LinkAddress;
+use sim::recipe::toml_starting_at;
+
+use super::campaign::text_of;
+use super::fly::interrupted;
+
+#[derive(Args)]
+pub(crate) struct ComputerArguments {
+    /// Link to the world: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD.
+    #[arg(long, value_name = "LINK")]
+    link: LinkAddress,
+    /// Built-in mission or TOML file. The world must have the same text.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    profile: String,
+    /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
+    #[arg(long, value_name = "START")]
+    start: Option<StartPoint>,
+}
+
+pub(crate) fn run(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(answer(arguments))
+}
+
+async fn answer(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
+    let mut mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
+    if let Some(start) = arguments.start {
+        mission_toml = toml_starting_at(&mission_toml, &arguments.profile, start)?;
+    }
+    let mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
+    let mut end = ComputerEnd::new(&mission, &mission_toml);
+    let mut link = HilLink::open(arguments.link, VEHICLE).await?;
+    writeln!(std::io::stdout(), "computer at {}", link.address())?;
+    let mut stopped = std::pin::pin!(interrupted());
+    let mut heartbeat = tokio::time::interval(Duration::from_secs(1));
+    heartbeat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
+    loop {
+        let brought = tokio::select! {
+            () = &mut stopped => break,
+            _ = heartbeat.tick() => {
+                link.send(&[end.heartbeat()]);
+                continue;
+            }
+            brought = link.receive() => brought,
+        };
+        let messages = match brought {
+            None => break,
+            Some(Brought::Up(peer)) => {
+                say(&format!("link up: {peer}"));
+                continue;
+            }
+            Some(Brought::Down(why)) => {
+                say(&format!("link down: {why}"));
+                continue;
+            }
+            Some(Brought::Messages(messages)) => messages,
+        };
+        for message in messages {
+            let mut out = Vec::new();
+            for event in end.take(&message, &mut out) {
+                say(&words(&event));
+            }
+            if !out.is_empty() {
+                link.send(&out);
+            }
+        }
+    }
+    if let Some((flight_id, counts)) = end.counts() {
+        say(&format!(
+            "flight {flight_id:08x}: {}; frames with a lost part: {}",
+            frames(counts),
+            end.broken()
+        ));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A closed pipe must not end a flight.
+fn say(words: &str) {
+    let _ = writeln!(std::io::stdout(), "{words}");
+}
+
+fn words(event: &Event) -> String {
+    match event {
+        Event::Began { flight_id, pace: Pace::Lockstep } => {
+            format!("flight {flight_id:08x} begins in lockstep")
+        }
+        Event::Began { flight_id, pace: Pace::RealTime } => {
+            format!("flight {flight_id:08x} begins in real time")
+        }
+        Event::Ended { flight_id, counts } => format!("flight {flight_id:08x}: {}", frames(counts)),
+        Event::OtherMission { theirs, ours } => {
+            format!("not answered: the world flies the mission {theirs}, this computer {ours}")
+        }
+    }
+}
+
+fn frames(counts: &Counts) -> String {
+    let Counts { flown, held, repeated, late, ahead, foreign } = counts;
+    format!(
+        "{flown} frames flown, {held} lost ones with the last inertial sample; doubled {repeated}, late {late}, too early \
+         {ahead}, of other flights {foreign}"
+    )
+}

@@ -1,0 +1,232 @@
+//! JSBSim as the world: its equations of motion, integrator, Earth, atmosphere, motor, servos and ground instead of ours,
+//! behind the messages of hardware in the loop. Each flight is also flown in our own world with the same draw.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+#![expect(clippy::print_stdout, reason = "the touchdowns side by side, for the page of hardware in the loop")]
+
+use std::path::Path;
+
+use clients::{JSBSIM, dialect, file};
+use e2e::{Bound, Ended, Program, Running, program};
+use flight::estimation::estimator::StartUncertainty;
+use flight::guidance::baseline::Law;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
+use flight::vehicle::rigid::RigidState;
+use protocol::mission::MissionHash;
+use serde_json::{Value, json};
+use sim::dispersion::Dispersion;
+use sim::draw::{Draw, draw};
+use sim::outcome::{Ending, Outcome, judge};
+use sim::sortie::Sortie;
+use world::sensors::believed_start;
+use world::{RestOutcome, Touchdown};
+
+const FLIGHTS: u64 = 20;
+/// Flights of one run of the bridge.
+const AT_ONCE: usize = 4;
+const SEED: u64 = 2002;
+
+/// A day at the field with this mean wind and without gusts, which JSBSim makes in another way.
+fn day(wind_m_s: f64) -> Dispersion {
+    let field = Dispersion::builtin("field").unwrap();
+    Dispersion { wind_m_s: [wind_m_s; 2], gust_scale: 0.0, wire_resolution: true, ..field }
+}
+
+fn state(state: &RigidState) -> Value {
+    let attitude = state.world_from_body;
+    json!({
+        "position_m": state.position_m.as_slice(),
+        "velocity_m_s": state.velocity_m_s.as_slice(),
+        "world_from_body": [attitude.w, attitude.i, attitude.j, attitude.k],
+        "rate_rad_s": state.rate_rad_s.as_slice(),
+    })
+}
+
+/// The flights that JSBSim is to fly, numbered from `first`.
+fn order(mission: &Mission, mission_toml: &str, first: usize, draws: &[Draw]) -> Value {
+    let vehicles = file("../../onboard-sim/vehicles");
+    let flights: Vec<Value> = draws
+        .iter()
+        .enumerate()
+        .map(|(number, drawn)| {
+            let uncertainty = StartUncertainty::at_start(StartPoint::Apogee);
+            let believed = believed_start(&drawn.apogee, &uncertainty, drawn.flight_seed);
+            json!({
+                "number": first + number,
+                "truth": serde_json::to_value(drawn.truth).unwrap(),
+                "apogee": state(&drawn.apogee),
+                "believed": state(&believed),
+            })
+        })
+        .collect();
+    json!({
+        "airframe": vehicles.join("airframes/mk2.toml"),
+        "motor": vehicles.join("motors/AeroTech_H45.eng"),
+        "site": { "latitude_deg": mission.site.latitude_deg, "longitude_deg": mission.site.longitude_deg },
+        "mission_hash": MissionHash::of(mission_toml).0,
+        "flights": flights,
+    })
+}
+
+/// Generates our dialect for JSBSim's bridge.
+fn generate_dialect() {
+    let place = Running::to_end(
+        JSBSIM.python().args(["-c", "import pymavlink.dialects.v20 as d; print(d.__path__[0])"]),
+    );
+    let place = Path::new(&place.output);
+    let folder = tempfile::tempdir_in(place).unwrap();
+    let made = folder.path().join("touchdown.py");
+    let mut generator = JSBSIM.program("mavgen.py");
+    generator.args(["--lang", "Python3", "--wire-protocol", "2.0", "-o"]).arg(&made).arg(dialect());
+    let generated = Running::to_end(&mut generator);
+    assert_eq!(generated.code, Some(0), "{}", generated.output);
+    std::fs::rename(&made, place.join("touchdown.py")).unwrap();
+}
+
+/// What JSBSim tells of a flight, judged as our own flights are.
+fn judged(mission: &Mission, told: &Value) -> Outcome {
+    let number = |key: &str| told[key].as_f64().unwrap_or_else(|| panic!("{key}: {told}"));
+    let touchdown = told.get("vertical_m_s").map(|_| {
+        // The heading does not count.
+        let mut state = RigidState::upright(0.0);
+        state.position_m.x = number("place_m");
+        Touchdown {
+            time_s: number("time_s"),
+            state,
+            vertical_m_s: number("vertical_m_s"),
+            lateral_m_s: number("lateral_m_s"),
+            tilt_rad: number("tilt_rad"),
+            rate_rad_s: number("rate_rad_s"),
+            cross_rate_rad_s: number("rate_rad_s"),
+            thrust_n: 0.0,
+            weight_n: 1.0,
+        }
+    });
+    let rest = match told["ending"].as_str().unwrap() {
+        "upright" => Some(RestOutcome::Upright),
+        "tipped over" => Some(RestOutcome::TippedOver),
+        "body strike" => Some(RestOutcome::BodyStrike),
+        _ => None,
+    };
+    let ignited = told["ignited_m"].is_number();
+    judge(
+        mission,
+        &Ending {
+            touchdown,
+            rest,
+            phase: flight::rules::phase::Phase::Touchdown,
+            ignited,
+            lit: ignited,
+            parachute: told["parachute"].as_bool().unwrap(),
+            finite: true,
+        },
+    )
+}
+
+/// Vertical speed, lateral speed, m/s, tilt, deg, rate, deg/s, distance, m, time, s.
+fn values(outcome: &Outcome) -> [f64; 6] {
+    outcome.touchdown.as_ref().map_or([f64::NAN; 6], |touchdown| {
+        let place = touchdown.state.position_m;
+        [
+            -touchdown.vertical_m_s,
+            touchdown.lateral_m_s,
+            touchdown.tilt_rad.to_degrees(),
+            touchdown.rate_rad_s.to_degrees(),
+            place.x.hypot(place.y),
+            touchdown.time_s,
+        ]
+    })
+}
+
+fn medians(outcomes: &[Outcome]) -> [f64; 6] {
+    core::array::from_fn(|column| {
+        let mut all: Vec<f64> = outcomes.iter().map(|outcome| values(outcome)[column]).collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    })
+}
+
+/// The same flights in JSBSim, in our world, and in our world with the noise of the sensors drawn anew.
+struct Flown {
+    theirs: Vec<Outcome>,
+    ours: Vec<Outcome>,
+    again: Vec<Outcome>,
+}
+
+fn fly(wind_m_s: f64) -> Flown {
+    let (_, mission_toml) = *vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
+    let mission = vehicles::mission::from_toml(mission_toml, "mk2").unwrap();
+    let dispersion = day(wind_m_s);
+    let draws: Vec<Draw> = (0..FLIGHTS).map(|number| draw(&mission, &dispersion, SEED, number)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let mut computer =
+        Running::start(program(Program::OnboardSim).args(["computer", "--link", "udpin:127.0.0.1:0"]));
+    let port = computer.bound_port(Bound::Udp);
+    let mut theirs = Vec::new();
+    // A few at a time, because a program under test has limited time.
+    for few in draws.chunks(AT_ONCE) {
+        let path = folder.path().join("order.json");
+        std::fs::write(&path, order(&mission, mission_toml, theirs.len(), few).to_string()).unwrap();
+        let mut bridge = JSBSIM.python();
+        bridge.arg(file("jsbsim/world.py")).arg(port.to_string()).arg(&path);
+        let Ended { code, output } = Running::to_end(&mut bridge);
+        assert_eq!(code, Some(0), "{output}");
+        let told = output.lines().filter(|line| line.starts_with('{'));
+        theirs.extend(told.map(|line| judged(&mission, &serde_json::from_str(line).unwrap())));
+    }
+    assert_eq!(theirs.len(), draws.len());
+    let in_our_world =
+        |drawn: &Draw| Sortie::drawn_as(&mission, &dispersion, drawn, Law::Nmpc).unwrap().run();
+    let ours = draws.iter().map(in_our_world).collect();
+    let anew = |drawn: &Draw| in_our_world(&Draw { flight_seed: drawn.flight_seed ^ 1, ..*drawn });
+    Flown { theirs, ours, again: draws.iter().map(anew).collect() }
+}
+
+/// Mean and standard deviation of the differences of the touchdowns' values.
+fn differences(some: &[Outcome], others: &[Outcome]) -> [(f64, f64); 6] {
+    core::array::from_fn(|column| {
+        let pairs = some.iter().zip(others);
+        let found: Vec<f64> =
+            pairs.map(|(some, other)| values(some)[column] - values(other)[column]).collect();
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let spread = found.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (found.len() - 1) as f64;
+        (mean, spread.sqrt())
+    })
+}
+
+fn compare(wind_m_s: f64, fewest: usize) {
+    generate_dialect();
+    let Flown { theirs, ours, again } = fly(wind_m_s);
+    println!("wind {wind_m_s} m/s: vertical m/s, lateral m/s, tilt deg, rate deg/s, distance m, time s");
+    for (number, (theirs, ours)) in theirs.iter().zip(&ours).enumerate() {
+        let failed = |outcome: &Outcome| outcome.failure.map_or("landed", sim::outcome::Failure::name);
+        let row = |outcome: &Outcome| values(outcome).map(|value| format!("{value:7.2}")).join(" ");
+        println!(
+            "{number:2} JSBSim {} {} | ours {} {}",
+            row(theirs),
+            failed(theirs),
+            row(ours),
+            failed(ours)
+        );
+    }
+    let legs = |outcomes: &[Outcome]| outcomes.iter().filter(|outcome| outcome.legs).count();
+    println!("legs: JSBSim {} of {FLIGHTS}, ours {} of {FLIGHTS}", legs(&theirs), legs(&ours));
+    println!("medians: JSBSim {:.2?}, ours {:.2?}", medians(&theirs), medians(&ours));
+    println!("JSBSim less ours, mean and standard deviation: {:.3?}", differences(&theirs, &ours));
+    println!("ours again less ours, mean and standard deviation: {:.3?}", differences(&again, &ours));
+    assert!(legs(&theirs) >= fewest, "only {} of {FLIGHTS} land in JSBSim", legs(&theirs));
+    // The same draw falls for the same time in both, within half a second.
+    for (theirs, ours) in theirs.iter().zip(&ours).filter(|(theirs, ours)| theirs.legs && ours.legs) {
+        assert!((values(theirs)[5] - values(ours)[5]).abs() < 0.5, "{theirs:?} {ours:?}");
+    }
+}
+
+#[test]
+fn val_jsbsim_in_still_air_it_lands_in_a_world_that_nobody_here_wrote() {
+    compare(0.0, 18);
+}
+
+#[test]
+fn val_jsbsim_in_wind_it_lands_in_a_world_that_nobody_here_wrote() {
+    compare(4.0, 17);
+}
