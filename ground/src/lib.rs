@@ -17,6 +17,7 @@
 
 pub mod app;
 pub mod attach;
+pub mod checklist_file;
 pub mod cli;
 pub mod config;
 pub mod demo;

@@ -177,6 +177,8 @@ async fn act(
             // The station itself sends, records and reports.
             Action::Send(_)
             | Action::Record(_)
+            | Action::KeepChecklist(_)
+            | Action::Enter(_)
             | Action::SyncLog
             | Action::Alarm(_)
             | Action::Tell(_)
@@ -208,6 +210,9 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
         Request::Acknowledge(kind) => {
             model.alarms.acknowledge(kind);
             return;
+        }
+        Request::Sign { step, .. } => {
+            format!("step {} NOT SIGNED: this screen has no station", u32::from(step) + 1)
         }
         Request::Parameters => return,
     };

@@ -2,6 +2,7 @@
 
 use anyhow::Context as _;
 use protocol::crew_file::CrewFile;
+use protocol::dialect::TdRole;
 use protocol::key_file::KeyFile;
 use protocol::signing::Signing;
 
@@ -12,6 +13,8 @@ use crate::model::two_person::KeyOwner;
 pub(super) struct KeyRing {
     pub(super) key: Option<(KeyFile, Signing)>,
     pub(super) owner: Option<KeyOwner>,
+    /// The people of the crew by name, with their roles; empty without a crew.
+    pub(super) roles: Vec<(String, TdRole)>,
 }
 
 impl KeyRing {
@@ -25,21 +28,23 @@ impl KeyRing {
                 cli.crew.is_none(),
                 "--crew needs --key, the key that vehicle and stations share"
             );
-            return Ok(Self { key: None, owner: None });
+            return Ok(Self { key: None, owner: None, roles: Vec::new() });
         };
         let crew = cli.crew.as_deref().map(CrewFile::open).transpose()?;
+        let people = crew.iter().flat_map(|crew| &crew.members);
+        let roles = people.map(|member| (member.name.clone(), member.role)).collect();
         let member = match (&crew, cli.operator.as_deref()) {
             (Some(crew), Some(name)) => Some(crew.member(name)?),
             _ => None,
         };
         let Some((member, (number, path))) = member.and_then(|member| Some((member, member.key.as_ref()?)))
         else {
-            return Ok(Self { key: Some(KeyFile::open(shared, "ground")?), owner: None });
+            return Ok(Self { key: Some(KeyFile::open(shared, "ground")?), owner: None, roles });
         };
         let (file, signing) =
             KeyFile::open(path, "ground").with_context(|| format!("the timestamps of {}", member.name))?;
         let signing = signing.as_operator(*number, KeyFile::read_key(shared)?);
         let owner = KeyOwner { number: *number, name: member.name.clone() };
-        Ok(Self { key: Some((file, signing)), owner: Some(owner) })
+        Ok(Self { key: Some((file, signing)), owner: Some(owner), roles })
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod alarm_command;
 pub mod attached;
+mod checklist;
 pub mod clock;
 mod key_ring;
 pub mod lines;
@@ -137,7 +138,9 @@ async fn start(
     if endpoints.is_empty() {
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
-    let KeyRing { key, owner } = KeyRing::open(cli)?;
+    let KeyRing { key, owner, roles } = KeyRing::open(cli)?;
+    let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
+    let checklist = cli.checklist.as_deref().map(|path| checklist::open(path, start_unix_s)).transpose()?;
     let mission = cli.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
@@ -170,6 +173,8 @@ async fn start(
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         key_owner: owner,
         mission: mission.map(|mission| MissionHash::of(mission.toml())),
+        crew_roles: roles,
+        start_unix_s,
         demonstration: demo.is_some(),
         auto,
         // A daemon also keeps running after a flight.
@@ -179,6 +184,14 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
+    let mut signatures = None;
+    if let Some((list, file, told)) = checklist {
+        model.checklist = Some(list);
+        signatures = Some(file);
+        for text in told {
+            model.warn(clock.now(), text);
+        }
+    }
     let server = serve(cli, &mut model, interactive, &clock).await?;
     if demo.is_some()
         && !is_daemon
@@ -188,7 +201,7 @@ async fn start(
     }
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
-    let station = Station {
+    let mut station = Station {
         clock,
         log_time,
         recorder,
@@ -199,8 +212,10 @@ async fn start(
         screens: Vec::new(),
         alarm_command: config.alarm_command.clone(),
         quiet_input: None,
+        signatures,
         report_at: Duration::ZERO,
     };
+    station.publish_checklist(&model, clock.now());
     Ok((station, model, wire))
 }
 

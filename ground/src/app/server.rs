@@ -50,6 +50,8 @@ pub enum ServerEvent {
 
 struct History {
     hello: Hello,
+    /// The latest checklist, which is told also if the history no longer reaches back to it.
+    checklist: Option<Bytes>,
     kept: VecDeque<Bytes>,
     bytes: usize,
 }
@@ -84,7 +86,7 @@ impl Server {
         }
         let (news, _) = broadcast::channel(BEHIND_MAX);
         let (ask, requests) = mpsc::channel(REQUESTS_MAX);
-        let history = Mutex::new(History { hello, kept: VecDeque::new(), bytes: 0 });
+        let history = Mutex::new(History { hello, checklist: None, kept: VecDeque::new(), bytes: 0 });
         let shared = Arc::new(Shared { history, news, next_screen: AtomicU32::new(first_screen) });
         let for_screens = Arc::clone(&shared);
         let accepting = tokio::spawn(async move {
@@ -106,6 +108,9 @@ impl Server {
     pub fn publish(&mut self, msg: &Msg, now: Duration) {
         let Some(bytes) = encode_to_screen(&ToScreen::Msg(msg.clone()), now).map(Bytes::from) else { return };
         let Ok(mut history) = self.shared.history.lock() else { return };
+        if matches!(msg, Msg::Checklist(_)) {
+            history.checklist = Some(Arc::clone(&bytes));
+        }
         history.bytes += bytes.len();
         history.kept.push_back(Arc::clone(&bytes));
         while history.bytes > HISTORY_BYTES_MAX {
@@ -160,7 +165,7 @@ impl Shared {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
         let hello = ToScreen::Hello(Hello { screen, ..history.hello.clone() });
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
-        let past = hello.iter().chain(&history.kept).cloned().collect();
+        let past = hello.iter().chain(&history.checklist).chain(&history.kept).cloned().collect();
         (past, self.news.subscribe())
     }
 }

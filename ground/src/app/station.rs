@@ -9,6 +9,7 @@ use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::checklist::SignatureFile;
 use super::clock::{Clock, LogTime};
 use super::lines::Lines;
 use super::output::Output;
@@ -18,6 +19,7 @@ use super::wire::Wire;
 use super::{alarm_command, screen, stations};
 use crate::attach::message::{ToScreen, ToStation};
 use crate::demo::Demo;
+use crate::model::checklist::ChecklistEntry;
 use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model};
 use crate::update::{Action, Msg, Request, update};
@@ -41,6 +43,8 @@ pub(super) struct Station {
     pub(super) alarm_command: Option<String>,
     /// The open end of the pipe that replaces a lost terminal.
     pub(super) quiet_input: Option<OwnedFd>,
+    /// Where the signatures of the checklist are kept; `None` without a checklist.
+    pub(super) signatures: Option<SignatureFile>,
     /// When the links are reported next.
     pub(super) report_at: Duration,
 }
@@ -151,6 +155,7 @@ impl Station {
         if self.server.is_none() {
             // If another station uses the path, this one continues without a socket.
             self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
+            self.publish_checklist(model, self.clock.now());
         }
     }
 
@@ -170,6 +175,9 @@ impl Station {
             }
             ServerEvent::FromScreen(_, ToStation::Request(Request::Acknowledge(kind))) => {
                 vec![Msg::AlarmAcknowledged(kind)]
+            }
+            ServerEvent::FromScreen(by, ToStation::Request(Request::Sign { step, void })) => {
+                vec![Msg::SignAsked { step: step.into(), void, by }]
             }
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
@@ -250,6 +258,8 @@ impl Station {
                         recorder.try_record(timed(record, at_ns), at_ns);
                     }
                 }
+                Action::Enter(_) => {}
+                Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
                         recorder.sync_soon();
@@ -276,6 +286,21 @@ impl Station {
             }
         }
         next
+    }
+
+    /// Keeps a change of the checklist, and shows it on every screen.
+    fn keep_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
+        if let Some(Err(error)) = self.signatures.as_mut().map(|file| file.add(entry)) {
+            model.warn(now, format!("the checklist is not kept over a restart: {error:#}"));
+        }
+        self.publish_checklist(model, now);
+    }
+
+    /// Tells every screen the checklist.
+    pub(super) fn publish_checklist(&mut self, model: &Model, now: Duration) {
+        if let (Some(server), Some(list)) = (&mut self.server, &model.checklist) {
+            server.publish(&Msg::Checklist(Box::new(list.clone())), now);
+        }
     }
 
     /// Restores the terminal first, because the rest may take a while.

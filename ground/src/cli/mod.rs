@@ -58,6 +58,10 @@ pub struct Cli {
     #[arg(long, value_name = "NAME|FILE", global = true)]
     pub mission: Option<String>,
 
+    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub checklist: Option<PathBuf>,
+
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
@@ -256,6 +260,7 @@ impl Cli {
             ("--key", self.key.is_some()),
             ("--crew", self.crew.is_some()),
             ("--mission", self.mission.is_some()),
+            ("--checklist", self.checklist.is_some()),
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
@@ -295,6 +300,7 @@ mod tests {
             "--key",
             "--crew",
             "--mission",
+            "--checklist",
             "--sysid",
             "--vehicle-sysid",
             "--log",
@@ -340,6 +346,7 @@ mod tests {
             ("--connect", " udpin:0.0.0.0:14550"),
             ("--key", " k"),
             ("--mission", " mk2"),
+            ("--checklist", " c"),
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),

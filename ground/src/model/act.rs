@@ -23,6 +23,12 @@ pub enum Act {
     /// Open the dialog that takes command.
     TakeCommand,
     Acknowledge,
+    /// Show the checklist on the Pad page, or the arming checks again.
+    Checklist,
+    /// Open the dialog that signs the chosen step of the checklist.
+    SignStep,
+    /// Open the dialog that takes the signature of the chosen step back.
+    VoidStep,
     Show(Page),
     Hold,
     Follow,
@@ -48,7 +54,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 29] = [
+pub const DEFINITIONS: [Definition; 32] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -66,6 +72,19 @@ pub const DEFINITIONS: [Definition; 29] = [
         "take command from a silent station: then TAKE and Enter",
     ),
     define(Act::Acknowledge, "acknowledge", Key::Char(' '), "acknowledge the shown alarm"),
+    define(
+        Act::Checklist,
+        "checklist",
+        Key::Char('k'),
+        "the checklist on the Pad page; Up and Down choose a step",
+    ),
+    define(
+        Act::SignStep,
+        "sign",
+        Key::Char('G'),
+        "sign the chosen step of the checklist: then Enter within 5 s",
+    ),
+    define(Act::VoidStep, "void", Key::Char('V'), "take a step's signature back: then Enter within 5 s"),
     define(Act::Show(Page::Pad), "pad", Key::Char('1'), "page: arming checks and ladder"),
     define(Act::Show(Page::Descent), "flight", Key::Char('2'), "page: ascent and descent"),
     define(Act::Show(Page::Landing), "landing", Key::Char('3'), "page: the burn"),
@@ -112,6 +131,8 @@ impl Act {
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
             Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
+            Self::Checklist => model.checklist.is_some(),
+            Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold
             | Self::Filter
@@ -126,7 +147,14 @@ impl Act {
     pub fn opens_ladder(self) -> bool {
         matches!(
             self,
-            Self::Arm | Self::Start | Self::Disarm | Self::HoldCountdown | Self::Tap | Self::TakeCommand
+            Self::Arm
+                | Self::Start
+                | Self::Disarm
+                | Self::HoldCountdown
+                | Self::Tap
+                | Self::TakeCommand
+                | Self::SignStep
+                | Self::VoidStep
         )
     }
 }

@@ -4,6 +4,7 @@ use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
 
 use super::alarm::AlarmKind;
+use super::checklist::ChecklistEntry;
 use super::command::CommandKind;
 use super::events::Speaker;
 
@@ -16,6 +17,18 @@ pub enum Request {
     Acknowledge(AlarmKind),
     /// Ask the vehicle for its parameters.
     Parameters,
+    /// The crew has signed or voided this step of the checklist, counted from zero.
+    Sign { step: u8, void: bool },
+}
+
+/// A line of the book: who did what. The run loop adds the time and the chain.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BookLine {
+    /// As in `key`, `commanded`, `signed`.
+    pub kind: String,
+    /// Who did it; empty for the station or the vehicle itself.
+    pub who: String,
+    pub text: String,
 }
 
 /// What `update` wants the run loop to do.
@@ -25,6 +38,10 @@ pub enum Action {
     Send(Box<MavMessage>),
     /// Write a record into the log.
     Record(Record),
+    /// The checklist has changed: keep the change, and show it on every screen.
+    KeepChecklist(ChecklistEntry),
+    /// Enter this into the book.
+    Enter(BookLine),
     /// Write the log to disk now.
     SyncLog,
     /// Redraw the whole screen.

@@ -11,6 +11,7 @@ mod auto_step;
 pub mod bindings;
 pub mod boot;
 pub mod callouts;
+pub mod checklist;
 pub mod chord;
 pub mod command;
 pub mod crew;
@@ -45,18 +46,19 @@ pub mod words;
 use std::sync::Arc;
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::OperatorAction;
 use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
 
-use action::Action;
+use action::{Action, BookLine};
 use alarm::{Alarm, Alarms};
 pub(crate) use auto_step::AutoStep;
 use bindings::Bindings;
 use callouts::{Called, Talk};
+use checklist::Checklist;
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
@@ -97,6 +99,10 @@ pub struct Settings {
     pub key_owner: Option<KeyOwner>,
     /// The mission that the vehicle should fly, if the station knows it.
     pub mission: Option<MissionHash>,
+    /// The people of the crew file by name, with their roles; empty without one.
+    pub crew_roles: Vec<(String, TdRole)>,
+    /// When the run started: seconds since 1970, UTC.
+    pub start_unix_s: u64,
     /// Whether the vehicle is simulated in the station's own process.
     pub demonstration: bool,
     /// Whether the automatic mode arms and starts.
@@ -126,6 +132,8 @@ impl Settings {
             seat: Seat::default(),
             key_owner: None,
             mission: None,
+            crew_roles: Vec::new(),
+            start_unix_s: 0,
             demonstration: false,
             auto: false,
             interactive: true,
@@ -217,6 +225,8 @@ pub struct Model {
     pub recall: Recall,
     /// The moment of the past that the crew looks at; `None` while the screen is live.
     pub look_back: Option<LookBack>,
+    /// The checklist of the mission, as the station keeps it; `None` without one.
+    pub checklist: Option<Checklist>,
     /// What has been called out.
     pub called: Called,
     /// `None` for a live flight.
@@ -258,6 +268,7 @@ impl Model {
             parameters: Parameters::default(),
             recall: Recall::default(),
             look_back: None,
+            checklist: None,
             called: Called::default(),
             playing: None,
             rebooted_at: None,
@@ -332,12 +343,22 @@ impl Model {
     }
 
     /// Records in the log what the crew did and what followed.
-    pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, detail: &str) {
+    pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, by: &Seat, detail: &str) {
         self.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
             time_s: now.as_secs_f64(),
             kind: kind.to_owned(),
             detail: detail.to_owned(),
         })));
+        self.enter(kind, &by.operator, detail);
+    }
+
+    /// Enters a line into the book.
+    pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
+        self.outbox.push(Action::Enter(BookLine {
+            kind: kind.to_owned(),
+            who: who.to_owned(),
+            text: text.to_owned(),
+        }));
     }
 
     pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {

@@ -117,6 +117,10 @@ pub struct Pages {
     pub pinned: Vec<&'static Quantity>,
     /// Only lines with this text are listed; empty for all.
     pub filter: String,
+    /// Whether the Pad page lists the checklist instead of the arming checks.
+    pub checklist: bool,
+    /// The chosen step of the checklist; `None` for the first that is open.
+    pub step: Option<usize>,
     /// A text that is being typed.
     pub entry: Option<TextEntry>,
 }
@@ -145,6 +149,8 @@ impl Default for Pages {
             plotted: &quantity::ALL[0],
             pinned: Vec::new(),
             filter: String::new(),
+            checklist: false,
+            step: None,
             entry: None,
         }
     }

@@ -109,7 +109,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let Some(track) = track else { return };
     let kind = track.kind;
     let name = kind.name();
-    let by = track.by.in_brackets();
+    let (by, seat) = (track.by.in_brackets(), track.by.clone());
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
@@ -153,7 +153,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
-    model.record_operator(now, operator_kind, &told);
+    model.record_operator(now, operator_kind, &seat, &told);
     model.say(now, Speaker::Ground, level, text);
     if let Some(result) = answered.filter(|_| !asked_to_confirm) {
         on_final_answer(model, kind, result, now);
@@ -225,6 +225,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             track.observed_at = Some(now);
             seen.push((
                 EventLevel::Info,
+                track.by.clone(),
                 format!("{} observed: {}", track.kind.name(), track.kind.observed_words()),
             ));
         } else if track.disagrees(now) && !track.not_observed_reported {
@@ -232,12 +233,13 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             let name = track.kind.name();
             seen.push((
                 EventLevel::Error,
+                track.by.clone(),
                 format!("{name} acknowledged, not observed: the vehicle does not show it"),
             ));
         }
     }
-    for (level, text) in seen {
-        model.record_operator(now, "observed", &text);
+    for (level, by, text) in seen {
+        model.record_operator(now, "observed", &by, &text);
         model.say(now, Speaker::Ground, level, text);
     }
     stop_if_latched(model, now);

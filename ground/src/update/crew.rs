@@ -9,6 +9,7 @@ use super::Action;
 use crate::model::Model;
 use crate::model::command::CommandKind;
 use crate::model::crew::UNATTENDED_MAX;
+use crate::model::seat::Seat;
 
 /// How often the hold is sent; the countdown itself shows whether it worked.
 const HOLD_EVERY: Duration = Duration::from_millis(100);
@@ -26,7 +27,7 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     }
     if model.crew.hold_due.is_none() {
         let text = format!("no commanding screen for {} s in the countdown: HOLD", UNATTENDED_MAX.as_secs());
-        model.record_operator(now, "hold", &text);
+        model.record_operator(now, "hold", &Seat::default(), &text);
         model.warn(now, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);

@@ -5,6 +5,7 @@
 pub mod alarms;
 pub mod auto;
 mod callouts;
+mod checklist;
 pub mod commands;
 pub mod crew;
 mod entry;
@@ -21,6 +22,7 @@ use protocol::signing::SigningCounters;
 
 use crate::key::Key;
 use crate::model::alarm::AlarmKind;
+use crate::model::checklist::Checklist;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
@@ -53,6 +55,15 @@ pub enum Msg {
     ScreenQuit,
     /// The crew has acknowledged this alarm on an attached screen.
     AlarmAcknowledged(AlarmKind),
+    /// The station has this checklist, in this state.
+    Checklist(Box<Checklist>),
+    /// The crew has signed or voided a step of the checklist on an attached screen.
+    SignAsked {
+        /// Counted from zero.
+        step: usize,
+        void: bool,
+        by: Seat,
+    },
     /// An attached screen asks for the parameters.
     ParametersWanted,
     /// Time passes on an attached screen: its dialogs and its abort chord may expire.
@@ -109,6 +120,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.info(now, model.crew.words());
         }
         Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
+        Msg::Checklist(list) => model.checklist = Some(*list),
+        Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {

@@ -9,6 +9,7 @@
 pub mod actuators;
 pub mod alarm_line;
 pub mod ascii;
+pub mod checklist;
 pub mod compact;
 pub mod controller;
 pub mod dialog;

@@ -3,6 +3,7 @@
 mod alarms;
 mod auto;
 mod bytes;
+mod checklist;
 mod crew;
 mod daemon;
 mod disarm;

@@ -5,6 +5,7 @@
 //! ```
 
 mod bytes;
+mod checklist;
 mod report;
 
 use std::time::Duration;
@@ -91,10 +92,15 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
             }
         }
         Msg::ScreenQuit => drop(out.kind(18)),
+        Msg::Checklist(list) => {
+            out.kind(20);
+            checklist::encode(list, out);
+        }
         // The station's own keys and end, and messages that only a replay or an attached screen uses.
         Msg::Key(_)
         | Msg::Keys(_)
         | Msg::Pasted
+        | Msg::SignAsked { .. }
         | Msg::Terminate(_)
         | Msg::Commanded(_)
         | Msg::ScreenTick => return None,
@@ -154,6 +160,7 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         }
         18 => ToScreen::Msg(Msg::ScreenQuit),
         19 => ToScreen::Msg(Msg::LinkSays(rest.text()?)),
+        20 => ToScreen::Msg(Msg::Checklist(Box::new(checklist::decode(&mut rest)?))),
         30 => ToScreen::Status(StationStatus {
             pid: rest.u32()?,
             demonstration: rest.u8()? != 0,
@@ -210,6 +217,7 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Command(kind)) => out.kind(1).u8(number_of(*kind)),
         ToStation::Request(Request::Acknowledge(kind)) => out.kind(2).u8(alarm_number(*kind)),
         ToStation::Request(Request::Parameters) => out.kind(3),
+        ToStation::Request(Request::Sign { step, void }) => out.kind(7).u8(*step).u8(u8::from(*void)),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -236,6 +244,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         4 => ToStation::Key(words(&mut rest, KEY_MAX)?),
         5 => ToStation::Status,
         6 => ToStation::Stop { force: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? },
+        7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };
     rest.end()?;
