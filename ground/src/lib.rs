@@ -24,6 +24,7 @@ pub mod demo;
 pub mod exit;
 pub mod key;
 pub mod model;
+pub mod place_file;
 pub mod replay;
 pub mod update;
 pub mod view;

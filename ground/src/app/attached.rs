@@ -179,6 +179,7 @@ async fn act(
             | Action::Record(_)
             | Action::KeepChecklist(_)
             | Action::Enter(_)
+            | Action::KeepPlace(_)
             | Action::SyncLog
             | Action::Alarm(_)
             | Action::Tell(_)

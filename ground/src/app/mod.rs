@@ -2,6 +2,7 @@
 
 pub mod alarm_command;
 pub mod attached;
+mod book;
 mod checklist;
 pub mod clock;
 mod key_ring;
@@ -10,6 +11,7 @@ pub mod log;
 mod operator;
 mod output;
 pub mod pace;
+mod places;
 pub mod print;
 pub mod replaying;
 pub mod screen;
@@ -113,6 +115,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
             }
         };
     let ran = station.run(&mut model, &mut wire).await;
+    station.close_book(&mut model, &mut wire);
     if let Some(msg) = wire.save_timestamps() {
         update(&mut model, msg, clock.now());
     }
@@ -138,7 +141,7 @@ async fn start(
     if endpoints.is_empty() {
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
-    let KeyRing { key, owner, roles } = KeyRing::open(cli)?;
+    let KeyRing { key, owner, book_key, roles } = KeyRing::open(cli)?;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist = cli.checklist.as_deref().map(|path| checklist::open(path, start_unix_s)).transpose()?;
     let mission = cli.mission.as_deref().map(load_flight).transpose()?;
@@ -174,6 +177,8 @@ async fn start(
         key_owner: owner,
         mission: mission.map(|mission| MissionHash::of(mission.toml())),
         crew_roles: roles,
+        pad: cli.pad,
+        here: cli.here,
         start_unix_s,
         demonstration: demo.is_some(),
         auto,
@@ -191,6 +196,10 @@ async fn start(
         for text in told {
             model.warn(clock.now(), text);
         }
+    }
+    if let Some(place) = places::newest(recorder_folder(recorder.as_ref()), start_unix_s) {
+        model.place = Some(place);
+        model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
     }
     let server = serve(cli, &mut model, interactive, &clock).await?;
     if demo.is_some()
@@ -213,10 +222,19 @@ async fn start(
         alarm_command: config.alarm_command.clone(),
         quiet_input: None,
         signatures,
+        book: None,
+        place_failed: false,
         report_at: Duration::ZERO,
     };
+    station.open_book(&model, book_key);
     station.publish_checklist(&model, clock.now());
+    station.publish_place(&model, clock.now());
     Ok((station, model, wire))
+}
+
+/// The folder of the log.
+fn recorder_folder(recorder: Option<&Recorder>) -> Option<&std::path::Path> {
+    recorder.and_then(|recorder| recorder.path().parent())
 }
 
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a

@@ -13,6 +13,7 @@ use protocol::transport::LinkAddress;
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::bindings::Bindings;
+use crate::model::place::Degrees;
 pub use values::{Characters, LogChoice, ReplayFrom, Seconds, TalkAmount, ThemeChoice};
 
 /// The profile that the demonstration flies by default.
@@ -61,6 +62,14 @@ pub struct Cli {
     /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
     #[arg(long, value_name = "FILE", global = true)]
     pub checklist: Option<PathBuf>,
+
+    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub pad: Option<Degrees>,
+
+    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub here: Option<Degrees>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
@@ -261,6 +270,8 @@ impl Cli {
             ("--crew", self.crew.is_some()),
             ("--mission", self.mission.is_some()),
             ("--checklist", self.checklist.is_some()),
+            ("--pad", self.pad.is_some()),
+            ("--here", self.here.is_some()),
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
@@ -347,6 +358,8 @@ mod tests {
             ("--key", " k"),
             ("--mission", " mk2"),
             ("--checklist", " c"),
+            ("--pad", " -1.5,2"),
+            ("--here", " 1,2"),
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),

@@ -54,7 +54,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 32] = [
+pub const DEFINITIONS: [Definition; 33] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -95,6 +95,12 @@ pub const DEFINITIONS: [Definition; 32] = [
     define(Act::Show(Page::Log), "log", Key::Char('8'), "page: the recording"),
     define(Act::Show(Page::Alarms), "alarms", Key::Char('9'), "page: every alarm"),
     define(Act::Show(Page::Path), "path", Key::Char('p'), "page: the flight from two sides and from above"),
+    define(
+        Act::Show(Page::Find),
+        "find",
+        Key::Char('f'),
+        "page: where to look for the vehicle, and the way there",
+    ),
     define(
         Act::Show(Page::Values),
         "values",

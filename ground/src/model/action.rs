@@ -7,6 +7,7 @@ use super::alarm::AlarmKind;
 use super::checklist::ChecklistEntry;
 use super::command::CommandKind;
 use super::events::Speaker;
+use super::place::LastPlace;
 
 /// What a screen in another process asks its station to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub enum Action {
     Record(Record),
     /// The checklist has changed: keep the change, and show it on every screen.
     KeepChecklist(ChecklistEntry),
+    /// Keep the last place of the vehicle in the files for maps.
+    KeepPlace(Box<LastPlace>),
     /// Enter this into the book.
     Enter(BookLine),
     /// Write the log to disk now.

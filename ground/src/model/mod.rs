@@ -9,6 +9,7 @@ pub mod action;
 pub mod alarm;
 mod auto_step;
 pub mod bindings;
+pub mod book;
 pub mod boot;
 pub mod callouts;
 pub mod checklist;
@@ -31,6 +32,7 @@ pub mod page;
 pub mod palette;
 pub mod parameters;
 pub mod permits;
+pub mod place;
 pub mod quantity;
 pub mod recall;
 pub mod seat;
@@ -57,6 +59,7 @@ use action::{Action, BookLine};
 use alarm::{Alarm, Alarms};
 pub(crate) use auto_step::AutoStep;
 use bindings::Bindings;
+use book::BookState;
 use callouts::{Called, Talk};
 use checklist::Checklist;
 use chord::AbortChord;
@@ -70,6 +73,7 @@ use key_timing::KeyTiming;
 use link::Link;
 use page::{Page, Pages};
 use parameters::Parameters;
+use place::{Degrees, LastPlace};
 use recall::{LookBack, Recall};
 use seat::Seat;
 use two_person::KeyOwner;
@@ -101,6 +105,9 @@ pub struct Settings {
     pub mission: Option<MissionHash>,
     /// The people of the crew file by name, with their roles; empty without one.
     pub crew_roles: Vec<(String, TdRole)>,
+    /// Where the pad is on the Earth, and where the station is; `None` if nobody has said it.
+    pub pad: Option<Degrees>,
+    pub here: Option<Degrees>,
     /// When the run started: seconds since 1970, UTC.
     pub start_unix_s: u64,
     /// Whether the vehicle is simulated in the station's own process.
@@ -133,6 +140,8 @@ impl Settings {
             key_owner: None,
             mission: None,
             crew_roles: Vec::new(),
+            pad: None,
+            here: None,
             start_unix_s: 0,
             demonstration: false,
             auto: false,
@@ -227,6 +236,12 @@ pub struct Model {
     pub look_back: Option<LookBack>,
     /// The checklist of the mission, as the station keeps it; `None` without one.
     pub checklist: Option<Checklist>,
+    /// The last place of the vehicle: of this flight, or kept from before a restart.
+    pub place: Option<LastPlace>,
+    /// When it is looked at next.
+    pub(crate) place_due: Option<Duration>,
+    /// The end of the station's book.
+    pub book: BookState,
     /// What has been called out.
     pub called: Called,
     /// `None` for a live flight.
@@ -269,6 +284,9 @@ impl Model {
             recall: Recall::default(),
             look_back: None,
             checklist: None,
+            place: None,
+            place_due: None,
+            book: BookState::default(),
             called: Called::default(),
             playing: None,
             rebooted_at: None,
@@ -329,8 +347,21 @@ impl Model {
         chosen.or_else(|| self.alarms.foremost())
     }
 
-    /// Adds an event to the list and to the log.
+    /// Adds an event to the list, to the log and to the book.
     pub(crate) fn say(
+        &mut self,
+        now: Duration,
+        speaker: Speaker,
+        level: EventLevel,
+        text: impl Into<String>,
+    ) {
+        let text = text.into();
+        self.enter(if matches!(speaker, Speaker::Vehicle) { "vehicle says" } else { "event" }, "", &text);
+        self.tell(now, speaker, level, text);
+    }
+
+    /// Adds an event to the list and to the log; the book has it already.
+    pub(crate) fn tell(
         &mut self,
         now: Duration,
         speaker: Speaker,

@@ -49,13 +49,13 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
             let text = words(model, step, &signature, verb, by);
             model.record_operator(now, verb, by, &text);
             let level = if void { EventLevel::Warning } else { EventLevel::Info };
-            model.say(now, Speaker::Ground, level, text);
+            model.tell(now, Speaker::Ground, level, text);
         }
         Err(why) => {
             let what = if void { "voided" } else { "signed" };
             let text = format!("step {} is not {what}: {why}{}", step + 1, by.in_brackets());
             model.record_operator(now, "not signed", by, &text);
-            model.warn(now, text);
+            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
         }
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
 use protocol::log::record::EventLevel;
+use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
@@ -57,7 +58,11 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     // A confirmation names the ask that it confirms; without a number it would be another ask.
     let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
     let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
-    let params = [param1, 0.0, number, 0.0, 0.0, 0.0, 0.0];
+    // An arm says for which mission: the vehicle refuses it if it flies another one.
+    let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
+    let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 4], MissionHash::to_params);
+    let [param4, param5, param6, param7] = mission;
+    let params = [param1, 0.0, number, param4, param5, param6, param7];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 
@@ -154,7 +159,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
     model.record_operator(now, operator_kind, &seat, &told);
-    model.say(now, Speaker::Ground, level, text);
+    model.tell(now, Speaker::Ground, level, text);
     if let Some(result) = answered.filter(|_| !asked_to_confirm) {
         on_final_answer(model, kind, result, now);
     }
@@ -240,7 +245,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
     }
     for (level, by, text) in seen {
         model.record_operator(now, "observed", &by, &text);
-        model.say(now, Speaker::Ground, level, text);
+        model.tell(now, Speaker::Ground, level, text);
     }
     stop_if_latched(model, now);
 }

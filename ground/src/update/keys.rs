@@ -7,6 +7,7 @@
 use std::time::Duration;
 
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
+use protocol::log::record::EventLevel;
 
 use super::{Action, Request, checklist, commands, entry};
 use crate::key::Key;
@@ -14,6 +15,7 @@ use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
+use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
 use crate::model::permits::{why_not_arm, why_not_confirm, why_not_start, why_not_take};
@@ -367,7 +369,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
             model.record_operator(now, "not sent", by, &text);
-            model.warn(now, text);
+            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
         }
     }
 }

@@ -4,6 +4,7 @@
 
 pub mod alarms;
 pub mod auto;
+mod book;
 mod callouts;
 mod checklist;
 pub mod commands;
@@ -11,11 +12,13 @@ pub mod crew;
 mod entry;
 pub mod frames;
 pub mod keys;
+mod place;
 pub mod tick;
 pub mod vehicle_changes;
 
 use std::time::Duration;
 
+use protocol::book::SignedHead;
 use protocol::frame::{Frame, FramerCounters};
 use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
@@ -26,6 +29,7 @@ use crate::model::checklist::Checklist;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
+use crate::model::place::LastPlace;
 use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model, Role};
 
@@ -57,6 +61,14 @@ pub enum Msg {
     AlarmAcknowledged(AlarmKind),
     /// The station has this checklist, in this state.
     Checklist(Box<Checklist>),
+    /// The last place of the vehicle, kept from before this run of the station.
+    Place(Box<LastPlace>),
+    /// The station has signed the end of its book.
+    Book {
+        head: SignedHead,
+        /// False without a key: then the signature is empty.
+        is_signed: bool,
+    },
     /// The crew has signed or voided a step of the checklist on an attached screen.
     SignAsked {
         /// Counted from zero.
@@ -121,6 +133,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::Checklist(list) => model.checklist = Some(*list),
+        Msg::Place(place) => model.place = Some(*place),
+        Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
         Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),

@@ -259,10 +259,7 @@ fn every_step_can_be_reached_at_every_size() {
             for palette in Palette::ALL {
                 let terminal = rig.draw(size.0, size.1, Theme { palette, ascii: false });
                 let screen = terminal.backend().to_string();
-                assert!(
-                    screen.contains(&format!(">open {number:>2} Step {number}: xxx")),
-                    "{number} {screen}"
-                );
+                assert!(screen.contains(&format!(">open {number:>2} Step {number}:")), "{number} {screen}");
                 assert!(screen.contains("anybody signs"), "{screen}");
             }
         }

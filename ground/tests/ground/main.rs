@@ -2,6 +2,7 @@
 
 mod alarms;
 mod auto;
+mod book;
 mod bytes;
 mod checklist;
 mod crew;

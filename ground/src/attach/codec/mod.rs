@@ -10,6 +10,7 @@ mod report;
 
 use std::time::Duration;
 
+use protocol::book::{Head, SignedHead};
 use protocol::frame::FramerCounters;
 
 use super::message::{Hello, OPERATOR_MAX, StationStatus, ToScreen, ToStation, VERSION};
@@ -18,6 +19,7 @@ use crate::model::action::Request;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::seat::Seat;
+use crate::place_file;
 use crate::update::Msg;
 pub use bytes::CodecError;
 use bytes::{PREFIX_LEN, Reader, Writer};
@@ -92,6 +94,11 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
             }
         }
         Msg::ScreenQuit => drop(out.kind(18)),
+        Msg::Place(place) => drop(out.kind(22).text(&place_file::geojson(place))),
+        Msg::Book { head: SignedHead { head, signature }, is_signed } => {
+            out.kind(21).u64(head.book).u32(head.entries).raw(&head.hash).raw(signature);
+            out.u8(u8::from(*is_signed));
+        }
         Msg::Checklist(list) => {
             out.kind(20);
             checklist::encode(list, out);
@@ -160,6 +167,15 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         }
         18 => ToScreen::Msg(Msg::ScreenQuit),
         19 => ToScreen::Msg(Msg::LinkSays(rest.text()?)),
+        22 => {
+            let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
+            ToScreen::Msg(Msg::Place(Box::new(place)))
+        }
+        21 => {
+            let head = Head { book: rest.u64()?, entries: rest.u32()?, hash: rest.take()? };
+            let head = SignedHead { head, signature: rest.take()? };
+            ToScreen::Msg(Msg::Book { head, is_signed: rest.u8()? != 0 })
+        }
         20 => ToScreen::Msg(Msg::Checklist(Box::new(checklist::decode(&mut rest)?))),
         30 => ToScreen::Status(StationStatus {
             pid: rest.u32()?,

@@ -39,6 +39,13 @@ fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
 }
 
 #[test]
+fn the_end_of_the_book_survives_the_round_trip() {
+    let head = SignedHead { head: Head { book: 7, entries: 8, hash: [9; 32] }, signature: [10; 64] };
+    let told = ToScreen::Msg(Msg::Book { head, is_signed: true });
+    assert_eq!(back(&told, Duration::ZERO).0, told);
+}
+
+#[test]
 fn a_checklist_survives_the_round_trip() {
     use crate::model::checklist::{ChecklistEntry, Signature};
     let mut list = crate::checklist_file::parse(include_str!("../../../checklist-example.toml")).unwrap();

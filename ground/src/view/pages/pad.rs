@@ -42,12 +42,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             Constraint::Fill(1),
         ]));
         draw_now(model, theme, now, frame, right);
-        let [events, picture] = below.layout(&Layout::horizontal([Constraint::Fill(3), Constraint::Fill(2)]));
+        let shares = if model.checklist.is_some() { [4, 4, 3] } else { [3, 0, 2] };
+        let [events, list, picture] = below.layout(&Layout::horizontal(shares.map(Constraint::Fill)));
         if model.checklist.is_some() {
-            draw_checklist(model, theme, now, frame, picture);
-        } else {
-            draw_rehearsal(model, theme, now, frame, picture);
+            draw_checklist(model, theme, now, frame, list);
         }
+        draw_rehearsal(model, theme, now, frame, picture);
         (left, middle, events)
     } else {
         let [upper, events] =
