@@ -12,6 +12,7 @@ use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::again::Again;
 use super::clock::Clock;
 use super::output::Output;
 use super::server::read_one;
@@ -79,6 +80,7 @@ pub async fn session(
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
+    let mut again = Again::default();
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -93,7 +95,11 @@ pub async fn session(
                 if matches!(msg, Msg::Terminate(_)) {
                     break;
                 }
-                update(&mut model, msg, times.theirs(clock.now()))
+                let (mut actions, rest) = again.take(msg);
+                if let Some(msg) = rest {
+                    actions.extend(update(&mut model, msg, times.theirs(clock.now())));
+                }
+                actions
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
@@ -132,18 +138,51 @@ pub async fn session(
                 }
                 Vec::new()
             }
-            _ = ticks.tick() => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
+            _ = ticks.tick() => {
+                pass_replay(&mut again, &mut model, &mut output, clock.now(), times.theirs(clock.now()));
+                update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
+            }
             () = clock.sleep_until(redraw_at) => Vec::new(),
         };
+        start_or_end_replay(&actions, &mut again, &mut model, &mut output, times.theirs(clock.now()));
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let now = clock.now();
-        output.show(&model, now, times.theirs(now))?;
+        let (shown, shown_now) = again.shown().unwrap_or((&model, times.theirs(now)));
+        output.show(shown, now, shown_now)?;
         if quit {
             break;
         }
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
+}
+
+/// Lets a replay on this screen go on.
+fn pass_replay(again: &mut Again, model: &mut Model, output: &mut Output, now: Duration, theirs: Duration) {
+    match again.pass(model, now) {
+        Ok(true) => output.mark_changed(),
+        Ok(false) => {}
+        Err(why) => model.info(theirs, format!("no replay: {why}")),
+    }
+}
+
+/// Begins a replay that was asked for; an alarm ends it.
+fn start_or_end_replay(
+    actions: &[Action],
+    again: &mut Again,
+    model: &mut Model,
+    output: &mut Output,
+    theirs: Duration,
+) {
+    if actions.contains(&Action::ReplayFlight)
+        && let Some(log) = model.settings.log_path.clone()
+        && let Err(why) = again.begin(Path::new(&log))
+    {
+        model.info(theirs, format!("no replay: {why}"));
+    }
+    if actions.iter().any(|action| matches!(action, Action::Alarm(_))) && again.leave() {
+        output.mark_changed();
+    }
 }
 
 /// Does the actions that are a screen's own. Returns whether to quit.
@@ -180,6 +219,8 @@ async fn act(
             | Action::KeepChecklist(_)
             | Action::Enter(_)
             | Action::KeepPlace(_)
+            | Action::WriteReport
+            | Action::ReplayFlight
             | Action::SyncLog
             | Action::Alarm(_)
             | Action::Tell(_)
@@ -215,6 +256,7 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
         Request::Sign { step, .. } => {
             format!("step {} NOT SIGNED: this screen has no station", u32::from(step) + 1)
         }
+        Request::Report => "no report: this screen has no station".to_owned(),
         Request::Parameters => return,
     };
     model.say(now, Speaker::Ground, EventLevel::Error, text);
@@ -252,10 +294,15 @@ fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -
         ToScreen::Msg(msg) => {
             let actions = update(model, msg, at);
             // The station does the actions; a screen only rings the bell and talks.
-            actions.into_iter().filter(|action| matches!(action, Action::Bell | Action::Say(_))).collect()
+            actions.into_iter().filter(stays_here).collect()
         }
         ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
     }
+}
+
+/// The station does the other actions.
+fn stays_here(action: &Action) -> bool {
+    matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_))
 }
 
 fn settings(hello: &Hello, viewer: &Viewer) -> Settings {

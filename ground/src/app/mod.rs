@@ -1,5 +1,6 @@
 //! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
 
+mod again;
 pub mod alarm_command;
 pub mod attached;
 mod book;
@@ -14,6 +15,7 @@ pub mod pace;
 mod places;
 pub mod print;
 pub mod replaying;
+mod report;
 pub mod screen;
 pub mod server;
 pub mod signals;
@@ -40,6 +42,7 @@ use crate::exit::{self, Exit};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
 use crate::update::update;
+use again::Again;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use key_ring::KeyRing;
@@ -223,6 +226,8 @@ async fn start(
         quiet_input: None,
         signatures,
         book: None,
+        again: Again::default(),
+        report: None,
         place_failed: false,
         report_at: Duration::ZERO,
     };

@@ -151,12 +151,17 @@ pub(super) fn hello(model: &Model) -> Hello {
         link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
         system_ids: [settings.us.system_id, settings.vehicle.system_id],
         link_name: settings.link_name.clone(),
-        log_path: settings.log_path.clone().unwrap_or_default(),
+        log_path: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
         tlog_path: settings.tlog_path.clone().unwrap_or_default(),
         key_number: settings.key_owner.as_ref().map_or(0, |owner| owner.number),
         key_owner: settings.key_owner.as_ref().map(|owner| owner.name.clone()).unwrap_or_default(),
         mission: settings.mission.map(|MissionHash(hash)| hash),
     }
+}
+
+/// An attached screen may run in another folder.
+fn absolute(path: &str) -> String {
+    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| path.display().to_string())
 }
 
 impl Shared {

@@ -11,6 +11,7 @@ use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::again::Again;
 use super::book::StationBook;
 use super::checklist::SignatureFile;
 use super::clock::{Clock, LogTime};
@@ -19,7 +20,7 @@ use super::output::Output;
 use super::server::{Server, ServerEvent, hello};
 use super::signals::Signals;
 use super::wire::Wire;
-use super::{alarm_command, places, screen, stations};
+use super::{alarm_command, places, report, screen, stations};
 use crate::attach::message::{ToScreen, ToStation};
 use crate::demo::Demo;
 use crate::model::action::BookLine;
@@ -53,6 +54,10 @@ pub(super) struct Station {
     pub(super) quiet_input: Option<OwnedFd>,
     /// The files of the last place could not be written.
     pub(super) place_failed: bool,
+    /// The flight just flown, again on the station's own screen.
+    pub(super) again: Again,
+    /// The report that is being written.
+    pub(super) report: Option<report::Writing>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// Where the signatures of the checklist are kept; `None` without a checklist.
@@ -89,10 +94,13 @@ impl Station {
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 news = server_hears(server) => self.hear(news, model),
-                msg = self.output.input() => vec![msg],
+                msg = self.output.input() => self.typed(msg),
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
-                _ = ticks.tick() => self.tick_msgs(model),
+                _ = ticks.tick() => {
+                    self.pass_replay(model);
+                    self.tick_msgs(model)
+                }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
                 received = wire.receive() => wire.take(received),
             };
@@ -114,7 +122,9 @@ impl Station {
                 next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
-            if let Err(gone) = self.output.show(model, now, now) {
+            let shown = self.again.shown();
+            let (shown, shown_now) = shown.unwrap_or((&*model, now));
+            if let Err(gone) = self.output.show(shown, now, shown_now) {
                 if !self.outlives_its_screen() {
                     return Err(gone);
                 }
@@ -191,6 +201,7 @@ impl Station {
             ServerEvent::FromScreen(by, ToStation::Request(Request::Sign { step, void })) => {
                 vec![Msg::SignAsked { step: step.into(), void, by }]
             }
+            ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
             }
@@ -244,7 +255,12 @@ impl Station {
         });
         let health = (health != model.log).then_some(Msg::Log(health));
         let book = self.sign_book(false);
-        health.into_iter().chain(book).chain([Msg::Tick]).collect()
+        let written = self.report.as_ref().and_then(|report| report.try_recv().ok());
+        if written.is_some() {
+            self.report = None;
+        }
+        let written = written.map(Msg::Report);
+        health.into_iter().chain(book).chain(written).chain([Msg::Tick]).collect()
     }
 
     /// Takes one message into the model and does the resulting actions.
@@ -289,7 +305,12 @@ impl Station {
                         model.warn(now, ended.to_string());
                     }
                 }
-                Action::Alarm(words) => self.tell_alarm(&words),
+                Action::Alarm(words) => {
+                    self.leave_replay();
+                    self.tell_alarm(&words);
+                }
+                Action::ReplayFlight => self.replay(model, now),
+                Action::WriteReport => self.write_report(model, now),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(kind) => {
@@ -302,6 +323,55 @@ impl Station {
             }
         }
         next
+    }
+
+    /// What was typed, for the live model; a replay takes its own keys.
+    fn typed(&mut self, msg: Msg) -> Vec<Msg> {
+        let was_shown = self.again.shown().is_some();
+        let (actions, rest) = self.again.take(msg);
+        if was_shown {
+            self.output.mark_changed();
+        }
+        for action in actions {
+            match action {
+                Action::Redraw => self.output.clear(),
+                Action::NextTheme => self.output.next_theme(),
+                _ => {}
+            }
+        }
+        rest.into_iter().collect()
+    }
+
+    fn replay(&mut self, model: &mut Model, now: Duration) {
+        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        if let Some(Err(why)) = log.map(|log| self.again.begin(&log)) {
+            model.warn(now, format!("no replay: {why}"));
+        }
+    }
+
+    fn pass_replay(&mut self, model: &mut Model) {
+        let now = self.clock.now();
+        match self.again.pass(model, now) {
+            Ok(true) => self.output.mark_changed(),
+            Ok(false) => {}
+            Err(why) => model.warn(now, format!("no replay: {why}")),
+        }
+    }
+
+    /// The live screen comes back.
+    fn leave_replay(&mut self) {
+        if self.again.leave() {
+            self.output.mark_changed();
+        }
+    }
+
+    fn write_report(&mut self, model: &mut Model, now: Duration) {
+        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        match log.map(|log| report::begin(&log)) {
+            Some(Ok(writing)) => self.report = Some(writing),
+            Some(Err(why)) => model.warn(now, format!("no report: {why}")),
+            None => {}
+        }
     }
 
     /// Writes the files for maps. A failure is told once.

@@ -25,6 +25,10 @@ pub enum Act {
     Acknowledge,
     /// Show the checklist on the Pad page, or the arming checks again.
     Checklist,
+    /// Show the flight just flown again.
+    ReplayFlight,
+    /// Write the report of the flight.
+    Report,
     /// Open the dialog that signs the chosen step of the checklist.
     SignStep,
     /// Open the dialog that takes the signature of the chosen step back.
@@ -54,7 +58,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 33] = [
+pub const DEFINITIONS: [Definition; 35] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -115,10 +119,23 @@ pub const DEFINITIONS: [Definition; 33] = [
     define(Act::Palette, "palette", Key::Char(':'), "list every action; type a part of its words"),
     define(Act::Pin, "pin", Key::Char('i'), "pin the plotted number to every page, or remove it"),
     define(Act::NextTheme, "theme", Key::Char('c'), "colours: dark, light for sunlight, 16, none, contrast"),
+    define(
+        Act::ReplayFlight,
+        "replay",
+        Key::Char('R'),
+        "the flight just flown, again on this screen; q ends it",
+    ),
+    define(Act::Report, "report", Key::Char('W'), "write the report of the flight beside the log"),
     define(Act::AskParameters, "ask", Key::Char('r'), "ask the vehicle for its parameters again"),
     define(Act::Redraw, "redraw", Key::CtrlL, "draw the screen again"),
     define(Act::Quit, "quit", Key::Char('q'), "quit; armed or in flight: then type QUIT and Enter"),
 ];
+
+/// Whether a flight has been flown that this screen's log holds, and nothing is at risk.
+fn flown_here(model: &Model) -> bool {
+    let is_live = model.settings.role != Role::Replaying;
+    is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
+}
 
 impl Act {
     /// Whether the key would do something now.
@@ -138,6 +155,8 @@ impl Act {
             Self::Pin => matches!(model.page(), Page::Plot),
             Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
             Self::Checklist => model.checklist.is_some(),
+            Self::ReplayFlight => flown_here(model),
+            Self::Report => commands && flown_here(model),
             Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold

@@ -18,6 +18,8 @@ pub enum Request {
     Acknowledge(AlarmKind),
     /// Ask the vehicle for its parameters.
     Parameters,
+    /// Write the report of the flight.
+    Report,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
 }
@@ -43,6 +45,10 @@ pub enum Action {
     KeepChecklist(ChecklistEntry),
     /// Keep the last place of the vehicle in the files for maps.
     KeepPlace(Box<LastPlace>),
+    /// Show the flight just flown again, on this screen.
+    ReplayFlight,
+    /// Write the report of the flight.
+    WriteReport,
     /// Enter this into the book.
     Enter(BookLine),
     /// Write the log to disk now.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, checklist, commands, entry};
+use super::{Action, Request, afterwards, checklist, commands, entry};
 use crate::key::Key;
 use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
@@ -247,6 +247,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 model.pages.hold(Some(Page::Pad));
             }
         }
+        Act::ReplayFlight => afterwards::replay(model, now),
+        Act::Report => afterwards::report(model, now),
         Act::SignStep => checklist::open_dialog(model, false, now),
         Act::VoidStep => checklist::open_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),

@@ -2,6 +2,7 @@
 //!
 //! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do: send, record, quit.
 
+mod afterwards;
 pub mod alarms;
 pub mod auto;
 mod book;
@@ -61,6 +62,10 @@ pub enum Msg {
     AlarmAcknowledged(AlarmKind),
     /// The station has this checklist, in this state.
     Checklist(Box<Checklist>),
+    /// An attached screen asks for the report of the flight.
+    ReportWanted,
+    /// The report of the flight is here, or is not because of this.
+    Report(Result<String, String>),
     /// The last place of the vehicle, kept from before this run of the station.
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
@@ -133,6 +138,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::Checklist(list) => model.checklist = Some(*list),
+        Msg::ReportWanted => afterwards::report(model, now),
+        Msg::Report(written) => afterwards::on_report(model, written, now),
         Msg::Place(place) => model.place = Some(*place),
         Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
         Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),

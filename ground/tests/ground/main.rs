@@ -1,5 +1,6 @@
 //! Tests of the ground station from outside: keys, radio, screens, and the program itself.
 
+mod afterwards;
 mod alarms;
 mod auto;
 mod book;

@@ -94,6 +94,10 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
             }
         }
         Msg::ScreenQuit => drop(out.kind(18)),
+        Msg::Report(written) => {
+            let (Ok(text) | Err(text)) = written;
+            out.kind(23).u8(u8::from(written.is_ok())).text(text);
+        }
         Msg::Place(place) => drop(out.kind(22).text(&place_file::geojson(place))),
         Msg::Book { head: SignedHead { head, signature }, is_signed } => {
             out.kind(21).u64(head.book).u32(head.entries).raw(&head.hash).raw(signature);
@@ -108,6 +112,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         | Msg::Keys(_)
         | Msg::Pasted
         | Msg::SignAsked { .. }
+        | Msg::ReportWanted
         | Msg::Terminate(_)
         | Msg::Commanded(_)
         | Msg::ScreenTick => return None,
@@ -167,6 +172,10 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         }
         18 => ToScreen::Msg(Msg::ScreenQuit),
         19 => ToScreen::Msg(Msg::LinkSays(rest.text()?)),
+        23 => {
+            let (is_written, text) = (rest.u8()? != 0, rest.text()?);
+            ToScreen::Msg(Msg::Report(if is_written { Ok(text) } else { Err(text) }))
+        }
         22 => {
             let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
             ToScreen::Msg(Msg::Place(Box::new(place)))
@@ -234,6 +243,7 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Acknowledge(kind)) => out.kind(2).u8(alarm_number(*kind)),
         ToStation::Request(Request::Parameters) => out.kind(3),
         ToStation::Request(Request::Sign { step, void }) => out.kind(7).u8(*step).u8(u8::from(*void)),
+        ToStation::Request(Request::Report) => out.kind(8),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -260,6 +270,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         4 => ToStation::Key(words(&mut rest, KEY_MAX)?),
         5 => ToStation::Status,
         6 => ToStation::Stop { force: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? },
+        8 => ToStation::Request(Request::Report),
         7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };

@@ -39,6 +39,14 @@ fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
 }
 
 #[test]
+fn a_report_survives_the_round_trip() {
+    for written in [Ok("flight.html".to_owned()), Err("disk full".to_owned())] {
+        let told = ToScreen::Msg(Msg::Report(written));
+        assert_eq!(back(&told, Duration::ZERO).0, told);
+    }
+}
+
+#[test]
 fn the_end_of_the_book_survives_the_round_trip() {
     let head = SignedHead { head: Head { book: 7, entries: 8, hash: [9; 32] }, signature: [10; 64] };
     let told = ToScreen::Msg(Msg::Book { head, is_signed: true });
@@ -97,6 +105,7 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Acknowledge(AlarmKind::Held)),
         ToStation::Request(Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort))),
         ToStation::Request(Request::Parameters),
+        ToStation::Request(Request::Report),
         ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];

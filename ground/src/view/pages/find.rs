@@ -47,7 +47,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 
 fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
     Line::from(vec![
-        Span::styled(format!("   {label:<14}"), theme.style(TextRole::Label)),
+        Span::styled(format!("   {label:<16}"), theme.style(TextRole::Label)),
         Span::styled(value, theme.style(TextRole::Plain)),
     ])
 }
@@ -55,9 +55,11 @@ fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
 fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {
     let way = place.way(spot, model.settings.here);
     let from = if way.from_station { "from here" } else { "from the pad" };
+    // 359.6 is 000, as on a compass.
+    let bearing_deg = way.bearing_deg.round() as u32 % 360;
     let plus_minus = theme.either_side(&format!("±{} m", fixed(spot.error_m, 0)));
     let mut rows = vec![
-        row(from, format!("{} m, bearing {:03.0} deg", fixed(way.distance_m, 0), way.bearing_deg), theme),
+        row(from, format!("{} m, bearing {bearing_deg:03} deg", fixed(way.distance_m, 0)), theme),
         row(
             "pad frame",
             format!("north {} m, east {} m", fixed(spot.north_m, 1), fixed(spot.east_m, 1)),
