@@ -24,7 +24,7 @@ fn book(texts: &[String], key: &BookKey) -> Written {
     let mut written = Written { entries: Vec::new(), heads: Vec::new(), told: Vec::new() };
     for (place, (kind, who, text)) in lines.enumerate() {
         written.entries.push(book.enter(&Line { unix_ns: 1_000 + place as u64, kind, who, text }));
-        let head = key.sign(book.head().unwrap());
+        let head = key.sign(book.head().expect("an entry"));
         if place % 3 == 0 || kind == CLOSED {
             written.heads.push(head.record(Some(key.public())));
             written.told.push(Known { from: "the vehicle".to_owned(), signed: head });

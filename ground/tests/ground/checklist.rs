@@ -39,7 +39,7 @@ fn station(list: &str, role: Role) -> Rig {
         start_unix_s: 1_800_000_000,
         ..settings(false, true)
     });
-    rig.msg(Msg::Checklist(Box::new(parse(list).unwrap())));
+    rig.msg(Msg::Checklist(Box::new(parse(list).expect("a checklist"))));
     rig.run(1.0);
     upright(&mut rig, 90.0);
     rig
@@ -50,7 +50,7 @@ fn upright(rig: &mut Rig, pitch_deg: f64) {
 }
 
 fn list(rig: &Rig) -> &Checklist {
-    rig.model.checklist.as_ref().unwrap()
+    rig.model.checklist.as_ref().expect("the station has a checklist")
 }
 
 fn asked(rig: &mut Rig, step: usize, void: bool, who: &str) {
@@ -248,10 +248,10 @@ fn nothing_is_signed_by_accident() {
 /// The longest checklist, on the pad page at three sizes and in every theme.
 #[test]
 fn every_step_can_be_reached_at_every_size() {
-    let mut long = "name = \"long\"\n".to_owned();
-    for number in 1..=40 {
-        long += &format!("[[step]]\nwords = \"Step {number}: {}\"\nsigns = \"anybody\"\n", "x".repeat(45));
-    }
+    let words = "x".repeat(45);
+    let step = |number| format!("[[step]]\nwords = \"Step {number}: {words}\"\nsigns = \"anybody\"\n");
+    let steps: Vec<String> = (1..=40).map(step).collect();
+    let long = format!("name = \"long\"\n{}", steps.concat());
     let mut rig = station(&long, Role::Station);
     rig.key(Key::Char('k'));
     for number in 1..=40 {

@@ -34,7 +34,7 @@ fn day(arms: &str, secret: u8) -> Day {
     let (mut entries, mut heads, mut told) = (Vec::new(), Vec::new(), Vec::new());
     for (place, (kind, who, text)) in lines.into_iter().enumerate() {
         entries.push(book.enter(&Line { unix_ns: place as u64, kind, who, text }));
-        let signed = key.sign(book.head().unwrap());
+        let signed = key.sign(book.head().expect("an entry"));
         heads.push(signed.record(Some(key.public())));
         told.push(signed);
     }
@@ -42,11 +42,13 @@ fn day(arms: &str, secret: u8) -> Day {
 }
 
 fn written(path: &Path, records: impl IntoIterator<Item = Record>) -> PathBuf {
-    let mut writer = LogWriter::new(std::fs::File::create_new(path).unwrap(), &LogHeader::default()).unwrap();
+    let mut writer =
+        LogWriter::new(std::fs::File::create_new(path).expect("a new file"), &LogHeader::default())
+            .expect("a log");
     for (place, record) in records.into_iter().enumerate() {
-        writer.write(&record, place as u64).unwrap();
+        writer.write(&record, place as u64).expect("a record");
     }
-    writer.finish().unwrap();
+    writer.finish().expect("a record");
     path.to_owned()
 }
 
@@ -60,14 +62,14 @@ fn vehicle_log(path: &Path, told: &[SignedHead]) -> PathBuf {
     let frames = told.iter().map(|head| {
         let frame = encoder.encode(&MavMessage::TD_BOOK_HEAD(head.message(VEHICLE)));
         let link = "udpin:0.0.0.0:14550".to_owned();
-        let bytes = frame.for_log().unwrap();
+        let bytes = frame.for_log().expect("a record");
         Record::RawFrame(RawFrame { direction: Direction::Rx, endpoint: "vehicle", link, bytes })
     });
     written(path, frames.collect::<Vec<_>>())
 }
 
 fn audited(logs: &[&PathBuf], trusted: &Trusted) -> AuditFound {
-    audit_logs(logs, trusted).unwrap()
+    audit_logs(logs, trusted).expect("logs")
 }
 
 #[test]
