@@ -7,7 +7,8 @@ use anyhow::Context as _;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::mission::MissionHash;
-use tokio::io::AsyncWriteExt as _;
+use tokio::io::{AsyncRead, AsyncWriteExt as _};
+use tokio::net::TcpStream;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
@@ -44,6 +45,8 @@ const WAITING_MAX: usize = 4_096;
 #[derive(Debug, Clone)]
 pub struct Viewer {
     pub watch: bool,
+    /// The feed of a station on another machine, HOST:PORT; `None` for a station on this one.
+    pub feed: Option<String>,
     pub operator: String,
     pub keys: Bindings,
     pub talk: Talk,
@@ -60,10 +63,7 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let path = stations::the_station(named).await?;
-    let mut link = StationConnection::open(&path, viewer).await.with_context(|| {
-        format!("no ground station serves {}; start one with `ground daemon`", path.display())
-    })?;
+    let mut link = open_first(named, viewer).await?;
     let clock = Clock::start();
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
@@ -157,6 +157,18 @@ pub async fn session(
     Ok(exit::decide(&model.outcome, true))
 }
 
+/// Connects to the feed, or to the station of this machine.
+async fn open_first(named: Option<&Path>, viewer: &Viewer) -> anyhow::Result<StationConnection> {
+    if let Some(feed) = &viewer.feed {
+        let no_feed = || format!("no station feeds watchers at {feed}; its flag is --watchers ADDRESS:PORT");
+        return StationConnection::of_feed(feed).await.with_context(no_feed);
+    }
+    let path = stations::the_station(named).await?;
+    StationConnection::open(&path, viewer).await.with_context(|| {
+        format!("no ground station serves {}; start one with `ground daemon`", path.display())
+    })
+}
+
 /// Lets a replay on this screen go on.
 fn pass_replay(again: &mut Again, model: &mut Model, output: &mut Output, now: Duration, theirs: Duration) {
     match again.pass(model, now) {
@@ -233,6 +245,9 @@ async fn act(
 /// Finds the station on the named socket, otherwise the one that now holds the same link; never a station of another
 /// vehicle.
 async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<StationConnection> {
+    if let Some(feed) = &viewer.feed {
+        return StationConnection::of_feed(feed).await.ok();
+    }
     let place = match named {
         Some(path) => path.to_owned(),
         None => stations::station_over(links).await?,
@@ -351,28 +366,43 @@ impl Times {
 
 struct StationConnection {
     told: mpsc::Receiver<(ToScreen, Duration)>,
-    write: OwnedWriteHalf,
+    /// `None` for a feed, which takes nothing.
+    write: Option<OwnedWriteHalf>,
 }
 
 impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
-        let (mut read, write) = socket::connect(path).await?.into_split();
-        let (tell, told) = mpsc::channel(WAITING_MAX);
-        tokio::spawn(async move {
-            while let Some(bytes) = read_one(&mut read).await {
-                let Ok(told) = decode_to_screen(&bytes) else { return };
-                if tell.send(told).await.is_err() {
-                    return;
-                }
-            }
-        });
-        let mut link = Self { told, write };
+        let (read, write) = socket::connect(path).await?.into_split();
+        let mut link = Self { told: listen(read), write: Some(write) };
         link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 
+    /// Connects to the feed of a station on another machine. Nothing is ever sent to it.
+    async fn of_feed(address: &str) -> std::io::Result<Self> {
+        let stream = TcpStream::connect(address).await?;
+        Ok(Self { told: listen(stream), write: None })
+    }
+
     /// Sends a message. Returns whether the station still takes it.
     async fn ask(&mut self, asked: &ToStation) -> bool {
-        self.write.write_all(&encode_to_station(asked)).await.is_ok()
+        match &mut self.write {
+            Some(write) => write.write_all(&encode_to_station(asked)).await.is_ok(),
+            None => false,
+        }
     }
+}
+
+/// Decodes what a station tells, until it ends or makes no sense.
+fn listen(mut read: impl AsyncRead + Unpin + Send + 'static) -> mpsc::Receiver<(ToScreen, Duration)> {
+    let (tell, told) = mpsc::channel(WAITING_MAX);
+    tokio::spawn(async move {
+        while let Some(bytes) = read_one(&mut read).await {
+            let Ok(told) = decode_to_screen(&bytes) else { return };
+            if tell.send(told).await.is_err() {
+                return;
+            }
+        }
+    });
+    told
 }

@@ -23,6 +23,7 @@ mod station;
 pub mod stations;
 mod terminal_writer;
 pub mod voice;
+mod watchers;
 pub mod wire;
 
 use std::io::IsTerminal as _;
@@ -50,6 +51,7 @@ use log::LogGuard;
 use output::Output;
 use server::{Server, hello};
 use station::Station;
+use watchers::Watchers;
 use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
@@ -79,9 +81,15 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         match (&cli.command, &cli.replay) {
             (Some(Command::Status), _) => stations::list().await,
             (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
-            (Some(Command::Attach { watch }), _) => {
-                let viewer =
-                    Viewer { watch: *watch, operator, keys: config.keys.clone(), talk: config.talk() };
+            (Some(Command::Attach { watch, from }), _) => {
+                let viewer = Viewer {
+                    // Nobody can command through a feed.
+                    watch: *watch || from.is_some(),
+                    feed: from.clone(),
+                    operator,
+                    keys: config.keys.clone(),
+                    talk: config.talk(),
+                };
                 attached::session(socket, &viewer, config, interactive).await
             }
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
@@ -205,6 +213,7 @@ async fn start(
         model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
     }
     let server = serve(cli, &mut model, interactive, &clock).await?;
+    let watchers = feed(cli, server.as_ref()).await?;
     if demo.is_some()
         && !is_daemon
         && let Some(line) = stations::running_beside().await
@@ -227,6 +236,7 @@ async fn start(
         signatures,
         book: None,
         again: Again::default(),
+        _watchers: watchers,
         report: None,
         place_failed: false,
         report_at: Duration::ZERO,
@@ -263,6 +273,19 @@ async fn serve(
             model.warn(clock.now(), format!("no other screen can attach: {error:#}"));
             Ok(None)
         }
+    }
+}
+
+/// Opens the feed for watchers, if one is wanted.
+async fn feed(cli: &Cli, server: Option<&Server>) -> anyhow::Result<Option<Watchers>> {
+    match (&cli.watchers, server) {
+        (Some(address), Some(server)) => Watchers::open(address, server.shared()).await.map(Some),
+        (Some(_), None) => {
+            anyhow::bail!(
+                "--watchers needs a station that serves screens: one with a link, or `ground daemon`"
+            )
+        }
+        (None, _) => Ok(None),
     }
 }
 

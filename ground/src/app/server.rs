@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::mission::MissionHash;
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
@@ -65,7 +65,7 @@ pub struct Server {
 }
 
 /// What the tasks of all screens share.
-struct Shared {
+pub(super) struct Shared {
     history: Mutex<History>,
     news: broadcast::Sender<Bytes>,
     next_screen: AtomicU32,
@@ -102,6 +102,11 @@ impl Server {
             }
         });
         Ok(Self { paths, shared, requests, accepting })
+    }
+
+    /// What a feed for watchers tells.
+    pub(super) fn shared(&self) -> Arc<Shared> {
+        Arc::clone(&self.shared)
     }
 
     /// Sends a message to every screen, and keeps it for later ones.
@@ -165,6 +170,23 @@ fn absolute(path: &str) -> String {
 }
 
 impl Shared {
+    /// The greeting, at most this much of the latest past, and a receiver for everything after it.
+    pub(super) fn for_watcher(&self, past_bytes: usize) -> (Vec<u8>, broadcast::Receiver<Bytes>) {
+        let (all, live) = self.snapshot(0);
+        let has_checklist = self.history.lock().is_ok_and(|history| history.checklist.is_some());
+        // The greeting and the checklist come first, whatever is left out after them.
+        let first = all.len().min(1 + usize::from(has_checklist));
+        let (first, past) = all.split_at(first);
+        let mut kept = 0;
+        let from = past.iter().rposition(|bytes| {
+            kept += bytes.len();
+            kept > past_bytes
+        });
+        let past = &past[from.map_or(0, |place| place + 1)..];
+        let live_mark = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
+        (first.iter().chain(past).chain(&live_mark).flat_map(|bytes| bytes.to_vec()).collect(), live)
+    }
+
     /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
@@ -269,7 +291,7 @@ async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::
 }
 
 /// The bytes of one message without its length; `None` at the end.
-pub async fn read_one(read: &mut OwnedReadHalf) -> Option<Vec<u8>> {
+pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
     let mut prefix = [0; 4];
     read.read_exact(&mut prefix).await.ok()?;
     let mut bytes = vec![0; length(prefix).ok()?];

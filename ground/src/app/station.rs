@@ -19,6 +19,7 @@ use super::lines::Lines;
 use super::output::Output;
 use super::server::{Server, ServerEvent, hello};
 use super::signals::Signals;
+use super::watchers::Watchers;
 use super::wire::Wire;
 use super::{alarm_command, places, report, screen, stations};
 use crate::attach::message::{ToScreen, ToStation};
@@ -54,6 +55,8 @@ pub(super) struct Station {
     pub(super) quiet_input: Option<OwnedFd>,
     /// The files of the last place could not be written.
     pub(super) place_failed: bool,
+    /// The feed for other machines ends with the station.
+    pub(super) _watchers: Option<Watchers>,
     /// The flight just flown, again on the station's own screen.
     pub(super) again: Again,
     /// The report that is being written.

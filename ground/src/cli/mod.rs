@@ -122,6 +122,10 @@ pub struct Cli {
     #[arg(long, value_name = "PATH", global = true)]
     pub socket: Option<PathBuf>,
 
+    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
+    #[arg(long, value_name = "ADDRESS:PORT", global = true)]
+    pub watchers: Option<String>,
+
     /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
     pub operator: Option<String>,
@@ -186,6 +190,9 @@ pub enum Command {
         /// Show only; command nothing.
         #[arg(long)]
         watch: bool,
+        /// Watch a station on another machine: the HOST:PORT of its --watchers.
+        #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
+        from: Option<String>,
     },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
     Status,
@@ -272,6 +279,7 @@ impl Cli {
             ("--checklist", self.checklist.is_some()),
             ("--pad", self.pad.is_some()),
             ("--here", self.here.is_some()),
+            ("--watchers", self.watchers.is_some()),
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
@@ -360,6 +368,7 @@ mod tests {
             ("--checklist", " c"),
             ("--pad", " -1.5,2"),
             ("--here", " 1,2"),
+            ("--watchers", " 127.0.0.1:1"),
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),
