@@ -17,12 +17,14 @@
 
 pub mod app;
 pub mod attach;
+pub mod checklist_file;
 pub mod cli;
 pub mod config;
 pub mod demo;
 pub mod exit;
 pub mod key;
 pub mod model;
+pub mod place_file;
 pub mod replay;
 pub mod update;
 pub mod view;

@@ -17,6 +17,7 @@
 //! * `transport` (a feature): UDP, TCP and serial links;
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
 //! * [`mission`]: which mission is meant;
+//! * [`book`]: who did what, as a chain of hashes;
 //! * [`log`]: the flight log;
 //! * [`hostile`]: hostile input for tests and fuzzing.
 //!
@@ -60,6 +61,7 @@
 //! With a key, the caller must pass the time of day, as far as it is known, and must store
 //! [`hub::Hub::signing_memory`] so that it survives a power cycle.
 
+pub mod book;
 pub mod command;
 #[cfg(feature = "transport")]
 pub mod crew_file;

@@ -21,9 +21,11 @@
 //! * [`frames`]: a flight as the frames that a board reads.
 //! * [`shadow`](mod@shadow): holds the telemetry of a vehicle in flight against what this build expects.
 //! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
+//! * [`audit`]: proves the books of ground stations.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
 //! * [`print`](mod@print): prints reports as text for people, JSON for programs and JUnit XML for build servers.
 
+pub mod audit;
 pub mod compare;
 pub mod controller;
 pub mod evaluate;

@@ -7,11 +7,13 @@ use anyhow::Context as _;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::mission::MissionHash;
-use tokio::io::AsyncWriteExt as _;
+use tokio::io::{AsyncRead, AsyncWriteExt as _};
+use tokio::net::TcpStream;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::again::Again;
 use super::clock::Clock;
 use super::output::Output;
 use super::server::read_one;
@@ -43,6 +45,8 @@ const WAITING_MAX: usize = 4_096;
 #[derive(Debug, Clone)]
 pub struct Viewer {
     pub watch: bool,
+    /// The feed of a station on another machine, HOST:PORT; `None` for a station on this one.
+    pub feed: Option<String>,
     pub operator: String,
     pub keys: Bindings,
     pub talk: Talk,
@@ -59,10 +63,7 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let path = stations::the_station(named).await?;
-    let mut link = StationConnection::open(&path, viewer).await.with_context(|| {
-        format!("no ground station serves {}; start one with `ground daemon`", path.display())
-    })?;
+    let mut link = open_first(named, viewer).await?;
     let clock = Clock::start();
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
@@ -79,6 +80,7 @@ pub async fn session(
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
+    let mut again = Again::default();
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -93,7 +95,11 @@ pub async fn session(
                 if matches!(msg, Msg::Terminate(_)) {
                     break;
                 }
-                update(&mut model, msg, times.theirs(clock.now()))
+                let (mut actions, rest) = again.take(msg);
+                if let Some(msg) = rest {
+                    actions.extend(update(&mut model, msg, times.theirs(clock.now())));
+                }
+                actions
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
@@ -132,18 +138,63 @@ pub async fn session(
                 }
                 Vec::new()
             }
-            _ = ticks.tick() => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
+            _ = ticks.tick() => {
+                pass_replay(&mut again, &mut model, &mut output, clock.now(), times.theirs(clock.now()));
+                update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
+            }
             () = clock.sleep_until(redraw_at) => Vec::new(),
         };
+        start_or_end_replay(&actions, &mut again, &mut model, &mut output, times.theirs(clock.now()));
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let now = clock.now();
-        output.show(&model, now, times.theirs(now))?;
+        let (shown, shown_now) = again.shown().unwrap_or((&model, times.theirs(now)));
+        output.show(shown, now, shown_now)?;
         if quit {
             break;
         }
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
+}
+
+/// Connects to the feed, or to the station of this machine.
+async fn open_first(named: Option<&Path>, viewer: &Viewer) -> anyhow::Result<StationConnection> {
+    if let Some(feed) = &viewer.feed {
+        let no_feed = || format!("no station feeds watchers at {feed}; its flag is --watchers ADDRESS:PORT");
+        return StationConnection::of_feed(feed).await.with_context(no_feed);
+    }
+    let path = stations::the_station(named).await?;
+    StationConnection::open(&path, viewer).await.with_context(|| {
+        format!("no ground station serves {}; start one with `ground daemon`", path.display())
+    })
+}
+
+/// Lets a replay on this screen go on.
+fn pass_replay(again: &mut Again, model: &mut Model, output: &mut Output, now: Duration, theirs: Duration) {
+    match again.pass(model, now) {
+        Ok(true) => output.mark_changed(),
+        Ok(false) => {}
+        Err(why) => model.info(theirs, format!("no replay: {why}")),
+    }
+}
+
+/// Begins a replay that was asked for; an alarm ends it.
+fn start_or_end_replay(
+    actions: &[Action],
+    again: &mut Again,
+    model: &mut Model,
+    output: &mut Output,
+    theirs: Duration,
+) {
+    if actions.contains(&Action::ReplayFlight)
+        && let Some(log) = model.settings.log_path.clone()
+        && let Err(why) = again.begin(Path::new(&log))
+    {
+        model.info(theirs, format!("no replay: {why}"));
+    }
+    if actions.iter().any(|action| matches!(action, Action::Alarm(_))) && again.leave() {
+        output.mark_changed();
+    }
 }
 
 /// Does the actions that are a screen's own. Returns whether to quit.
@@ -177,6 +228,11 @@ async fn act(
             // The station itself sends, records and reports.
             Action::Send(_)
             | Action::Record(_)
+            | Action::KeepChecklist(_)
+            | Action::Enter(_)
+            | Action::KeepPlace(_)
+            | Action::WriteReport
+            | Action::ReplayFlight
             | Action::SyncLog
             | Action::Alarm(_)
             | Action::Tell(_)
@@ -189,6 +245,9 @@ async fn act(
 /// Finds the station on the named socket, otherwise the one that now holds the same link; never a station of another
 /// vehicle.
 async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<StationConnection> {
+    if let Some(feed) = &viewer.feed {
+        return StationConnection::of_feed(feed).await.ok();
+    }
     let place = match named {
         Some(path) => path.to_owned(),
         None => stations::station_over(links).await?,
@@ -209,6 +268,10 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
             model.alarms.acknowledge(kind);
             return;
         }
+        Request::Sign { step, .. } => {
+            format!("step {} NOT SIGNED: this screen has no station", u32::from(step) + 1)
+        }
+        Request::Report => "no report: this screen has no station".to_owned(),
         Request::Parameters => return,
     };
     model.say(now, Speaker::Ground, EventLevel::Error, text);
@@ -246,10 +309,15 @@ fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -
         ToScreen::Msg(msg) => {
             let actions = update(model, msg, at);
             // The station does the actions; a screen only rings the bell and talks.
-            actions.into_iter().filter(|action| matches!(action, Action::Bell | Action::Say(_))).collect()
+            actions.into_iter().filter(stays_here).collect()
         }
         ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
     }
+}
+
+/// The station does the other actions.
+fn stays_here(action: &Action) -> bool {
+    matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_))
 }
 
 fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
@@ -298,28 +366,43 @@ impl Times {
 
 struct StationConnection {
     told: mpsc::Receiver<(ToScreen, Duration)>,
-    write: OwnedWriteHalf,
+    /// `None` for a feed, which takes nothing.
+    write: Option<OwnedWriteHalf>,
 }
 
 impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
-        let (mut read, write) = socket::connect(path).await?.into_split();
-        let (tell, told) = mpsc::channel(WAITING_MAX);
-        tokio::spawn(async move {
-            while let Some(bytes) = read_one(&mut read).await {
-                let Ok(told) = decode_to_screen(&bytes) else { return };
-                if tell.send(told).await.is_err() {
-                    return;
-                }
-            }
-        });
-        let mut link = Self { told, write };
+        let (read, write) = socket::connect(path).await?.into_split();
+        let mut link = Self { told: listen(read), write: Some(write) };
         link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 
+    /// Connects to the feed of a station on another machine. Nothing is ever sent to it.
+    async fn of_feed(address: &str) -> std::io::Result<Self> {
+        let stream = TcpStream::connect(address).await?;
+        Ok(Self { told: listen(stream), write: None })
+    }
+
     /// Sends a message. Returns whether the station still takes it.
     async fn ask(&mut self, asked: &ToStation) -> bool {
-        self.write.write_all(&encode_to_station(asked)).await.is_ok()
+        match &mut self.write {
+            Some(write) => write.write_all(&encode_to_station(asked)).await.is_ok(),
+            None => false,
+        }
     }
+}
+
+/// Decodes what a station tells, until it ends or makes no sense.
+fn listen(mut read: impl AsyncRead + Unpin + Send + 'static) -> mpsc::Receiver<(ToScreen, Duration)> {
+    let (tell, told) = mpsc::channel(WAITING_MAX);
+    tokio::spawn(async move {
+        while let Some(bytes) = read_one(&mut read).await {
+            let Ok(told) = decode_to_screen(&bytes) else { return };
+            if tell.send(told).await.is_err() {
+                return;
+            }
+        }
+    });
+    told
 }

@@ -30,6 +30,11 @@ impl Clock {
         self.start_unix_ns
     }
 
+    /// The present time of day, nanoseconds since the Unix epoch; it never goes back during a run.
+    pub fn unix_ns(&self) -> u64 {
+        self.start_unix_ns.saturating_add(nanoseconds(self.now()))
+    }
+
     /// Waits until a time; forever without one.
     pub async fn sleep_until(&self, at: Option<Duration>) {
         match at {

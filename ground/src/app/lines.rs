@@ -79,6 +79,11 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
         let _ = writeln!(text, "log: {} records dropped", model.log.dropped);
     }
     if let Ok(Some(path)) = log_path {
+        if let Some(head) = model.book.short() {
+            let signed = if model.book.is_signed { "signed" } else { "not signed (--key)" };
+            let kept = model.book.kept;
+            let _ = writeln!(text, "book: {head}, {signed}; the vehicle confirmed {kept} entries");
+        }
         let _ = writeln!(text, "log: {}", path.display());
     }
     // The exit code is decided even if nobody reads this.

@@ -1,7 +1,10 @@
 //! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
 
+mod again;
 pub mod alarm_command;
 pub mod attached;
+mod book;
+mod checklist;
 pub mod clock;
 mod key_ring;
 pub mod lines;
@@ -9,8 +12,10 @@ pub mod log;
 mod operator;
 mod output;
 pub mod pace;
+mod places;
 pub mod print;
 pub mod replaying;
+mod report;
 pub mod screen;
 pub mod server;
 pub mod signals;
@@ -18,6 +23,7 @@ mod station;
 pub mod stations;
 mod terminal_writer;
 pub mod voice;
+mod watchers;
 pub mod wire;
 
 use std::io::IsTerminal as _;
@@ -37,6 +43,7 @@ use crate::exit::{self, Exit};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, Settings};
 use crate::update::update;
+use again::Again;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use key_ring::KeyRing;
@@ -44,6 +51,7 @@ use log::LogGuard;
 use output::Output;
 use server::{Server, hello};
 use station::Station;
+use watchers::Watchers;
 use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
@@ -73,9 +81,15 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
         match (&cli.command, &cli.replay) {
             (Some(Command::Status), _) => stations::list().await,
             (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
-            (Some(Command::Attach { watch }), _) => {
-                let viewer =
-                    Viewer { watch: *watch, operator, keys: config.keys.clone(), talk: config.talk() };
+            (Some(Command::Attach { watch, from }), _) => {
+                let viewer = Viewer {
+                    // Nobody can command through a feed.
+                    watch: *watch || from.is_some(),
+                    feed: from.clone(),
+                    operator,
+                    keys: config.keys.clone(),
+                    talk: config.talk(),
+                };
                 attached::session(socket, &viewer, config, interactive).await
             }
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
@@ -112,6 +126,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
             }
         };
     let ran = station.run(&mut model, &mut wire).await;
+    station.close_book(&mut model, &mut wire);
     if let Some(msg) = wire.save_timestamps() {
         update(&mut model, msg, clock.now());
     }
@@ -137,7 +152,9 @@ async fn start(
     if endpoints.is_empty() {
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
-    let KeyRing { key, owner } = KeyRing::open(cli)?;
+    let KeyRing { key, owner, book_key, roles } = KeyRing::open(cli)?;
+    let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
+    let checklist = cli.checklist.as_deref().map(|path| checklist::open(path, start_unix_s)).transpose()?;
     let mission = cli.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
@@ -170,6 +187,10 @@ async fn start(
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         key_owner: owner,
         mission: mission.map(|mission| MissionHash::of(mission.toml())),
+        crew_roles: roles,
+        pad: cli.pad,
+        here: cli.here,
+        start_unix_s,
         demonstration: demo.is_some(),
         auto,
         // A daemon also keeps running after a flight.
@@ -179,7 +200,20 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
+    let mut signatures = None;
+    if let Some((list, file, told)) = checklist {
+        model.checklist = Some(list);
+        signatures = Some(file);
+        for text in told {
+            model.warn(clock.now(), text);
+        }
+    }
+    if let Some(place) = places::newest(recorder_folder(recorder.as_ref()), start_unix_s) {
+        model.place = Some(place);
+        model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
+    }
     let server = serve(cli, &mut model, interactive, &clock).await?;
+    let watchers = feed(cli, server.as_ref()).await?;
     if demo.is_some()
         && !is_daemon
         && let Some(line) = stations::running_beside().await
@@ -188,7 +222,7 @@ async fn start(
     }
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
-    let station = Station {
+    let mut station = Station {
         clock,
         log_time,
         recorder,
@@ -199,9 +233,23 @@ async fn start(
         screens: Vec::new(),
         alarm_command: config.alarm_command.clone(),
         quiet_input: None,
+        signatures,
+        book: None,
+        again: Again::default(),
+        _watchers: watchers,
+        report: None,
+        place_failed: false,
         report_at: Duration::ZERO,
     };
+    station.open_book(&model, book_key);
+    station.publish_checklist(&model, clock.now());
+    station.publish_place(&model, clock.now());
     Ok((station, model, wire))
+}
+
+/// The folder of the log.
+fn recorder_folder(recorder: Option<&Recorder>) -> Option<&std::path::Path> {
+    recorder.and_then(|recorder| recorder.path().parent())
 }
 
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
@@ -225,6 +273,19 @@ async fn serve(
             model.warn(clock.now(), format!("no other screen can attach: {error:#}"));
             Ok(None)
         }
+    }
+}
+
+/// Opens the feed for watchers, if one is wanted.
+async fn feed(cli: &Cli, server: Option<&Server>) -> anyhow::Result<Option<Watchers>> {
+    match (&cli.watchers, server) {
+        (Some(address), Some(server)) => Watchers::open(address, server.shared()).await.map(Some),
+        (Some(_), None) => {
+            anyhow::bail!(
+                "--watchers needs a station that serves screens: one with a link, or `ground daemon`"
+            )
+        }
+        (None, _) => Ok(None),
     }
 }
 

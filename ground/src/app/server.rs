@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::mission::MissionHash;
-use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
@@ -50,6 +50,8 @@ pub enum ServerEvent {
 
 struct History {
     hello: Hello,
+    /// The latest checklist, which is told also if the history no longer reaches back to it.
+    checklist: Option<Bytes>,
     kept: VecDeque<Bytes>,
     bytes: usize,
 }
@@ -63,7 +65,7 @@ pub struct Server {
 }
 
 /// What the tasks of all screens share.
-struct Shared {
+pub(super) struct Shared {
     history: Mutex<History>,
     news: broadcast::Sender<Bytes>,
     next_screen: AtomicU32,
@@ -84,7 +86,7 @@ impl Server {
         }
         let (news, _) = broadcast::channel(BEHIND_MAX);
         let (ask, requests) = mpsc::channel(REQUESTS_MAX);
-        let history = Mutex::new(History { hello, kept: VecDeque::new(), bytes: 0 });
+        let history = Mutex::new(History { hello, checklist: None, kept: VecDeque::new(), bytes: 0 });
         let shared = Arc::new(Shared { history, news, next_screen: AtomicU32::new(first_screen) });
         let for_screens = Arc::clone(&shared);
         let accepting = tokio::spawn(async move {
@@ -102,10 +104,18 @@ impl Server {
         Ok(Self { paths, shared, requests, accepting })
     }
 
+    /// What a feed for watchers tells.
+    pub(super) fn shared(&self) -> Arc<Shared> {
+        Arc::clone(&self.shared)
+    }
+
     /// Sends a message to every screen, and keeps it for later ones.
     pub fn publish(&mut self, msg: &Msg, now: Duration) {
         let Some(bytes) = encode_to_screen(&ToScreen::Msg(msg.clone()), now).map(Bytes::from) else { return };
         let Ok(mut history) = self.shared.history.lock() else { return };
+        if matches!(msg, Msg::Checklist(_)) {
+            history.checklist = Some(Arc::clone(&bytes));
+        }
         history.bytes += bytes.len();
         history.kept.push_back(Arc::clone(&bytes));
         while history.bytes > HISTORY_BYTES_MAX {
@@ -146,7 +156,7 @@ pub(super) fn hello(model: &Model) -> Hello {
         link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
         system_ids: [settings.us.system_id, settings.vehicle.system_id],
         link_name: settings.link_name.clone(),
-        log_path: settings.log_path.clone().unwrap_or_default(),
+        log_path: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
         tlog_path: settings.tlog_path.clone().unwrap_or_default(),
         key_number: settings.key_owner.as_ref().map_or(0, |owner| owner.number),
         key_owner: settings.key_owner.as_ref().map(|owner| owner.name.clone()).unwrap_or_default(),
@@ -154,13 +164,35 @@ pub(super) fn hello(model: &Model) -> Hello {
     }
 }
 
+/// An attached screen may run in another folder.
+fn absolute(path: &str) -> String {
+    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| path.display().to_string())
+}
+
 impl Shared {
+    /// The greeting, at most this much of the latest past, and a receiver for everything after it.
+    pub(super) fn for_watcher(&self, past_bytes: usize) -> (Vec<u8>, broadcast::Receiver<Bytes>) {
+        let (all, live) = self.snapshot(0);
+        let has_checklist = self.history.lock().is_ok_and(|history| history.checklist.is_some());
+        // The greeting and the checklist come first, whatever is left out after them.
+        let first = all.len().min(1 + usize::from(has_checklist));
+        let (first, past) = all.split_at(first);
+        let mut kept = 0;
+        let from = past.iter().rposition(|bytes| {
+            kept += bytes.len();
+            kept > past_bytes
+        });
+        let past = &past[from.map_or(0, |place| place + 1)..];
+        let live_mark = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
+        (first.iter().chain(past).chain(&live_mark).flat_map(|bytes| bytes.to_vec()).collect(), live)
+    }
+
     /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
         let hello = ToScreen::Hello(Hello { screen, ..history.hello.clone() });
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
-        let past = hello.iter().chain(&history.kept).cloned().collect();
+        let past = hello.iter().chain(&history.checklist).chain(&history.kept).cloned().collect();
         (past, self.news.subscribe())
     }
 }
@@ -259,7 +291,7 @@ async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::
 }
 
 /// The bytes of one message without its length; `None` at the end.
-pub async fn read_one(read: &mut OwnedReadHalf) -> Option<Vec<u8>> {
+pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
     let mut prefix = [0; 4];
     read.read_exact(&mut prefix).await.ok()?;
     let mut bytes = vec![0; length(prefix).ok()?];

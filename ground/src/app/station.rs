@@ -4,24 +4,36 @@ use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use protocol::book::BookKey;
+use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::again::Again;
+use super::book::StationBook;
+use super::checklist::SignatureFile;
 use super::clock::{Clock, LogTime};
 use super::lines::Lines;
 use super::output::Output;
 use super::server::{Server, ServerEvent, hello};
 use super::signals::Signals;
+use super::watchers::Watchers;
 use super::wire::Wire;
-use super::{alarm_command, screen, stations};
+use super::{alarm_command, places, report, screen, stations};
 use crate::attach::message::{ToScreen, ToStation};
 use crate::demo::Demo;
+use crate::model::action::BookLine;
+use crate::model::checklist::ChecklistEntry;
+use crate::model::place::LastPlace;
 use crate::model::seat::Seat;
-use crate::model::{LogHealth, Model};
+use crate::model::two_person::role_name;
+use crate::model::{LogHealth, Model, Settings};
 use crate::update::{Action, Msg, Request, update};
 
+/// How often the vehicle is told the end of the closed book, because a frame may be lost.
+const TOLD_AT_THE_END: usize = 3;
 const TICK: Duration = Duration::from_millis(100);
 /// How often link rates are reported; they are means over ten seconds.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
@@ -41,6 +53,18 @@ pub(super) struct Station {
     pub(super) alarm_command: Option<String>,
     /// The open end of the pipe that replaces a lost terminal.
     pub(super) quiet_input: Option<OwnedFd>,
+    /// The files of the last place could not be written.
+    pub(super) place_failed: bool,
+    /// The feed for other machines ends with the station.
+    pub(super) _watchers: Option<Watchers>,
+    /// The flight just flown, again on the station's own screen.
+    pub(super) again: Again,
+    /// The report that is being written.
+    pub(super) report: Option<report::Writing>,
+    /// Who did what; `None` without a log.
+    pub(super) book: Option<StationBook>,
+    /// Where the signatures of the checklist are kept; `None` without a checklist.
+    pub(super) signatures: Option<SignatureFile>,
     /// When the links are reported next.
     pub(super) report_at: Duration,
 }
@@ -73,10 +97,13 @@ impl Station {
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 news = server_hears(server) => self.hear(news, model),
-                msg = self.output.input() => vec![msg],
+                msg = self.output.input() => self.typed(msg),
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
-                _ = ticks.tick() => self.tick_msgs(model),
+                _ = ticks.tick() => {
+                    self.pass_replay(model);
+                    self.tick_msgs(model)
+                }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
                 received = wire.receive() => wire.take(received),
             };
@@ -98,7 +125,9 @@ impl Station {
                 next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
-            if let Err(gone) = self.output.show(model, now, now) {
+            let shown = self.again.shown();
+            let (shown, shown_now) = shown.unwrap_or((&*model, now));
+            if let Err(gone) = self.output.show(shown, now, shown_now) {
                 if !self.outlives_its_screen() {
                     return Err(gone);
                 }
@@ -151,6 +180,7 @@ impl Station {
         if self.server.is_none() {
             // If another station uses the path, this one continues without a socket.
             self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
+            self.publish_checklist(model, self.clock.now());
         }
     }
 
@@ -171,18 +201,22 @@ impl Station {
             ServerEvent::FromScreen(_, ToStation::Request(Request::Acknowledge(kind))) => {
                 vec![Msg::AlarmAcknowledged(kind)]
             }
+            ServerEvent::FromScreen(by, ToStation::Request(Request::Sign { step, void })) => {
+                vec![Msg::SignAsked { step: step.into(), void, by }]
+            }
+            ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
-                self.record_operator("key", format!("{name}{}", by.in_brackets()));
+                self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
                 Vec::new()
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
                 let told = stations::stopping(model, force);
                 let stops = matches!(told, ToScreen::Stopping { stops: true, .. });
                 let ending = if stops { "ends" } else { "refused" };
-                self.record_operator("stop", format!("asked for by {operator}: {ending}"));
+                self.record_operator("stop", &operator, format!("asked for by {operator}: {ending}"));
                 // The asking process may be gone; the station ends in any case.
                 let _ = answer.send(told);
                 if stops { vec![Msg::Terminate("ground stop")] } else { Vec::new() }
@@ -195,12 +229,13 @@ impl Station {
         }
     }
 
-    fn record_operator(&self, kind: &str, detail: String) {
+    fn record_operator(&mut self, kind: &str, who: &str, detail: String) {
         if let Some(recorder) = &self.recorder {
             let at_ns = self.log_time.now_ns();
-            let action = OperatorAction { time_s: 0.0, kind: kind.to_owned(), detail };
+            let action = OperatorAction { time_s: 0.0, kind: kind.to_owned(), detail: detail.clone() };
             recorder.try_record(timed(Record::OperatorAction(action), at_ns), at_ns);
         }
+        self.enter(&BookLine { kind: kind.to_owned(), who: who.to_owned(), text: detail });
     }
 
     fn tell_alarm(&mut self, words: &str) {
@@ -216,12 +251,19 @@ impl Station {
         }
     }
 
-    fn tick_msgs(&self, model: &Model) -> Vec<Msg> {
+    fn tick_msgs(&mut self, model: &Model) -> Vec<Msg> {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
             failed: !recorder.is_running(),
         });
-        if health == model.log { vec![Msg::Tick] } else { vec![Msg::Log(health), Msg::Tick] }
+        let health = (health != model.log).then_some(Msg::Log(health));
+        let book = self.sign_book(false);
+        let written = self.report.as_ref().and_then(|report| report.try_recv().ok());
+        if written.is_some() {
+            self.report = None;
+        }
+        let written = written.map(Msg::Report);
+        health.into_iter().chain(book).chain(written).chain([Msg::Tick]).collect()
     }
 
     /// Takes one message into the model and does the resulting actions.
@@ -250,6 +292,9 @@ impl Station {
                         recorder.try_record(timed(record, at_ns), at_ns);
                     }
                 }
+                Action::KeepPlace(place) => self.keep_place(model, &place, now),
+                Action::Enter(line) => self.enter(&line),
+                Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
                         recorder.sync_soon();
@@ -263,7 +308,12 @@ impl Station {
                         model.warn(now, ended.to_string());
                     }
                 }
-                Action::Alarm(words) => self.tell_alarm(&words),
+                Action::Alarm(words) => {
+                    self.leave_replay();
+                    self.tell_alarm(&words);
+                }
+                Action::ReplayFlight => self.replay(model, now),
+                Action::WriteReport => self.write_report(model, now),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(kind) => {
@@ -276,6 +326,150 @@ impl Station {
             }
         }
         next
+    }
+
+    /// What was typed, for the live model; a replay takes its own keys.
+    fn typed(&mut self, msg: Msg) -> Vec<Msg> {
+        let was_shown = self.again.shown().is_some();
+        let (actions, rest) = self.again.take(msg);
+        if was_shown {
+            self.output.mark_changed();
+        }
+        for action in actions {
+            match action {
+                Action::Redraw => self.output.clear(),
+                Action::NextTheme => self.output.next_theme(),
+                _ => {}
+            }
+        }
+        rest.into_iter().collect()
+    }
+
+    fn replay(&mut self, model: &mut Model, now: Duration) {
+        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        if let Some(Err(why)) = log.map(|log| self.again.begin(&log)) {
+            model.warn(now, format!("no replay: {why}"));
+        }
+    }
+
+    fn pass_replay(&mut self, model: &mut Model) {
+        let now = self.clock.now();
+        match self.again.pass(model, now) {
+            Ok(true) => self.output.mark_changed(),
+            Ok(false) => {}
+            Err(why) => model.warn(now, format!("no replay: {why}")),
+        }
+    }
+
+    /// The live screen comes back.
+    fn leave_replay(&mut self) {
+        if self.again.leave() {
+            self.output.mark_changed();
+        }
+    }
+
+    fn write_report(&mut self, model: &mut Model, now: Duration) {
+        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        match log.map(|log| report::begin(&log)) {
+            Some(Ok(writing)) => self.report = Some(writing),
+            Some(Err(why)) => model.warn(now, format!("no report: {why}")),
+            None => {}
+        }
+    }
+
+    /// Writes the files for maps. A failure is told once.
+    fn keep_place(&mut self, model: &mut Model, place: &LastPlace, now: Duration) {
+        let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
+            return;
+        };
+        if let Err(error) = places::write(folder, place)
+            && !std::mem::replace(&mut self.place_failed, true)
+        {
+            model.warn(now, format!("the last place is not kept: {error:#}"));
+        }
+    }
+
+    /// Tells every screen the place that is kept from before this run.
+    pub(super) fn publish_place(&mut self, model: &Model, now: Duration) {
+        if let (Some(server), Some(place)) = (&mut self.server, model.place) {
+            server.publish(&Msg::Place(Box::new(place)), now);
+        }
+    }
+
+    /// Opens the book of this run, if there is a log for it.
+    pub(super) fn open_book(&mut self, model: &Model, key: Option<BookKey>) {
+        if self.recorder.is_none() {
+            return;
+        }
+        let Settings { us, vehicle, key_owner, mission, .. } = &model.settings;
+        let owner = key_owner.as_ref().map_or_else(
+            || "no operator's key".to_owned(),
+            |owner| format!("key {} of {}", owner.number, owner.name),
+        );
+        let mission = mission.map_or_else(|| "any mission".to_owned(), |hash| format!("mission {hash}"));
+        let about = format!(
+            "station {}/{}, vehicle system {}, {owner}, {mission}",
+            us.system_id, us.component_id, vehicle.system_id
+        );
+        let (book, first) = StationBook::open(key, &about, self.clock.unix_ns());
+        self.book = Some(book);
+        self.record(first);
+        for (name, role) in &model.settings.crew_roles {
+            let text = role_name(*role).to_owned();
+            self.enter(&BookLine { kind: "crew".to_owned(), who: name.clone(), text });
+        }
+    }
+
+    fn enter(&mut self, line: &BookLine) {
+        let unix_ns = self.clock.unix_ns();
+        if let Some(record) = self.book.as_mut().map(|book| book.enter(line, unix_ns)) {
+            self.record(record);
+        }
+    }
+
+    /// Signs the end of the book and records it, if it is due, or in any case at the `end`.
+    fn sign_book(&mut self, end: bool) -> Option<Msg> {
+        let now = self.clock.now();
+        let book = self.book.as_mut()?;
+        let is_signed = book.is_signed();
+        let (head, record) = if end { book.sign(now) } else { book.sign_if_due(now) }?;
+        self.record(record);
+        Some(Msg::Book { head, is_signed })
+    }
+
+    /// Closes the book. The vehicle is told its end without waiting for an answer.
+    pub(super) fn close_book(&mut self, model: &mut Model, wire: &mut Wire) {
+        let unix_ns = self.clock.unix_ns();
+        let Some(last) = self.book.as_mut().map(|book| book.close(unix_ns)) else { return };
+        self.record(last);
+        let Some(msg) = self.sign_book(true) else { return };
+        self.book = None;
+        self.step(model, wire, msg);
+        let Some(head) = model.book.head else { return };
+        for _ in 0..TOLD_AT_THE_END {
+            wire.send(&MavMessage::TD_BOOK_HEAD(head.message(model.settings.vehicle)));
+        }
+    }
+
+    fn record(&self, record: Record) {
+        if let Some(recorder) = &self.recorder {
+            recorder.try_record(record, self.log_time.now_ns());
+        }
+    }
+
+    /// Keeps a change of the checklist, and shows it on every screen.
+    fn keep_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
+        if let Some(Err(error)) = self.signatures.as_mut().map(|file| file.add(entry)) {
+            model.warn(now, format!("the checklist is not kept over a restart: {error:#}"));
+        }
+        self.publish_checklist(model, now);
+    }
+
+    /// Tells every screen the checklist.
+    pub(super) fn publish_checklist(&mut self, model: &Model, now: Duration) {
+        if let (Some(server), Some(list)) = (&mut self.server, &model.checklist) {
+            server.publish(&Msg::Checklist(Box::new(list.clone())), now);
+        }
     }
 
     /// Restores the terminal first, because the rest may take a while.

@@ -13,6 +13,7 @@ use protocol::transport::LinkAddress;
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::bindings::Bindings;
+use crate::model::place::Degrees;
 pub use values::{Characters, LogChoice, ReplayFrom, Seconds, TalkAmount, ThemeChoice};
 
 /// The profile that the demonstration flies by default.
@@ -57,6 +58,18 @@ pub struct Cli {
     /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
     #[arg(long, value_name = "NAME|FILE", global = true)]
     pub mission: Option<String>,
+
+    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub checklist: Option<PathBuf>,
+
+    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub pad: Option<Degrees>,
+
+    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub here: Option<Degrees>,
 
     /// Log to write (MCAP), or `none`. An existing file is not overwritten.
     ///
@@ -108,6 +121,10 @@ pub struct Cli {
     /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
     #[arg(long, value_name = "PATH", global = true)]
     pub socket: Option<PathBuf>,
+
+    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
+    #[arg(long, value_name = "ADDRESS:PORT", global = true)]
+    pub watchers: Option<String>,
 
     /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
@@ -173,6 +190,9 @@ pub enum Command {
         /// Show only; command nothing.
         #[arg(long)]
         watch: bool,
+        /// Watch a station on another machine: the HOST:PORT of its --watchers.
+        #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
+        from: Option<String>,
     },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
     Status,
@@ -256,6 +276,10 @@ impl Cli {
             ("--key", self.key.is_some()),
             ("--crew", self.crew.is_some()),
             ("--mission", self.mission.is_some()),
+            ("--checklist", self.checklist.is_some()),
+            ("--pad", self.pad.is_some()),
+            ("--here", self.here.is_some()),
+            ("--watchers", self.watchers.is_some()),
             ("--log", self.log.is_some()),
             ("--tlog", self.tlog.is_some()),
             ("--profile", self.profile.is_some()),
@@ -295,6 +319,7 @@ mod tests {
             "--key",
             "--crew",
             "--mission",
+            "--checklist",
             "--sysid",
             "--vehicle-sysid",
             "--log",
@@ -340,6 +365,10 @@ mod tests {
             ("--connect", " udpin:0.0.0.0:14550"),
             ("--key", " k"),
             ("--mission", " mk2"),
+            ("--checklist", " c"),
+            ("--pad", " -1.5,2"),
+            ("--here", " 1,2"),
+            ("--watchers", " 127.0.0.1:1"),
             ("--log", " none"),
             ("--tlog", " none"),
             ("--profile", " mk2"),

@@ -30,6 +30,9 @@ pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name ove
 # The mission that the vehicle should fly, as for --mission. Default: any.
 #mission = "mission.toml"
 
+# Checklist, as for --checklist. Default: none.
+#checklist = "checklist.toml"
+
 # Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
 #log = "flight.mcap"
 
@@ -79,6 +82,7 @@ pub struct Config {
     pub crew: Option<PathBuf>,
     pub operator: Option<String>,
     pub mission: Option<String>,
+    pub checklist: Option<PathBuf>,
     pub log: Option<String>,
     pub tlog: Option<String>,
     pub socket: Option<PathBuf>,
@@ -177,6 +181,9 @@ impl Config {
         }
         if cli.mission.is_none() && !cli.connect.is_empty() {
             cli.mission.clone_from(&self.mission);
+        }
+        if cli.checklist.is_none() && !cli.connect.is_empty() {
+            cli.checklist.clone_from(&self.checklist);
         }
         if cli.operator.is_none() {
             cli.operator.clone_from(&self.operator);

@@ -17,7 +17,7 @@ fn the_example_contains_every_key() {
         !config.connect.is_empty() && config.key.is_some() && config.log.is_some() && config.tlog.is_some()
     );
     assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-    assert_eq!(uncommented.lines().count(), 18, "one line a key: {uncommented}");
+    assert_eq!(uncommented.lines().count(), 19, "one line a key: {uncommented}");
     assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
 }
 
@@ -40,7 +40,7 @@ fn an_error_names_the_wrong_key() {
 /// A key, its value in a file, its flags, and a check that the value of the flag is used.
 type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
 
-const OVERRIDES: [Override; 18] = [
+const OVERRIDES: [Override; 19] = [
     ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
         cli.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
     }),
@@ -53,6 +53,9 @@ const OVERRIDES: [Override; 18] = [
     ("operator", "\"Ann\"", &["--operator", "Bob"], |cli, _| cli.operator.as_deref() == Some("Bob")),
     ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |cli, _| {
         cli.mission.as_deref() == Some("mk3")
+    }),
+    ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |cli, _| {
+        cli.checklist.as_deref() == Some(Path::new("b"))
     }),
     ("log", "\"a.mcap\"", &["--log", "b.mcap"], |cli, _| cli.log == Some(LogChoice::File("b.mcap".into()))),
     ("tlog", "\"a.tlog\"", &["--tlog", "none"], |cli, _| cli.tlog == Some(LogChoice::None)),

@@ -23,6 +23,16 @@ pub enum Act {
     /// Open the dialog that takes command.
     TakeCommand,
     Acknowledge,
+    /// Show the checklist on the Pad page, or the arming checks again.
+    Checklist,
+    /// Show the flight just flown again.
+    ReplayFlight,
+    /// Write the report of the flight.
+    Report,
+    /// Open the dialog that signs the chosen step of the checklist.
+    SignStep,
+    /// Open the dialog that takes the signature of the chosen step back.
+    VoidStep,
     Show(Page),
     Hold,
     Follow,
@@ -48,7 +58,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 29] = [
+pub const DEFINITIONS: [Definition; 35] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -66,6 +76,19 @@ pub const DEFINITIONS: [Definition; 29] = [
         "take command from a silent station: then TAKE and Enter",
     ),
     define(Act::Acknowledge, "acknowledge", Key::Char(' '), "acknowledge the shown alarm"),
+    define(
+        Act::Checklist,
+        "checklist",
+        Key::Char('k'),
+        "the checklist on the Pad page; Up and Down choose a step",
+    ),
+    define(
+        Act::SignStep,
+        "sign",
+        Key::Char('G'),
+        "sign the chosen step of the checklist: then Enter within 5 s",
+    ),
+    define(Act::VoidStep, "void", Key::Char('V'), "take a step's signature back: then Enter within 5 s"),
     define(Act::Show(Page::Pad), "pad", Key::Char('1'), "page: arming checks and ladder"),
     define(Act::Show(Page::Descent), "flight", Key::Char('2'), "page: ascent and descent"),
     define(Act::Show(Page::Landing), "landing", Key::Char('3'), "page: the burn"),
@@ -76,6 +99,12 @@ pub const DEFINITIONS: [Definition; 29] = [
     define(Act::Show(Page::Log), "log", Key::Char('8'), "page: the recording"),
     define(Act::Show(Page::Alarms), "alarms", Key::Char('9'), "page: every alarm"),
     define(Act::Show(Page::Path), "path", Key::Char('p'), "page: the flight from two sides and from above"),
+    define(
+        Act::Show(Page::Find),
+        "find",
+        Key::Char('f'),
+        "page: where to look for the vehicle, and the way there",
+    ),
     define(
         Act::Show(Page::Values),
         "values",
@@ -90,10 +119,23 @@ pub const DEFINITIONS: [Definition; 29] = [
     define(Act::Palette, "palette", Key::Char(':'), "list every action; type a part of its words"),
     define(Act::Pin, "pin", Key::Char('i'), "pin the plotted number to every page, or remove it"),
     define(Act::NextTheme, "theme", Key::Char('c'), "colours: dark, light for sunlight, 16, none, contrast"),
+    define(
+        Act::ReplayFlight,
+        "replay",
+        Key::Char('R'),
+        "the flight just flown, again on this screen; q ends it",
+    ),
+    define(Act::Report, "report", Key::Char('W'), "write the report of the flight beside the log"),
     define(Act::AskParameters, "ask", Key::Char('r'), "ask the vehicle for its parameters again"),
     define(Act::Redraw, "redraw", Key::CtrlL, "draw the screen again"),
     define(Act::Quit, "quit", Key::Char('q'), "quit; armed or in flight: then type QUIT and Enter"),
 ];
+
+/// Whether a flight has been flown that this screen's log holds, and nothing is at risk.
+fn flown_here(model: &Model) -> bool {
+    let is_live = model.settings.role != Role::Replaying;
+    is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
+}
 
 impl Act {
     /// Whether the key would do something now.
@@ -112,6 +154,10 @@ impl Act {
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
             Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
+            Self::Checklist => model.checklist.is_some(),
+            Self::ReplayFlight => flown_here(model),
+            Self::Report => commands && flown_here(model),
+            Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold
             | Self::Filter
@@ -126,7 +172,14 @@ impl Act {
     pub fn opens_ladder(self) -> bool {
         matches!(
             self,
-            Self::Arm | Self::Start | Self::Disarm | Self::HoldCountdown | Self::Tap | Self::TakeCommand
+            Self::Arm
+                | Self::Start
+                | Self::Disarm
+                | Self::HoldCountdown
+                | Self::Tap
+                | Self::TakeCommand
+                | Self::SignStep
+                | Self::VoidStep
         )
     }
 }

@@ -4,8 +4,10 @@ use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
 
 use super::alarm::AlarmKind;
+use super::checklist::ChecklistEntry;
 use super::command::CommandKind;
 use super::events::Speaker;
+use super::place::LastPlace;
 
 /// What a screen in another process asks its station to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +18,20 @@ pub enum Request {
     Acknowledge(AlarmKind),
     /// Ask the vehicle for its parameters.
     Parameters,
+    /// Write the report of the flight.
+    Report,
+    /// The crew has signed or voided this step of the checklist, counted from zero.
+    Sign { step: u8, void: bool },
+}
+
+/// A line of the book: who did what. The run loop adds the time and the chain.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BookLine {
+    /// As in `key`, `commanded`, `signed`.
+    pub kind: String,
+    /// Who did it; empty for the station or the vehicle itself.
+    pub who: String,
+    pub text: String,
 }
 
 /// What `update` wants the run loop to do.
@@ -25,6 +41,16 @@ pub enum Action {
     Send(Box<MavMessage>),
     /// Write a record into the log.
     Record(Record),
+    /// The checklist has changed: keep the change, and show it on every screen.
+    KeepChecklist(ChecklistEntry),
+    /// Keep the last place of the vehicle in the files for maps.
+    KeepPlace(Box<LastPlace>),
+    /// Show the flight just flown again, on this screen.
+    ReplayFlight,
+    /// Write the report of the flight.
+    WriteReport,
+    /// Enter this into the book.
+    Enter(BookLine),
     /// Write the log to disk now.
     SyncLog,
     /// Redraw the whole screen.

@@ -57,6 +57,13 @@ pub enum Dialog {
     Hold {
         until: Duration,
     },
+    /// Signs a step of the checklist, or takes its signature back.
+    Sign {
+        /// Counted from zero.
+        step: usize,
+        void: bool,
+        until: Duration,
+    },
     /// The word that quits is typed, because the vehicle is armed or in flight.
     Quit {
         /// The beginning of [`QUIT_WORD`] that has been typed.
@@ -86,6 +93,10 @@ impl Dialog {
         Self::Hold { until: now + CONFIRM_TIME_LIMIT }
     }
 
+    pub fn sign(step: usize, void: bool, now: Duration) -> Self {
+        Self::Sign { step, void, until: now + CONFIRM_TIME_LIMIT }
+    }
+
     pub fn disarm(now: Duration) -> Self {
         Self::Disarm { until: now + CONFIRM_TIME_LIMIT }
     }
@@ -104,6 +115,7 @@ impl Dialog {
             | Self::TakeCommand { until, .. }
             | Self::Disarm { until }
             | Self::Hold { until }
+            | Self::Sign { until, .. }
             | Self::Quit { until, .. } => Some(*until),
         }
     }
@@ -118,6 +130,8 @@ impl Dialog {
             Self::TakeCommand { .. } => "take-over",
             Self::Disarm { .. } => "disarm",
             Self::Hold { .. } => "hold",
+            Self::Sign { void: false, .. } => "signature",
+            Self::Sign { void: true, .. } => "voiding",
             Self::Quit { .. } => "quit",
         }
     }
@@ -125,7 +139,7 @@ impl Dialog {
     /// The word to type; `None` where Enter alone confirms.
     pub fn word(&self) -> Option<&'static str> {
         match self {
-            Self::Closed | Self::Disarm { .. } | Self::Hold { .. } => None,
+            Self::Closed | Self::Disarm { .. } | Self::Hold { .. } | Self::Sign { .. } => None,
             Self::Confirm { .. } => Some(CONFIRM_WORD),
             Self::TakeCommand { .. } => Some(TAKE_WORD),
             Self::Arm { .. } => Some(ARM_WORD),
@@ -138,7 +152,7 @@ impl Dialog {
     pub fn is_complete(&self) -> bool {
         match self {
             Self::Closed => false,
-            Self::Disarm { .. } | Self::Hold { .. } => true,
+            Self::Disarm { .. } | Self::Hold { .. } | Self::Sign { .. } => true,
             Self::Arm { typed, .. }
             | Self::Start { typed, .. }
             | Self::Confirm { typed, .. }

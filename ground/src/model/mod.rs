@@ -9,8 +9,10 @@ pub mod action;
 pub mod alarm;
 mod auto_step;
 pub mod bindings;
+pub mod book;
 pub mod boot;
 pub mod callouts;
+pub mod checklist;
 pub mod chord;
 pub mod command;
 pub mod crew;
@@ -30,6 +32,7 @@ pub mod page;
 pub mod palette;
 pub mod parameters;
 pub mod permits;
+pub mod place;
 pub mod quantity;
 pub mod recall;
 pub mod seat;
@@ -45,18 +48,20 @@ pub mod words;
 use std::sync::Arc;
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::OperatorAction;
 use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
 
-use action::Action;
+use action::{Action, BookLine};
 use alarm::{Alarm, Alarms};
 pub(crate) use auto_step::AutoStep;
 use bindings::Bindings;
+use book::BookState;
 use callouts::{Called, Talk};
+use checklist::Checklist;
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
@@ -68,6 +73,7 @@ use key_timing::KeyTiming;
 use link::Link;
 use page::{Page, Pages};
 use parameters::Parameters;
+use place::{Degrees, LastPlace};
 use recall::{LookBack, Recall};
 use seat::Seat;
 use two_person::KeyOwner;
@@ -97,6 +103,13 @@ pub struct Settings {
     pub key_owner: Option<KeyOwner>,
     /// The mission that the vehicle should fly, if the station knows it.
     pub mission: Option<MissionHash>,
+    /// The people of the crew file by name, with their roles; empty without one.
+    pub crew_roles: Vec<(String, TdRole)>,
+    /// Where the pad is on the Earth, and where the station is; `None` if nobody has said it.
+    pub pad: Option<Degrees>,
+    pub here: Option<Degrees>,
+    /// When the run started: seconds since 1970, UTC.
+    pub start_unix_s: u64,
     /// Whether the vehicle is simulated in the station's own process.
     pub demonstration: bool,
     /// Whether the automatic mode arms and starts.
@@ -126,6 +139,10 @@ impl Settings {
             seat: Seat::default(),
             key_owner: None,
             mission: None,
+            crew_roles: Vec::new(),
+            pad: None,
+            here: None,
+            start_unix_s: 0,
             demonstration: false,
             auto: false,
             interactive: true,
@@ -217,6 +234,14 @@ pub struct Model {
     pub recall: Recall,
     /// The moment of the past that the crew looks at; `None` while the screen is live.
     pub look_back: Option<LookBack>,
+    /// The checklist of the mission, as the station keeps it; `None` without one.
+    pub checklist: Option<Checklist>,
+    /// The last place of the vehicle: of this flight, or kept from before a restart.
+    pub place: Option<LastPlace>,
+    /// When it is looked at next.
+    pub(crate) place_due: Option<Duration>,
+    /// The end of the station's book.
+    pub book: BookState,
     /// What has been called out.
     pub called: Called,
     /// `None` for a live flight.
@@ -258,6 +283,10 @@ impl Model {
             parameters: Parameters::default(),
             recall: Recall::default(),
             look_back: None,
+            checklist: None,
+            place: None,
+            place_due: None,
+            book: BookState::default(),
             called: Called::default(),
             playing: None,
             rebooted_at: None,
@@ -318,8 +347,21 @@ impl Model {
         chosen.or_else(|| self.alarms.foremost())
     }
 
-    /// Adds an event to the list and to the log.
+    /// Adds an event to the list, to the log and to the book.
     pub(crate) fn say(
+        &mut self,
+        now: Duration,
+        speaker: Speaker,
+        level: EventLevel,
+        text: impl Into<String>,
+    ) {
+        let text = text.into();
+        self.enter(if matches!(speaker, Speaker::Vehicle) { "vehicle says" } else { "event" }, "", &text);
+        self.tell(now, speaker, level, text);
+    }
+
+    /// Adds an event to the list and to the log; the book has it already.
+    pub(crate) fn tell(
         &mut self,
         now: Duration,
         speaker: Speaker,
@@ -332,12 +374,22 @@ impl Model {
     }
 
     /// Records in the log what the crew did and what followed.
-    pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, detail: &str) {
+    pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, by: &Seat, detail: &str) {
         self.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
             time_s: now.as_secs_f64(),
             kind: kind.to_owned(),
             detail: detail.to_owned(),
         })));
+        self.enter(kind, &by.operator, detail);
+    }
+
+    /// Enters a line into the book.
+    pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
+        self.outbox.push(Action::Enter(BookLine {
+            kind: kind.to_owned(),
+            who: who.to_owned(),
+            text: text.to_owned(),
+        }));
     }
 
     pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {

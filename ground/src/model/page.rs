@@ -28,6 +28,8 @@ pub enum Page {
     Alarms,
     /// The flight from two sides and from above.
     Path,
+    /// Where to look for the vehicle.
+    Find,
     /// Every value, with the solver's residuals.
     Values,
     /// One quantity over time.
@@ -49,7 +51,7 @@ impl Page {
         Self::Alarms,
     ];
     /// The pages with a letter or a mark.
-    pub const LETTERED: [Self; 4] = [Self::Path, Self::Values, Self::Plot, Self::Help];
+    pub const LETTERED: [Self; 5] = [Self::Path, Self::Find, Self::Values, Self::Plot, Self::Help];
 
     /// The page whose key shows this one: ascent and descent share one.
     #[must_use]
@@ -81,6 +83,7 @@ impl Page {
             Self::Log => "Log",
             Self::Alarms => "Alarms",
             Self::Path => "Path",
+            Self::Find => "Find",
             Self::Values => "Values",
             Self::Plot => "Plot",
             Self::Help => "Help",
@@ -117,6 +120,10 @@ pub struct Pages {
     pub pinned: Vec<&'static Quantity>,
     /// Only lines with this text are listed; empty for all.
     pub filter: String,
+    /// Whether the Pad page lists the checklist instead of the arming checks.
+    pub checklist: bool,
+    /// The chosen step of the checklist; `None` for the first that is open.
+    pub step: Option<usize>,
     /// A text that is being typed.
     pub entry: Option<TextEntry>,
 }
@@ -145,6 +152,8 @@ impl Default for Pages {
             plotted: &quantity::ALL[0],
             pinned: Vec::new(),
             filter: String::new(),
+            checklist: false,
+            step: None,
             entry: None,
         }
     }

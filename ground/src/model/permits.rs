@@ -20,8 +20,9 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         let why = model.link.uplink.why_unheard();
         return Some(format!("the uplink is not proven: {why}"));
     }
-    if let Some(why) = why_no_key(model).or_else(|| why_other_mission(model)) {
-        return Some(why);
+    let why = why_no_key(model).or_else(|| why_other_mission(model)).or_else(|| model.why_checklist(now));
+    if why.is_some() {
+        return why;
     }
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());

@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
 use protocol::dialect::MavResult;
 use protocol::log::record::EventLevel;
+use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
@@ -57,7 +58,11 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     // A confirmation names the ask that it confirms; without a number it would be another ask.
     let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
     let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
-    let params = [param1, 0.0, number, 0.0, 0.0, 0.0, 0.0];
+    // An arm says for which mission: the vehicle refuses it if it flies another one.
+    let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
+    let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 4], MissionHash::to_params);
+    let [param4, param5, param6, param7] = mission;
+    let params = [param1, 0.0, number, param4, param5, param6, param7];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 
@@ -109,7 +114,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let Some(track) = track else { return };
     let kind = track.kind;
     let name = kind.name();
-    let by = track.by.in_brackets();
+    let (by, seat) = (track.by.in_brackets(), track.by.clone());
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
@@ -153,8 +158,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
-    model.record_operator(now, operator_kind, &told);
-    model.say(now, Speaker::Ground, level, text);
+    model.record_operator(now, operator_kind, &seat, &told);
+    model.tell(now, Speaker::Ground, level, text);
     if let Some(result) = answered.filter(|_| !asked_to_confirm) {
         on_final_answer(model, kind, result, now);
     }
@@ -225,6 +230,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             track.observed_at = Some(now);
             seen.push((
                 EventLevel::Info,
+                track.by.clone(),
                 format!("{} observed: {}", track.kind.name(), track.kind.observed_words()),
             ));
         } else if track.disagrees(now) && !track.not_observed_reported {
@@ -232,13 +238,14 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             let name = track.kind.name();
             seen.push((
                 EventLevel::Error,
+                track.by.clone(),
                 format!("{name} acknowledged, not observed: the vehicle does not show it"),
             ));
         }
     }
-    for (level, text) in seen {
-        model.record_operator(now, "observed", &text);
-        model.say(now, Speaker::Ground, level, text);
+    for (level, by, text) in seen {
+        model.record_operator(now, "observed", &by, &text);
+        model.tell(now, Speaker::Ground, level, text);
     }
     stop_if_latched(model, now);
 }

@@ -4,11 +4,14 @@ use std::time::Duration;
 
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TdPhase};
 use protocol::identity::Address;
+use protocol::log::record::EventLevel;
 
 use super::Action;
 use crate::model::Model;
 use crate::model::command::CommandKind;
 use crate::model::crew::UNATTENDED_MAX;
+use crate::model::events::Speaker;
+use crate::model::seat::Seat;
 
 /// How often the hold is sent; the countdown itself shows whether it worked.
 const HOLD_EVERY: Duration = Duration::from_millis(100);
@@ -26,8 +29,8 @@ pub(super) fn step(model: &mut Model, now: Duration) {
     }
     if model.crew.hold_due.is_none() {
         let text = format!("no commanding screen for {} s in the countdown: HOLD", UNATTENDED_MAX.as_secs());
-        model.record_operator(now, "hold", &text);
-        model.warn(now, text);
+        model.record_operator(now, "hold", &Seat::default(), &text);
+        model.tell(now, Speaker::Ground, EventLevel::Warning, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if now + HALF_A_TICK >= due {

@@ -69,6 +69,10 @@ fn perform(model: &mut Model, does: Does, now: Duration) {
             let does = if act == Act::Disarm { "disarm" } else { "hold" };
             model.info(now, format!("press {key}, then Enter: only these keys {does}"));
         }
+        Does::Act(act @ (Act::SignStep | Act::VoidStep)) => {
+            let key = model.settings.keys.name(act);
+            model.info(now, format!("press {key}, then Enter: only these keys sign or void"));
+        }
         Does::Act(act @ Act::Tap) => {
             let key = model.settings.keys.name(act);
             model.info(now, format!("press {key}: only this key taps"));

@@ -9,7 +9,7 @@ use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
-use super::{Action, commands, vehicle_changes};
+use super::{Action, book, commands, vehicle_changes};
 use crate::model::events::Speaker;
 use crate::model::{Model, telemetry};
 
@@ -80,6 +80,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             return;
         }
         MavMessage::PARAM_VALUE(data) => return model.parameters.take(data),
+        MavMessage::TD_BOOK_KEPT(data) => return book::on_kept(model, data),
         MavMessage::TD_UPLINK(data) => return on_uplink(model, data, now),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
@@ -91,15 +92,18 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         _ => {}
     }
     let before = vehicle_changes::Announced::of(&model.vehicle);
+    let crew_before = book::CrewTold::of(model);
     let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
     if rebooted {
         vehicle_changes::on_reboot(model, now);
+        book::on_reboot(model);
     }
     vehicle_changes::on_change(
         model,
         if rebooted { vehicle_changes::Announced::default() } else { before },
         now,
     );
+    book::on_change(model, &crew_before);
     commands::observe(model, now);
 }
 

@@ -7,13 +7,15 @@
 use std::time::Duration;
 
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
+use protocol::log::record::EventLevel;
 
-use super::{Action, Request, commands, entry};
+use super::{Action, Request, afterwards, checklist, commands, entry};
 use crate::key::Key;
 use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
+use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::page::Page;
 use crate::model::permits::{why_not_arm, why_not_confirm, why_not_start, why_not_take};
@@ -42,7 +44,7 @@ pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
 
 /// A paste is dropped: it was meant for another window.
 pub(super) fn on_paste(model: &mut Model, now: Duration) {
-    model.record_operator(now, "key", "a paste");
+    model.record_operator(now, "key", &model.settings.seat.clone(), "a paste");
     model.key_timing.pasted(now);
     model.quit_at = None;
     cancel(model, now);
@@ -51,7 +53,7 @@ pub(super) fn on_paste(model: &mut Model, now: Duration) {
 
 fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     if touch != KeyOrigin::TooFast || matches!(key, Key::CtrlX | Key::Enter) {
-        model.record_operator(now, "key", &key.name());
+        model.record_operator(now, "key", &model.settings.seat.clone(), &key.name());
     }
     expire(model, now);
     if touch != KeyOrigin::Repeat {
@@ -142,6 +144,7 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
         Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
         Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
+        Dialog::Sign { step, void, .. } => checklist::ask(model, (*step, *void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Dialog::Quit { .. } => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
@@ -191,6 +194,9 @@ fn on_free_key(model: &mut Model, key: Key, now: Duration) {
     let shown = model.page();
     match key {
         Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
+        Key::Up | Key::Down if shown == Page::Pad && lists_steps(model) => {
+            choose_step(model, key == Key::Up, now);
+        }
         Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
         Key::Left | Key::Right if model.playing.is_none() => look_back(model, key == Key::Left, now),
         Key::Up => scroll(model, 1),
@@ -234,6 +240,17 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             Some(why) => model.warn(now, format!("cannot take command: {why}")),
         },
         Act::Acknowledge => see_alarm(model, now),
+        Act::Checklist if model.checklist.is_none() => model.info(now, "there is no checklist (--checklist)"),
+        Act::Checklist => {
+            model.pages.checklist = !(shown == Page::Pad && model.pages.checklist);
+            if shown != Page::Pad {
+                model.pages.hold(Some(Page::Pad));
+            }
+        }
+        Act::ReplayFlight => afterwards::replay(model, now),
+        Act::Report => afterwards::report(model, now),
+        Act::SignStep => checklist::open_dialog(model, false, now),
+        Act::VoidStep => checklist::open_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),
         Act::Show(page) => {
             model.pages.hold(Some(page));
@@ -276,6 +293,18 @@ fn look_back(model: &mut Model, earlier: bool, now: Duration) {
     let at = if earlier { at.saturating_sub(LOOK_STEP) } else { at + LOOK_STEP };
     let begin = model.recall.begin().filter(|_| at < now);
     model.look_back = begin.map(|begin| LookBack { at: at.max(begin), until: now + LOOKS_FOR });
+}
+
+/// Whether the Pad page lists the checklist.
+fn lists_steps(model: &Model) -> bool {
+    model.checklist.is_some() && model.pages.checklist
+}
+
+/// Chooses the next or the previous step of the checklist.
+fn choose_step(model: &mut Model, up: bool, now: Duration) {
+    let Some(at) = model.chosen_step(now) else { return };
+    let last = model.checklist.as_ref().map_or(0, |list| list.steps.len().saturating_sub(1));
+    model.pages.step = Some(if up { at.saturating_sub(1) } else { (at + 1).min(last) });
 }
 
 /// Chooses the next or the previous quantity to plot.
@@ -341,8 +370,8 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         None => commands::submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
-            model.record_operator(now, "not sent", &text);
-            model.warn(now, text);
+            model.record_operator(now, "not sent", by, &text);
+            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
         }
     }
 }
@@ -356,7 +385,7 @@ fn tap(model: &mut Model, by: &Seat, now: Duration) {
         target_component: model.settings.vehicle.component_id,
         ..COMMAND_LONG_DATA::default()
     })));
-    model.record_operator(now, "commanded", &format!("TAP{}", by.in_brackets()));
+    model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
 }
 
 /// Why not to send a command that another screen has just sent.

@@ -2,28 +2,35 @@
 //!
 //! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do: send, record, quit.
 
+mod afterwards;
 pub mod alarms;
 pub mod auto;
+mod book;
 mod callouts;
+mod checklist;
 pub mod commands;
 pub mod crew;
 mod entry;
 pub mod frames;
 pub mod keys;
+mod place;
 pub mod tick;
 pub mod vehicle_changes;
 
 use std::time::Duration;
 
+use protocol::book::SignedHead;
 use protocol::frame::{Frame, FramerCounters};
 use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
 
 use crate::key::Key;
 use crate::model::alarm::AlarmKind;
+use crate::model::checklist::Checklist;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
+use crate::model::place::LastPlace;
 use crate::model::seat::Seat;
 use crate::model::{LogHealth, Model, Role};
 
@@ -53,6 +60,27 @@ pub enum Msg {
     ScreenQuit,
     /// The crew has acknowledged this alarm on an attached screen.
     AlarmAcknowledged(AlarmKind),
+    /// The station has this checklist, in this state.
+    Checklist(Box<Checklist>),
+    /// An attached screen asks for the report of the flight.
+    ReportWanted,
+    /// The report of the flight is here, or is not because of this.
+    Report(Result<String, String>),
+    /// The last place of the vehicle, kept from before this run of the station.
+    Place(Box<LastPlace>),
+    /// The station has signed the end of its book.
+    Book {
+        head: SignedHead,
+        /// False without a key: then the signature is empty.
+        is_signed: bool,
+    },
+    /// The crew has signed or voided a step of the checklist on an attached screen.
+    SignAsked {
+        /// Counted from zero.
+        step: usize,
+        void: bool,
+        by: Seat,
+    },
     /// An attached screen asks for the parameters.
     ParametersWanted,
     /// Time passes on an attached screen: its dialogs and its abort chord may expire.
@@ -109,6 +137,12 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.info(now, model.crew.words());
         }
         Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
+        Msg::Checklist(list) => model.checklist = Some(*list),
+        Msg::ReportWanted => afterwards::report(model, now),
+        Msg::Report(written) => afterwards::on_report(model, written, now),
+        Msg::Place(place) => model.place = Some(*place),
+        Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
+        Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {

@@ -8,7 +8,7 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, callouts, commands, crew, frames, keys};
+use super::{Action, auto, book, callouts, commands, crew, frames, keys, place};
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link_state::LinkState;
@@ -60,6 +60,8 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     commands::poll(model, now);
     commands::observe(model, now);
     crew::step(model, now);
+    book::pass(model, now);
+    place::pass(model, now);
     if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
         let telemetry = telemetry_record(model, now);
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TdHold, TdMotor, TdPhase};
 use protocol::log::record::EventLevel;
 
-use super::{Action, commands};
+use super::{Action, checklist, commands};
 use crate::model::command::is_aborted;
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
@@ -135,6 +135,7 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
             model.vehicle.burn = FlownPath::default();
         }
         model.outcome.started = true;
+        checklist::on_liftoff(model, now);
     }
     if phase == TdPhase::TD_PHASE_SAFED {
         model.outcome.safed_at = Some(now);

@@ -68,6 +68,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 plain("Then only a new start counts down again. Any other key cancels.".to_owned()),
             ],
         ),
+        Dialog::Sign { step, void, .. } => sign(model, (*step, *void), left, theme),
         Dialog::Disarm { .. } => (
             "DISARM",
             vec![
@@ -92,6 +93,25 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
         }
     };
     Some(dialog)
+}
+
+/// The step that is signed or voided, and who signs it.
+fn sign(
+    model: &Model,
+    (number, void): (usize, bool),
+    left_s: f64,
+    theme: Theme,
+) -> (&'static str, Vec<Line<'static>>) {
+    let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
+    let words = step.map(|step| step.words.clone()).unwrap_or_default();
+    let who = step.and_then(|step| step.role).map_or("Anybody who commands", role_name);
+    let verb = if void { "voids the signature" } else { "signs" };
+    let lines = vec![
+        Line::styled(format!("{}: {words}", number + 1), theme.style(TextRole::Plain)),
+        Line::styled(format!("Enter within {left_s:.0} s {verb}."), theme.style(TextRole::Caution)),
+        Line::styled(format!("{who} signs it. Any other key cancels."), theme.style(TextRole::Plain)),
+    ];
+    (if void { "VOID a step of the checklist" } else { "SIGN a step of the checklist" }, lines)
 }
 
 /// What somebody else has to do after this dialog.

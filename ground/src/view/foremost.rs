@@ -45,7 +45,12 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
         return word("ARMED", TextRole::Alarm);
     }
     let other_mission = why_other_mission(model).is_some();
-    if other_mission || !status.value.checks_failed.is_empty() || !model.link.uplink.is_proven(now) {
+    let unsigned = model.why_checklist(now).is_some();
+    if other_mission
+        || unsigned
+        || !status.value.checks_failed.is_empty()
+        || !model.link.uplink.is_proven(now)
+    {
         return word("NO-GO", TextRole::Caution);
     }
     word("GO", TextRole::Good)

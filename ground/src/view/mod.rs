@@ -9,6 +9,7 @@
 pub mod actuators;
 pub mod alarm_line;
 pub mod ascii;
+pub mod checklist;
 pub mod compact;
 pub mod controller;
 pub mod dialog;
@@ -21,6 +22,7 @@ pub mod foremost;
 pub mod gauge;
 pub mod headline;
 pub mod identity;
+pub mod limit_bar;
 pub mod limit_rows;
 pub mod link_line;
 pub mod lost_position;

@@ -252,5 +252,8 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     if let Some(why) = why_other_mission(model) {
         return Some((format!("NO-GO: {why}"), TextRole::Caution));
     }
+    if let Some(why) = model.why_checklist(now) {
+        return Some((format!("NO-GO: {why}"), TextRole::Caution));
+    }
     Some(("GO: every arming check passes".to_owned(), TextRole::Good))
 }

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
+use super::limit_bar;
 use super::limit_rows::{LimitRow, decimals, limit_rows};
 use super::number::{age_mark, fixed};
 use super::theme::{TextRole, Theme};
@@ -41,6 +42,31 @@ pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<L
         Some(names) => Line::styled(format!("OUTSIDE {names}"), theme.style(TextRole::Alarm)),
     });
     ("Touchdown predicted", rows)
+}
+
+/// The same with a bar for each limit that says how much of it is used, where there is room beside the rows.
+pub fn panel_with_bars(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    columns: usize,
+) -> (&'static str, Vec<Line<'static>>) {
+    let (title, mut rows) = panel(model, theme, now);
+    let vehicle = &model.vehicle;
+    let judged = vehicle.verdict.map(|verdict| verdict.value.touchdown);
+    let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
+    let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits.as_ref()) else { return (title, rows) };
+    let used = limit_bar::used(&touchdown, limits);
+    let widest = rows.iter().take(used.len()).map(Line::width).max().unwrap_or(0);
+    let room = columns.saturating_sub(widest);
+    if room >= limit_bar::COLUMNS_MIN {
+        for (row, used) in rows.iter_mut().zip(used) {
+            let gap = widest - row.width();
+            row.spans.push(Span::raw(" ".repeat(gap)));
+            row.spans.extend(limit_bar::bar(used, room, theme));
+        }
+    }
+    (title, rows)
 }
 
 pub fn verdict_word(landed: bool) -> (&'static str, TextRole) {

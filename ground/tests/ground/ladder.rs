@@ -218,7 +218,10 @@ impl Watched {
         }
         let opens = [Key::Char('q'), Key::Char('Q'), Key::CtrlC];
         let at_risk = self.rig.model.is_at_risk();
-        let quits = ends_in_ladder(history, &opens, "QUIT", 10) || (!at_risk && ends_in_quit(history));
+        // The palette does what the key does: at risk it opens the same ladder.
+        let by_palette = ends_in_ladder(history, &[Key::Char(':')], "QUIT", 60);
+        let quits = ends_in_ladder(history, &opens, "QUIT", 10)
+            || (!at_risk && (by_palette || ends_in_quit(history)));
         prop_assert!(!leaves || quits, "left by {history:?}");
         if chord_among || ends_in_chord(history) {
             // The abort counts as answered, so that its resends do not look like new ones.

@@ -1,8 +1,11 @@
 //! Tests of the ground station from outside: keys, radio, screens, and the program itself.
 
+mod afterwards;
 mod alarms;
 mod auto;
+mod book;
 mod bytes;
+mod checklist;
 mod crew;
 mod daemon;
 mod disarm;

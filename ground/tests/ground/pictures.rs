@@ -8,6 +8,8 @@ use std::path::Path;
 
 use ground::key::Key;
 use ground::model::page::Page;
+use ground::model::seat::Seat;
+use ground::update::Msg;
 use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
 use protocol::dialect::{TdBooster, TdCheck, TdChute, TdLimit, TdPhase};
@@ -30,6 +32,19 @@ fn no_go() -> Rig {
     rig.checks_failed =
         (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
     rig.interlocks = protocol::dialect::TdInterlock::empty();
+    rig.run(1.0);
+    rig
+}
+
+/// On the pad with a checklist: signed, open, voided, and with a value.
+fn with_checklist() -> Rig {
+    let mut rig = on_the_pad();
+    let list = ground::checklist_file::parse(include_str!("../../checklist-example.toml"));
+    rig.msg(Msg::Checklist(Box::new(list.expect("the example is a checklist"))));
+    for (step, void) in [(0, false), (1, false), (3, false), (1, true)] {
+        rig.msg(Msg::SignAsked { step, void, by: Seat::new(2, "Ann") });
+    }
+    rig.key(Key::Char('k'));
     rig.run(1.0);
     rig
 }
@@ -97,6 +112,7 @@ fn states() -> Vec<(&'static str, Rig)> {
     vec![
         ("pad", on_the_pad()),
         ("nogo", no_go()),
+        ("checklist", with_checklist()),
         ("armed", armed()),
         ("counting", counting()),
         ("coast", flying(TdPhase::TD_PHASE_COAST)),

@@ -6,6 +6,7 @@
 mod budget;
 mod lane;
 mod lists;
+mod mission;
 mod questions;
 mod refusals;
 mod requests;
@@ -23,8 +24,8 @@ use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::PING_DATA;
 use protocol::dialect::{
     AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
-    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TIMESYNC_DATA,
+    TD_BOOK_KEPT_DATA, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
@@ -225,6 +226,18 @@ impl VehicleEndpoint {
                 };
                 self.lane(link).answer(MavMessage::TIMESYNC(answer).into());
             }
+            Ok(MavMessage::TD_BOOK_HEAD(head))
+                if self.is_for_us(head.target_system, head.target_component) =>
+            {
+                // The frame itself is in the log already.
+                let kept = TD_BOOK_KEPT_DATA {
+                    book: head.book,
+                    entries: head.entries,
+                    target_system: frame.source().system_id,
+                    target_component: frame.source().component_id,
+                };
+                self.lane(link).request(vec![MavMessage::TD_BOOK_KEPT(kept)]);
+            }
             Ok(message) => {
                 if let Some(pong) = pong(&message, frame.source()) {
                     self.lane(link).answer(pong.into());
@@ -333,6 +346,9 @@ impl VehicleEndpoint {
         vehicle: &Vehicle,
     ) {
         let (result, reason) = match commands::parse(request) {
+            Ok(asked) if let Some(why) = mission::why_other(request, &asked, vehicle) => {
+                (MavResult::MAV_RESULT_DENIED, Some(why))
+            }
             Err(unfit) => (unfit.result, unfit.reason),
             Ok(Command::Vehicle(asked)) => return self.put(link, (request, by), asked, vehicle),
             Ok(Command::ForcedDisarm) => {

@@ -2,10 +2,13 @@
 
 use std::time::Duration;
 
+use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::crew_file::CrewFile;
+use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA};
 use protocol::frame::Frame;
 use protocol::hub::{Hub, News};
+use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
@@ -69,6 +72,12 @@ impl Intake {
         if let Some(CommandRequest { source, command, .. }) = CommandRequest::from_frame(frame) {
             let (system, component) = (source.system_id, source.component_id);
             note(recorder, time_s, &format!("command {command} from {system}/{component} over {link}"));
+        } else if frame.message_id() == TD_BOOK_HEAD_DATA::ID
+            && let Ok(MavMessage::TD_BOOK_HEAD(head)) = frame.decode()
+        {
+            let Address { system_id, component_id } = frame.source();
+            let (entries, hash) = (head.entries, protocol::book::shown(&head.hash));
+            note(recorder, time_s, &format!("book of {system_id}/{component_id}: {entries}:{hash}"));
         }
     }
 }

@@ -179,6 +179,11 @@ impl Vehicle {
         Self { people: Some(people), operators, ..self }
     }
 
+    /// Which mission or profile it flies.
+    pub fn mission(&self) -> &MissionName {
+        &self.mission
+    }
+
     /// Sets the name and the text of the mission or profile that it flies.
     #[must_use]
     pub fn of_mission(self, name: &str, text: &str) -> Self {

@@ -57,6 +57,10 @@ pub enum Record {
     Telemetry(Box<v1::Telemetry>),
     /// `/operator`.
     OperatorAction(v1::OperatorAction),
+    /// `/book`.
+    BookEntry(v1::BookEntry),
+    /// `/book/head`.
+    BookHead(v1::BookHead),
     /// `/mavlink/rx/raw` or `/mavlink/tx/raw`.
     RawFrame(RawFrame),
     /// `/events`.
@@ -86,6 +90,10 @@ pub const TOPIC_VERDICT: &str = "/verdict";
 pub const TOPIC_TELEMETRY: &str = "/telemetry";
 /// Topic of the operator's keys and commands.
 pub const TOPIC_OPERATOR: &str = "/operator";
+/// Topic of a station's book.
+pub const TOPIC_BOOK: &str = "/book";
+/// Topic of the signed ends of the book.
+pub const TOPIC_BOOK_HEAD: &str = "/book/head";
 /// Topic of raw frames received.
 pub const TOPIC_RAW_RX: &str = "/mavlink/rx/raw";
 /// Topic of raw frames sent.

@@ -10,11 +10,11 @@ use mcap::records::MessageHeader;
 use super::build::build_info;
 use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
-    METADATA_RUN, METADATA_SCHEMA, RawFrame, Record, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY,
-    TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE, TOPIC_EVENTS,
-    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH, TOPIC_RAW_RX,
-    TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message,
-    transform, transform_in_space,
+    METADATA_RUN, METADATA_SCHEMA, RawFrame, Record, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY, TOPIC_BOOK,
+    TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE,
+    TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH,
+    TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+    log_message, transform, transform_in_space,
 };
 use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
 use crate::dialect::DIALECT_XML;
@@ -149,6 +149,8 @@ impl<W: Write + Seek> LogWriter<W> {
             Record::OperatorAction(action) => {
                 self.write_message(TOPIC_OPERATOR, (LOG, "OperatorAction"), action, log_time)
             }
+            Record::BookEntry(entry) => self.write_message(TOPIC_BOOK, (LOG, "BookEntry"), entry, log_time),
+            Record::BookHead(head) => self.write_message(TOPIC_BOOK_HEAD, (LOG, "BookHead"), head, log_time),
             Record::ComputerStart(start) => self.write_message(
                 TOPIC_COMPUTER_START,
                 (COMPUTER, "ComputerStart"),

@@ -74,6 +74,11 @@ impl Key {
             .collect()
     }
 
+    /// The bytes of the key.
+    pub(crate) fn secret(&self) -> &[u8; Self::LEN] {
+        &self.0
+    }
+
     fn hash(&self, signed: &[u8]) -> [u8; 6] {
         let digest = Sha256::new().chain_update(self.0).chain_update(signed).finalize();
         let mut hash = [0; 6];

@@ -1,5 +1,6 @@
 //! The command line: parses the question and prints the answer. One file for each subcommand.
 
+mod audit;
 mod bisect;
 mod compare;
 mod evaluate;
@@ -46,7 +47,8 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
 ///      shadow: something was flagged;
 ///      gate: some flight got worse, lands no longer, diverged or is missing;
-///      learn: NO-GO
+///      learn: NO-GO;
+///      audit: a book is broken, or its end is not proven
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some tick (no ticks, no profile, ticks missing) and all others are identical;
 ///      or a file would be overwritten and --force is not given
@@ -107,6 +109,11 @@ enum Question {
     Frames(frames::Ask),
     /// Converts a ground station's .tlog to a flight log: telemetry only, nothing can be re-executed.
     Import(import::Ask),
+    /// Proves the books of ground stations (who did what when), or names the first broken link.
+    ///
+    /// Exit code 0 if every book is whole and its end is vouched for (by its signed last entry, a vehicle's log or --head), 1 if
+    /// not, 2 if there is no book.
+    Audit(audit::Ask),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
     Recover(recover::Ask),
     /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
@@ -132,6 +139,8 @@ pub(crate) enum Answer {
     NotAll,
     /// A bit-for-bit comparison. If `strict`, it must cover the whole flight.
     Verified { outcome: Verification, strict: bool },
+    /// Whether every book is proven.
+    Audited { proven: bool },
     /// A comparison within tolerances.
     Compared { within: bool },
 }
@@ -139,8 +148,8 @@ pub(crate) enum Answer {
 impl Answer {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Given | Self::Compared { within: true } => 0,
-            Self::Compared { within: false } => EXIT_NO,
+            Self::Given | Self::Compared { within: true } | Self::Audited { proven: true } => 0,
+            Self::Compared { within: false } | Self::Audited { proven: false } => EXIT_NO,
             Self::NotAll => EXIT_NO_ANSWER,
             Self::Verified { outcome, strict } => match outcome {
                 Verification::Identical => 0,
@@ -157,6 +166,7 @@ impl Cli {
     pub(crate) fn run(self) -> Result<Answer> {
         match self.question {
             Question::Info(ask) => ask.run(),
+            Question::Audit(ask) => ask.run(),
             Question::Verify(ask) => ask.run(),
             Question::Evaluate(ask) => ask.run(),
             Question::Refly(ask) => ask.run(),

@@ -2,6 +2,7 @@
 //!
 //! Control characters are removed from the text of a log first, because a log may come from anywhere.
 
+mod audit;
 mod compare;
 mod evaluate;
 mod fit;
@@ -17,6 +18,7 @@ mod tick;
 mod verdicts;
 mod verify;
 
+pub use audit::print_audit;
 pub use compare::{compare_cases, print_compare};
 pub use evaluate::{print_evaluate, print_evaluate_csv};
 pub use fit::{FitReport, print_fit};

@@ -6,6 +6,7 @@ mod another_build;
 mod apogee;
 mod asked;
 mod asked_well;
+mod audit;
 mod clocks;
 mod command_line;
 mod commands;

@@ -5,10 +5,12 @@
 //! ```
 
 mod bytes;
+mod checklist;
 mod report;
 
 use std::time::Duration;
 
+use protocol::book::{Head, SignedHead};
 use protocol::frame::FramerCounters;
 
 use super::message::{Hello, OPERATOR_MAX, StationStatus, ToScreen, ToStation, VERSION};
@@ -17,6 +19,7 @@ use crate::model::action::Request;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::seat::Seat;
+use crate::place_file;
 use crate::update::Msg;
 pub use bytes::CodecError;
 use bytes::{PREFIX_LEN, Reader, Writer};
@@ -91,10 +94,25 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
             }
         }
         Msg::ScreenQuit => drop(out.kind(18)),
+        Msg::Report(written) => {
+            let (Ok(text) | Err(text)) = written;
+            out.kind(23).u8(u8::from(written.is_ok())).text(text);
+        }
+        Msg::Place(place) => drop(out.kind(22).text(&place_file::geojson(place))),
+        Msg::Book { head: SignedHead { head, signature }, is_signed } => {
+            out.kind(21).u64(head.book).u32(head.entries).raw(&head.hash).raw(signature);
+            out.u8(u8::from(*is_signed));
+        }
+        Msg::Checklist(list) => {
+            out.kind(20);
+            checklist::encode(list, out);
+        }
         // The station's own keys and end, and messages that only a replay or an attached screen uses.
         Msg::Key(_)
         | Msg::Keys(_)
         | Msg::Pasted
+        | Msg::SignAsked { .. }
+        | Msg::ReportWanted
         | Msg::Terminate(_)
         | Msg::Commanded(_)
         | Msg::ScreenTick => return None,
@@ -154,6 +172,20 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         }
         18 => ToScreen::Msg(Msg::ScreenQuit),
         19 => ToScreen::Msg(Msg::LinkSays(rest.text()?)),
+        23 => {
+            let (is_written, text) = (rest.u8()? != 0, rest.text()?);
+            ToScreen::Msg(Msg::Report(if is_written { Ok(text) } else { Err(text) }))
+        }
+        22 => {
+            let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
+            ToScreen::Msg(Msg::Place(Box::new(place)))
+        }
+        21 => {
+            let head = Head { book: rest.u64()?, entries: rest.u32()?, hash: rest.take()? };
+            let head = SignedHead { head, signature: rest.take()? };
+            ToScreen::Msg(Msg::Book { head, is_signed: rest.u8()? != 0 })
+        }
+        20 => ToScreen::Msg(Msg::Checklist(Box::new(checklist::decode(&mut rest)?))),
         30 => ToScreen::Status(StationStatus {
             pid: rest.u32()?,
             demonstration: rest.u8()? != 0,
@@ -210,6 +242,8 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Command(kind)) => out.kind(1).u8(number_of(*kind)),
         ToStation::Request(Request::Acknowledge(kind)) => out.kind(2).u8(alarm_number(*kind)),
         ToStation::Request(Request::Parameters) => out.kind(3),
+        ToStation::Request(Request::Sign { step, void }) => out.kind(7).u8(*step).u8(u8::from(*void)),
+        ToStation::Request(Request::Report) => out.kind(8),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -236,6 +270,8 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         4 => ToStation::Key(words(&mut rest, KEY_MAX)?),
         5 => ToStation::Status,
         6 => ToStation::Stop { force: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? },
+        8 => ToStation::Request(Request::Report),
+        7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };
     rest.end()?;

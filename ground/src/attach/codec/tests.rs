@@ -38,6 +38,32 @@ fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
     assert_eq!(back(&stopping, Duration::ZERO).0, stopping);
 }
 
+#[test]
+fn a_report_survives_the_round_trip() {
+    for written in [Ok("flight.html".to_owned()), Err("disk full".to_owned())] {
+        let told = ToScreen::Msg(Msg::Report(written));
+        assert_eq!(back(&told, Duration::ZERO).0, told);
+    }
+}
+
+#[test]
+fn the_end_of_the_book_survives_the_round_trip() {
+    let head = SignedHead { head: Head { book: 7, entries: 8, hash: [9; 32] }, signature: [10; 64] };
+    let told = ToScreen::Msg(Msg::Book { head, is_signed: true });
+    assert_eq!(back(&told, Duration::ZERO).0, told);
+}
+
+#[test]
+fn a_checklist_survives_the_round_trip() {
+    use crate::model::checklist::{ChecklistEntry, Signature};
+    let mut list = crate::checklist_file::parse(include_str!("../../../checklist-example.toml")).unwrap();
+    let signature = Signature { by: "Ann".to_owned(), unix_s: 7, found: Some(1.5), role: None };
+    list.apply(&ChecklistEntry::Signed { step: 0, signature: signature.clone() });
+    list.apply(&ChecklistEntry::Voided { step: 1, signature });
+    let told = ToScreen::Msg(Msg::Checklist(Box::new(list)));
+    assert_eq!(back(&told, Duration::ZERO).0, told);
+}
+
 /// A screen must be able to tell its crew which program to update.
 #[test]
 fn a_greeting_of_another_version_decodes_to_its_version() {
@@ -79,6 +105,8 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Acknowledge(AlarmKind::Held)),
         ToStation::Request(Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort))),
         ToStation::Request(Request::Parameters),
+        ToStation::Request(Request::Report),
+        ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];
     for asked in asked {

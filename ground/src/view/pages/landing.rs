@@ -88,7 +88,7 @@ fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
 }
 
 fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (title, rows) = touchdown::panel(model, theme, now);
+    let (title, rows) = touchdown::panel_with_bars(model, theme, now, usize::from(area.width));
     let inside = titled(title, theme, frame, area);
     draw_lines(frame, inside, &rows);
 }

@@ -8,6 +8,14 @@ use crate::model::{Model, Role};
 use crate::view::number::seconds;
 use crate::view::theme::{TextRole, Theme};
 
+/// The end of the book: how many entries, the head, whether it is signed, and what the vehicle has of it.
+fn book(model: &Model) -> String {
+    let Some(signed) = model.book.head else { return "none".to_owned() };
+    let (entries, hash) = (signed.head.entries, protocol::book::shown(&signed.head.hash[..6]));
+    let is_signed = if model.book.is_signed { "signed" } else { "not signed" };
+    format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.kept)
+}
+
 /// The state of the recording, its files and counts.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let row = |label: &str, value: String, role: TextRole| {
@@ -36,6 +44,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("running for", seconds(now), TextRole::Plain),
         row("events", model.events.total().to_string(), TextRole::Plain),
+        row("book", book(model), TextRole::Plain),
         Line::default(),
         Line::styled(
             " Both directions of the link, every key, command and event are recorded.",

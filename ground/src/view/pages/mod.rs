@@ -3,6 +3,7 @@
 pub mod alarms;
 pub mod ascent;
 pub mod descent;
+pub mod find;
 pub mod flying;
 pub mod help;
 pub mod landing;
@@ -61,6 +62,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Log => log::lines(model, theme, now),
         Page::Alarms => alarms::lines(model, theme, now, columns, rows),
         Page::Path => path::lines(model, theme, now),
+        Page::Find => find::lines(model, theme, now),
         Page::Values => values::lines(model, theme, now),
         Page::Plot => plot::lines(model, theme, now),
         Page::Help => help::lines(model, theme, now),

@@ -16,8 +16,8 @@ use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
-    actuators, draw_lines, event_list, flight, foremost, headline, link_line, next_event, side_view,
-    top_lines,
+    actuators, checklist, draw_lines, event_list, flight, foremost, headline, link_line, next_event,
+    side_view, top_lines,
 };
 
 /// Columns of the checks at 80 columns.
@@ -42,7 +42,11 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             Constraint::Fill(1),
         ]));
         draw_now(model, theme, now, frame, right);
-        let [events, picture] = below.layout(&Layout::horizontal([Constraint::Fill(3), Constraint::Fill(2)]));
+        let shares = if model.checklist.is_some() { [4, 4, 3] } else { [3, 0, 2] };
+        let [events, list, picture] = below.layout(&Layout::horizontal(shares.map(Constraint::Fill)));
+        if model.checklist.is_some() {
+            draw_checklist(model, theme, now, frame, list);
+        }
         draw_rehearsal(model, theme, now, frame, picture);
         (left, middle, events)
     } else {
@@ -56,8 +60,12 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         headline::draw(&foremost, theme, frame, inside);
         (left, ladder, events)
     };
-    let inside = titled(&summary(model, now).0, theme, frame, checks_area);
-    draw_lines(frame, inside, &checks(model, theme, now));
+    if model.checklist.is_some() && model.pages.checklist && !is_roomy(area) {
+        draw_checklist(model, theme, now, frame, checks_area);
+    } else {
+        let inside = titled(&summary(model, now).0, theme, frame, checks_area);
+        draw_lines(frame, inside, &checks(model, theme, now));
+    }
     let inside = titled("Arming ladder", theme, frame, ladder_area);
     draw_lines(frame, inside, &ladder(model, theme, now));
     let inside = titled("Events", theme, frame, events);
@@ -72,6 +80,12 @@ fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
     lines.push(link_line::link(model, theme, now, usize::from(inside.width)));
     draw_lines(frame, inside, &lines);
+}
+
+fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = titled(&checklist::title(model, now), theme, frame, area);
+    let size = (usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &checklist::rows(model, theme, now, size));
 }
 
 /// The landing that the vehicle has planned on the pad.
@@ -93,6 +107,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
+    if model.checklist.is_some() {
+        lines.push(Line::styled(format!(" {}", checklist::title(model, now)), theme.style(TextRole::Title)));
+        lines.extend(checklist::rows(model, theme, now, (CHECK_COLUMNS.into(), usize::from(CHECK_ROWS))));
+    }
     // Before the first command two lines may be equal.
     lines.dedup_by_key(|line| line.to_string());
     lines.extend(ladder(model, theme, now));
@@ -230,6 +248,16 @@ fn failure(check: TdCheck) -> &'static str {
     }
 }
 
+/// The rung of the checks, and of the checklist if there is one.
+fn checks_rung(model: &Model, now: Duration) -> String {
+    match model.steps_done(now) {
+        None => "every check passes".to_owned(),
+        Some((done, all)) => {
+            format!("checks; checklist {done}/{all} ({})", model.settings.keys.name(Act::Checklist))
+        }
+    }
+}
+
 /// The steps from link to countdown, and which are done.
 fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
@@ -254,7 +282,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
         (model.link.uplink.is_proven(now), "it hears us: uplink proven".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
-        (checked, "every check passes".to_owned()),
+        (checked && model.why_checklist(now).is_none(), checks_rung(model, now)),
         (armed, then(Act::Arm, "ARM")),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
         (counting, then(Act::Start, "START")),

@@ -361,6 +361,7 @@ proptest! {
     }
 }
 
+mod book;
 mod budget;
 mod crew;
 mod links;

@@ -1,0 +1,214 @@
+//! Where to look for the vehicle after a flight: the last place where it was heard, and the predicted one.
+
+use std::str::FromStr;
+use std::time::Duration;
+
+use super::Model;
+use super::dead_reckoning::predict_position;
+
+/// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
+const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
+const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
+/// The greatest latitude, degrees: close to a pole a path to the east circles the pole.
+const LATITUDE_MAX_DEG: f64 = 85.0;
+/// The error of a place where the vehicle was heard, m: usual for a satellite receiver.
+const HEARD_ERROR_M: f64 = 1.5;
+
+/// A point on the Earth, degrees, north and east positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Degrees {
+    pub latitude: f64,
+    pub longitude: f64,
+}
+
+impl FromStr for Degrees {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("`{given}` is no place; give latitude,longitude in degrees, as in 35.347,-117.809");
+        let (latitude, longitude) = given.split_once(',').ok_or_else(wrong)?;
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_no_number| wrong());
+        let (latitude, longitude) = (number(latitude)?, number(longitude)?);
+        let valid = latitude.abs() <= LATITUDE_MAX_DEG && longitude.abs() <= 180.0;
+        if valid { Ok(Self { latitude, longitude }) } else { Err(wrong()) }
+    }
+}
+
+impl Degrees {
+    /// Metres per degree of latitude and of longitude here.
+    fn metres_per_degree(self) -> (f64, f64) {
+        let latitude_rad = self.latitude.to_radians();
+        let flattened = 1.0 - ECCENTRICITY_SQUARED * libm::pow(libm::sin(latitude_rad), 2.0);
+        let across_m = EQUATORIAL_RADIUS_M / libm::sqrt(flattened);
+        let along_m = across_m * (1.0 - ECCENTRICITY_SQUARED) / flattened;
+        (along_m.to_radians(), (across_m * libm::cos(latitude_rad)).to_radians())
+    }
+
+    /// The point at a distance north and east of this one, m; exact to a millimetre within a kilometre.
+    #[must_use]
+    pub fn moved(self, north_m: f64, east_m: f64) -> Self {
+        let (north_m_deg, east_m_deg) = self.metres_per_degree();
+        Self {
+            latitude: self.latitude + north_m / north_m_deg,
+            longitude: wrapped(self.longitude + east_m / east_m_deg),
+        }
+    }
+
+    /// How far north and east another point is, m.
+    pub fn to(self, other: Self) -> (f64, f64) {
+        let (north_m_deg, east_m_deg) = self.metres_per_degree();
+        let east_deg = wrapped(other.longitude - self.longitude);
+        ((other.latitude - self.latitude) * north_m_deg, east_deg * east_m_deg)
+    }
+}
+
+/// Degrees from -180 to 180.
+fn wrapped(degrees: f64) -> f64 {
+    match degrees {
+        east if east > 180.0 => east - 360.0,
+        west if west < -180.0 => west + 360.0,
+        degrees => degrees,
+    }
+}
+
+/// A place over the ground, from the pad, and how wrong it may be.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Spot {
+    pub north_m: f64,
+    pub east_m: f64,
+    /// The radius of the circle that contains the vehicle in 19 of 20 cases, m.
+    pub error_m: f64,
+}
+
+/// The last that is known of a vehicle that has left the pad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LastPlace {
+    /// The vehicle's boot number.
+    pub boot: u32,
+    /// When it was last heard there: seconds since 1970, UTC.
+    pub heard_unix_s: u64,
+    pub heard: Spot,
+    /// Height above the pad when it was last heard, m.
+    pub height_m: f64,
+    /// Where it is predicted to be, if it fell silent in flight.
+    pub predicted: Option<Spot>,
+    /// Where the pad is, if that is known.
+    pub pad: Option<Degrees>,
+}
+
+/// The way to a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Way {
+    pub distance_m: f64,
+    /// Clockwise from true north, degrees, 0 to 360.
+    pub bearing_deg: f64,
+    /// Whether it begins at the station; otherwise at the pad.
+    pub from_station: bool,
+}
+
+impl LastPlace {
+    /// Where to look first.
+    pub fn best(&self) -> Spot {
+        self.predicted.unwrap_or(self.heard)
+    }
+
+    /// The point on the Earth of a spot, if the pad is known.
+    pub fn degrees(&self, spot: &Spot) -> Option<Degrees> {
+        self.pad.map(|pad| pad.moved(spot.north_m, spot.east_m))
+    }
+
+    /// The way to a spot from the station, or from the pad if one of the two is not known.
+    pub fn way(&self, spot: &Spot, station: Option<Degrees>) -> Way {
+        let to = self.pad.zip(station).map(|(pad, station)| {
+            let (north_m, east_m) = station.to(pad);
+            (north_m + spot.north_m, east_m + spot.east_m)
+        });
+        let (north_m, east_m) = to.unwrap_or((spot.north_m, spot.east_m));
+        let bearing_deg = libm::atan2(east_m, north_m).to_degrees();
+        Way {
+            distance_m: libm::hypot(north_m, east_m),
+            bearing_deg: if bearing_deg < 0.0 { bearing_deg + 360.0 } else { bearing_deg },
+            from_station: to.is_some(),
+        }
+    }
+}
+
+impl Model {
+    /// The last that is known of the vehicle in this flight; `None` before it left the pad.
+    pub fn last_place(&self, now: Duration) -> Option<LastPlace> {
+        let motion = self.vehicle.best_motion()?;
+        let left_at = self.vehicle.left_pad_at?;
+        if motion.received_at < left_at {
+            return None;
+        }
+        let predicted = predict_position(&self.vehicle, now).map(|at| Spot {
+            north_m: at.x_m,
+            east_m: at.y_m,
+            error_m: at.error_m,
+        });
+        Some(LastPlace {
+            boot: self.vehicle.boot.number().unwrap_or(0),
+            heard_unix_s: self.settings.start_unix_s + motion.received_at.as_secs(),
+            heard: Spot { north_m: motion.value.x_m, east_m: motion.value.y_m, error_m: HEARD_ERROR_M },
+            height_m: motion.value.altitude_m,
+            predicted,
+            pad: self.settings.pad,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAD: Degrees = Degrees { latitude: 45.0, longitude: 10.0 };
+
+    /// Length of a degree of latitude and of longitude at 45 degrees north on WGS 84, m: 111,131.75 and 78,846.81.
+    #[test]
+    fn val_wgs84_a_hundredth_of_a_degree_is_as_long_as_it_should_be() {
+        let moved = PAD.moved(1_111.317_5, 788.468_1);
+        assert!((moved.latitude - 45.01).abs() < 1e-7 && (moved.longitude - 10.01).abs() < 1e-7, "{moved:?}");
+        let (north_m, east_m) = PAD.to(moved);
+        assert!((north_m - 1_111.317_5).abs() < 1e-6 && (east_m - 788.468_1).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_way_is_from_the_station_if_both_places_are_known() {
+        let spot = Spot { north_m: 0.0, east_m: 100.0, error_m: 5.0 };
+        let place = LastPlace {
+            boot: 1,
+            heard_unix_s: 0,
+            heard: spot,
+            height_m: 3.0,
+            predicted: None,
+            pad: Some(PAD),
+        };
+        let way = place.way(&spot, None);
+        assert!(
+            !way.from_station
+                && (way.bearing_deg - 90.0).abs() < 1e-9
+                && (way.distance_m - 100.0).abs() < 1e-9
+        );
+        // The station is 100 m north of the pad: the vehicle is south-east of it.
+        let way = place.way(&spot, Some(PAD.moved(100.0, 0.0)));
+        assert!(way.from_station && (way.bearing_deg - 135.0).abs() < 1e-3, "{way:?}");
+        let west = place.way(&Spot { north_m: 0.0, east_m: -1.0, error_m: 0.0 }, None);
+        assert!((west.bearing_deg - 270.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_place_is_two_numbers_in_degrees() {
+        assert_eq!("35.347,-117.809".parse(), Ok(Degrees { latitude: 35.347, longitude: -117.809 }));
+        for wrong in ["", "1", "91,0", "0,181", "a,b", "nan,0", "1,2,3"] {
+            assert!(wrong.parse::<Degrees>().unwrap_err().contains("35.347,-117.809"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_path_across_the_date_line_is_short() {
+        let (_, east_m) =
+            Degrees { latitude: 0.0, longitude: 179.9 }.to(Degrees { latitude: 0.0, longitude: -179.9 });
+        assert!((east_m - 22_263.9).abs() < 1.0, "{east_m}");
+    }
+}

@@ -1,0 +1,121 @@
+//! After the flight: the flight again, its report, and where to look for the vehicle.
+
+use ground::key::Key;
+use ground::model::place::{Degrees, LastPlace};
+use ground::model::{Role, Settings};
+use ground::update::{Action, Msg, Request};
+use protocol::dialect::TdPhase;
+
+use crate::rig::{Rig, settings};
+
+const PAD: Degrees = Degrees { latitude: 35.347, longitude: -117.809 };
+
+fn station(role: Role) -> Rig {
+    let mut rig =
+        Rig::new(Settings { role, pad: Some(PAD), start_unix_s: 1_800_000_000, ..settings(false, true) });
+    rig.run(1.0);
+    rig
+}
+
+/// Falls at 20 m/s from 200 m, 30 m north of the pad.
+fn falling(role: Role) -> Rig {
+    let mut rig = station(role);
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.run(0.5);
+    for k in 0..20_u8 {
+        rig.state_in_space([30.0, 5.0, 200.0 - 2.0 * f32::from(k)], [0.0, 0.0, -20.0], (200.0, 4.0));
+        rig.run(0.1);
+    }
+    rig
+}
+
+fn asks(rig: &mut Rig, key: char) -> Vec<Action> {
+    rig.actions.clear();
+    rig.key(Key::Char(key));
+    let asked = |action: &Action| {
+        matches!(action, Action::ReplayFlight | Action::WriteReport | Action::Request(Request::Report))
+    };
+    rig.actions.iter().filter(|action| asked(action)).cloned().collect()
+}
+
+#[test]
+fn replay_and_report_wait_for_the_end_of_a_flight() {
+    let mut rig = station(Role::Station);
+    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
+    assert!(rig.events().contains("no replay: no flight has been flown yet"), "{}", rig.events());
+    let mut rig = falling(Role::Station);
+    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
+    assert!(rig.events().contains("no report: the vehicle is armed or in flight"), "{}", rig.events());
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.run(1.0);
+    assert_eq!(asks(&mut rig, 'R'), [Action::ReplayFlight]);
+    assert_eq!(asks(&mut rig, 'W'), [Action::WriteReport]);
+    rig.msg(Msg::Report(Ok("flight.html".to_owned())));
+    assert!(rig.events().contains("the report is written: flight.html"));
+    rig.armed = true;
+    rig.heartbeat();
+    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
+}
+
+#[test]
+fn an_attached_screen_replays_itself_and_asks_the_station_for_the_report() {
+    for (role, report) in
+        [(Role::Attached, vec![Action::Request(Request::Report)]), (Role::Watching, Vec::new())]
+    {
+        let mut rig = falling(role);
+        rig.phase = TdPhase::TD_PHASE_SAFED;
+        rig.run(1.0);
+        assert_eq!(asks(&mut rig, 'R'), [Action::ReplayFlight]);
+        assert_eq!(asks(&mut rig, 'W'), report);
+    }
+}
+
+fn kept(rig: &Rig) -> Vec<LastPlace> {
+    let place = |action: &Action| match action {
+        Action::KeepPlace(place) => Some(**place),
+        _ => None,
+    };
+    rig.actions.iter().filter_map(place).collect()
+}
+
+#[test]
+fn the_last_place_is_kept_in_flight_and_predicted_after_the_loss() {
+    let mut rig = station(Role::Station);
+    rig.state(0.0, 0.0, 0.0, 0.0, 90.0);
+    rig.run(5.0);
+    assert_eq!(kept(&rig), [], "on the pad there is nothing to look for");
+    let mut rig = falling(Role::Station);
+    let places = kept(&rig);
+    assert!((1..=2).contains(&places.len()), "every 2 s: {places:?}");
+    assert!(places[0].predicted.is_none() && (places[0].heard.north_m - 30.0).abs() < 0.1);
+    rig.speaks = false;
+    rig.actions.clear();
+    rig.run(20.0);
+    let places = kept(&rig);
+    let last = places.last().unwrap();
+    let predicted = last.predicted.unwrap();
+    assert!(predicted.error_m > last.heard.error_m && last.heard_unix_s <= 1_800_000_004, "{last:?}");
+    assert!((places.len()) <= 11, "{}", places.len());
+    rig.key(Key::Char('f'));
+    for (columns, rows) in [(80, 24), (140, 45), (200, 60)] {
+        let screen = rig.screen(columns, rows);
+        for words in ["PREDICTED: look here first", "from the pad", "bearing 0", "19 of 20 cases", "35.347"] {
+            assert!(screen.contains(words), "{words}: {screen}");
+        }
+    }
+}
+
+#[test]
+fn a_place_from_before_a_restart_is_shown_with_the_way_from_the_station() {
+    let place = *kept(&falling(Role::Station)).last().unwrap();
+    // 40 m south of the pad.
+    let here = Some(PAD.moved(-40.0, 5.0));
+    let mut rig =
+        Rig::new(Settings { pad: Some(PAD), here, start_unix_s: 1_800_000_100, ..settings(false, true) });
+    rig.msg(Msg::Place(Box::new(place)));
+    rig.run(1.0);
+    rig.key(Key::Char('f'));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("from here") && screen.contains("70 m, bearing 000 deg"), "{screen}");
+    assert!(screen.contains("boot 1A2B3C4D"), "{screen}");
+}

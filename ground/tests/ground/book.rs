@@ -1,0 +1,124 @@
+//! What is entered into the station's book, and how the vehicle is told its end.
+
+use ground::key::Key;
+use ground::model::action::BookLine;
+use ground::update::{Action, Msg};
+use protocol::book::{Book, Line, SignedHead};
+use protocol::dialect::{
+    MavCmd, MavMessage, TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TD_OPERATOR_DATA, TdAct, TdRole,
+};
+use protocol::identity::GROUND;
+
+use crate::rig::{Rig, typed};
+
+fn entered(rig: &Rig) -> Vec<BookLine> {
+    let line = |action: &Action| match action {
+        Action::Enter(line) => Some(line.clone()),
+        _ => None,
+    };
+    rig.actions.iter().filter_map(line).collect()
+}
+
+fn has(rig: &Rig, kind: &str, words: &str) -> usize {
+    entered(rig).iter().filter(|line| line.kind == kind && line.text.contains(words)).count()
+}
+
+#[test]
+fn keys_commands_answers_and_what_the_vehicle_shows_are_entered_once() {
+    let mut rig = Rig::crewed();
+    rig.actions.clear();
+    rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    rig.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
+    rig.armed = true;
+    rig.run(2.0);
+    rig.text("pin is out");
+    assert_eq!(has(&rig, "key", "Enter"), 1);
+    assert_eq!(has(&rig, "commanded", "ARM commanded, attempt 1"), 1);
+    assert_eq!(has(&rig, "acknowledged", "ARM acknowledged"), 1);
+    assert_eq!(has(&rig, "observed", "ARM observed"), 1);
+    assert_eq!(has(&rig, "event", "armed (HEARTBEAT)"), 1);
+    assert_eq!(has(&rig, "vehicle says", "pin is out"), 1);
+    let doubled = entered(&rig).iter().filter(|line| line.text.contains("ARM acknowledged")).count();
+    assert_eq!(doubled, 1, "{:?}", entered(&rig));
+}
+
+#[test]
+fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
+    let mut rig = Rig::crewed();
+    let mut name = [0; 16];
+    name[..3].copy_from_slice(b"Bob");
+    rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        number: 2,
+        role: TdRole::TD_ROLE_FLIGHT,
+        name: name.into(),
+    }));
+    let crew = TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() };
+    rig.hear(&MavMessage::TD_CREW(crew.clone()));
+    let ask = TD_CREW_DATA {
+        act: TdAct::TD_ACT_ARM,
+        ask_number: 4_711,
+        asked_by: 2,
+        ask_left_ms: 9_000,
+        ..crew.clone()
+    };
+    rig.hear(&MavMessage::TD_CREW(ask.clone()));
+    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { ask_left_ms: 8_000, ..ask }));
+    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, held_by: 2, ..crew }));
+    assert_eq!(has(&rig, "vehicle says", "key 2: asks to arm (ask 4711)"), 1);
+    let by = entered(&rig).into_iter().find(|line| line.text.contains("is in command")).unwrap();
+    assert_eq!(by.who, "FLIGHT Bob");
+    assert_eq!(has(&rig, "vehicle says", "key 2: held the countdown"), 1);
+}
+
+fn heads(rig: &mut Rig) -> Vec<TD_BOOK_HEAD_DATA> {
+    let head = |action: &Action| match action {
+        Action::Send(message) => match &**message {
+            MavMessage::TD_BOOK_HEAD(head) => Some(head.clone()),
+            _ => None,
+        },
+        _ => None,
+    };
+    let found = rig.actions.iter().filter_map(head).collect();
+    rig.actions.clear();
+    found
+}
+
+#[test]
+fn the_vehicle_is_told_the_end_until_it_confirms_it() {
+    let mut rig = Rig::crewed();
+    let mut book = Book::default();
+    book.enter(&Line { unix_ns: 1, kind: "opened", who: "", text: "" });
+    let head = SignedHead { head: book.head().unwrap(), signature: [1; 64] };
+    rig.actions.clear();
+    rig.msg(Msg::Book { head, is_signed: true });
+    rig.run(5.0);
+    let sent = heads(&mut rig);
+    assert!((2..=3).contains(&sent.len()), "every 2 s: {}", sent.len());
+    assert!(SignedHead::of_message(&sent[0]) == head && sent[0].target_system == 1);
+    let kept = TD_BOOK_KEPT_DATA {
+        book: head.head.book,
+        entries: 1,
+        target_system: GROUND.system_id,
+        target_component: GROUND.component_id,
+    };
+    // Of another book, to another station, and of entries that do not exist.
+    for wrong in [
+        TD_BOOK_KEPT_DATA { book: 1, ..kept.clone() },
+        TD_BOOK_KEPT_DATA { target_system: 7, ..kept.clone() },
+        TD_BOOK_KEPT_DATA { entries: 9, ..kept.clone() },
+    ] {
+        rig.hear(&MavMessage::TD_BOOK_KEPT(wrong));
+    }
+    rig.run(3.0);
+    assert!(!heads(&mut rig).is_empty());
+    rig.hear(&MavMessage::TD_BOOK_KEPT(kept));
+    rig.run(5.0);
+    assert!(heads(&mut rig).is_empty());
+    rig.key(Key::Char('8'));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("1 entries, head") && screen.contains("signed; 1 at the vehicle"), "{screen}");
+    // A vehicle that was switched on again has a new log.
+    rig.boot_number += 1;
+    rig.run(3.0);
+    assert!(!heads(&mut rig).is_empty());
+}

@@ -1,0 +1,27 @@
+//! Whether a station that arms is prepared for the mission that this vehicle flies.
+
+use flight::computer::crew::Asked;
+use protocol::command::CommandRequest;
+use protocol::mission::Expected;
+
+use crate::commands::Command;
+use crate::vehicle::Vehicle;
+
+/// Why the station expects another mission; `None` if it expects this one or says nothing of it.
+pub(super) fn why_other(request: &CommandRequest, asked: &Command, vehicle: &Vehicle) -> Option<String> {
+    if *asked != Command::Vehicle(Asked::Arm) {
+        return None;
+    }
+    let [.., param4, param5, param6, param7] = request.params;
+    let flies = vehicle.mission();
+    match Expected::of_params([param4, param5, param6, param7]) {
+        Expected::Any => None,
+        Expected::Hash(expected) if expected == flies.hash => None,
+        Expected::Hash(expected) => {
+            Some(format!("arm refused: this vehicle flies {} {}, not {expected}", flies.name, flies.hash))
+        }
+        Expected::Unreadable => {
+            Some("arm refused: parameters 4 to 7 are no mission's hash (0 for any mission)".to_owned())
+        }
+    }
+}
