@@ -11,7 +11,8 @@
 //! 6. [`replay`]: plays a recorded flight through the same `update` on the same screens.
 //! 7. [`demo`]: runs the embedded simulator for the demonstration.
 //! 8. [`cli`] reads the command line, [`config`] the settings file; [`key`] names the keys that have a
-//!    meaning, and [`exit`] decides the exit code.
+//!    meaning, and [`exit`] decides the exit code. [`checklist_file`] reads a checklist and its signatures,
+//!    [`place_file`] the last place of a lost vehicle.
 //!
 //! Imports go one way: `app` -> `update` -> `model`, and `app` -> `view` -> `model`.
 
