@@ -245,7 +245,7 @@ fn operator_to_log(operator: &Operator) -> v1::Operator {
     v1::Operator {
         number: u32::from(operator.number),
         role: u32::from(operator.role as u8),
-        name: operator.name.as_str().to_owned(),
+        name: operator.name.as_str().into(),
     }
 }
 
