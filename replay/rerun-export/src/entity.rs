@@ -60,3 +60,28 @@ pub const REPORT: &str = "report";
 pub const TIMELINE_FLIGHT_TIME: &str = "flight_time";
 /// Name of the timeline of controller ticks.
 pub const TIMELINE_TICK: &str = "tick";
+
+/// Name below which the entities of a second flight lie, in the first part of their path and in each plot.
+pub const BESIDE: &str = "beside";
+
+/// The path of the second flight's entity: `world/rocket` becomes `world/beside/rocket`, and `plots/x_m/true` becomes
+/// `plots/x_m/beside/true`, so that both flights are in the same views.
+pub fn beside(path: &str) -> String {
+    let parts: Vec<&str> = path.trim_start_matches('/').split('/').collect();
+    let shared = if parts.first() == Some(&PLOTS) { 2 } else { 1 };
+    let (shared, own) = parts.split_at(shared.min(parts.len()));
+    let all: Vec<&str> = shared.iter().chain([&BESIDE]).chain(own).copied().collect();
+    all.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_flight_lies_in_the_views_of_the_first() {
+        assert_eq!(beside(ROCKET), "world/beside/rocket");
+        assert_eq!(beside("/plots/x_m/true"), "plots/x_m/beside/true");
+        assert_eq!(beside(REPORT), "report/beside");
+    }
+}

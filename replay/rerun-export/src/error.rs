@@ -30,6 +30,13 @@ pub enum ExportError {
         /// Error from Rerun.
         reason: String,
     },
+    /// No viewer takes the recording.
+    #[error("{address}: no Rerun viewer takes the recording ({reason}); start one with `rerun`")]
+    NoViewer {
+        address: String,
+        /// Error from Rerun.
+        reason: String,
+    },
     /// Rerun refuses a record.
     #[error("Rerun refused a record")]
     Record(#[from] RecordingStreamError),

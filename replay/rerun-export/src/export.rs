@@ -1,5 +1,6 @@
 //! Exports a log into a recording, record by record.
 
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 
 use flight::guidance::controller::ControlLevel;
@@ -15,12 +16,12 @@ use crate::again::{Again, FrameAgain};
 use crate::identity;
 use crate::layout::send_layout;
 use crate::plot_list::{FROM_APOGEE, PLANAR, Plot, limits_of};
-use crate::plots::Plots;
+use crate::plots::{Plots, Whose};
 use crate::pose::{
     Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket, world_from_rocket_in_space,
 };
-use crate::rrd::RrdWriter;
-use crate::scene::{Scene, Seen};
+use crate::rrd::{Batches, RrdWriter};
+use crate::scene::{Extent, Scene, Seen};
 use crate::survey::{PoseSource, StampedEvent, Survey};
 use crate::times::Times;
 use crate::words;
@@ -45,6 +46,15 @@ pub struct Exported {
     pub damage: Option<String>,
 }
 
+/// When a log is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// After the flight; the survey has seen all of it.
+    Afterwards,
+    /// While it is being written; the survey has seen its beginning.
+    Live,
+}
+
 /// Writes the recording of a log to any output.
 ///
 /// # Errors
@@ -54,16 +64,74 @@ pub fn export<R: Read, W: Write + Send + 'static>(
     survey: &Survey,
     output: W,
 ) -> Result<(Exported, W), ExportError> {
-    let writer = RrdWriter::new(identity::builder(log.name(), survey), output)?;
-    let exported = Export::new(writer.recording(), survey)?.run(log)?;
+    let writer = RrdWriter::new(identity::builder(log.name(), survey), output, Batches::Large)?;
+    let exported = fill(writer.recording(), log, survey, Pace::Afterwards)?;
     Ok((exported, writer.finish()?))
+}
+
+/// Writes two flights into one recording: the second one in other colours, below the first one's entities, on the same
+/// clock. What was done with the second log is the second answer.
+///
+/// # Errors
+/// As [`export`].
+pub fn export_two<R: Read, W: Write + Send + 'static>(
+    (log, survey): (&mut FlightLog<R>, &Survey),
+    (other, other_survey): (&mut FlightLog<R>, &Survey),
+    output: W,
+) -> Result<(Exported, Exported, W), ExportError> {
+    let builder = || identity::builder(log.name(), survey);
+    let writer = RrdWriter::new(builder(), output, Batches::Large)?;
+    let below = writer.beside(builder())?;
+    let (of_other, beside) =
+        Export::new(&below, other_survey, Whose::Beside, Pace::Afterwards)?.run(other)?;
+    below.flush_blocking().map_err(|error| ExportError::Encode { reason: error.to_string() })?;
+    let recording = writer.recording();
+    let (done, own) = Export::new(recording, survey, Whose::Own, Pace::Afterwards)?.run(log)?;
+    let shown = Shown { extent: own.extent.around(&beside.extent), ..own };
+    shown.send(recording)?;
+    Ok((done, of_other, writer.finish()?))
+}
+
+/// Fills a recording with a log.
+pub(crate) fn fill<R: Read>(
+    recording: &RecordingStream,
+    log: &mut FlightLog<R>,
+    survey: &Survey,
+    pace: Pace,
+) -> Result<Exported, ExportError> {
+    let (done, shown) = Export::new(recording, survey, Whose::Own, pace)?.run(log)?;
+    shown.send(recording)?;
+    Ok(done)
+}
+
+/// What the layout depends on.
+pub(crate) struct Shown {
+    extent: Extent,
+    plots: Vec<&'static Plot>,
+    phases_as_text: bool,
+}
+
+impl Shown {
+    /// Everything that a flight may have, in the space where it is expected.
+    pub(crate) fn expected(survey: &Survey) -> Self {
+        let known: &'static [Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
+        Self { extent: Extent::expected(survey), plots: known.iter().collect(), phases_as_text: true }
+    }
+
+    pub(crate) fn send(&self, recording: &RecordingStream) -> RecordingStreamResult<()> {
+        send_layout(recording, identity::APPLICATION, &self.extent, &self.plots, self.phases_as_text)
+    }
 }
 
 /// An export in progress.
 struct Export<'a> {
     recording: &'a RecordingStream,
     survey: &'a Survey,
-    waiting: std::iter::Peekable<std::slice::Iter<'a, StampedEvent>>,
+    whose: Whose,
+    pace: Pace,
+    /// The best source of the pose so far.
+    pose_source: PoseSource,
+    waiting: VecDeque<StampedEvent>,
     times: Times,
     scene: Scene<'a>,
     plots: Plots<'a>,
@@ -75,14 +143,23 @@ struct Export<'a> {
 }
 
 impl<'a> Export<'a> {
-    fn new(recording: &'a RecordingStream, survey: &'a Survey) -> Result<Self, ExportError> {
+    fn new(
+        recording: &'a RecordingStream,
+        survey: &'a Survey,
+        whose: Whose,
+        pace: Pace,
+    ) -> Result<Self, ExportError> {
         Ok(Self {
             recording,
             survey,
-            waiting: survey.events.iter().peekable(),
+            whose,
+            pace,
+            pose_source: survey.pose_source,
+            // A log that is being written tells its events one by one.
+            waiting: if pace == Pace::Live { VecDeque::new() } else { survey.events.clone().into() },
             times: Times::default(),
-            scene: Scene::new(recording, survey)?,
-            plots: Plots::new(recording),
+            scene: Scene::new(recording, survey, whose)?,
+            plots: Plots::new(recording, whose),
             again: Again::of(survey),
             planning: false,
             verdict: None,
@@ -94,11 +171,12 @@ impl<'a> Export<'a> {
         })
     }
 
-    fn run<R: Read>(mut self, log: &mut FlightLog<R>) -> Result<Exported, ExportError> {
+    fn run<R: Read>(mut self, log: &mut FlightLog<R>) -> Result<(Exported, Shown), ExportError> {
         while let Some(StampedEntry { entry, log_time_ns, sequence, .. }) = log.next_entry()? {
             if self.times.known() {
                 self.events_until(log_time_ns)?;
             }
+            self.pose_source = self.pose_source.max(source_of(&entry));
             match entry {
                 Entry::Tick(tick) => self.tick(&tick, log_time_ns)?,
                 Entry::Truth(truth) => self.truth(&truth, log_time_ns)?,
@@ -120,6 +198,9 @@ impl<'a> Export<'a> {
                     self.plots.timing(&timing)?;
                 }
                 Entry::World(truth) => self.world(&truth, log_time_ns)?,
+                Entry::Event(event) if self.pace == Pace::Live => {
+                    self.waiting.push_back(StampedEvent::of(&event, log_time_ns));
+                }
                 Entry::ComputerStart(_)
                 | Entry::ComputerFrame(_)
                 | Entry::Estimate(_)
@@ -131,7 +212,7 @@ impl<'a> Export<'a> {
         }
         self.events_until(u64::MAX)?;
         self.done.damage = log.damage().map(ToString::to_string);
-        if let Some(span) = self.times.span() {
+        if let Some(span) = self.times.span().filter(|_| self.whose == Whose::Own) {
             self.plots.limits(&limits_of(self.survey, self.verdict.as_ref()), span)?;
         }
         let Self { recording, survey, scene, verdict, plots, again, done, .. } = self;
@@ -139,10 +220,12 @@ impl<'a> Export<'a> {
         let remarks = words::Remarks { damage: done.damage.as_deref(), again: again.as_deref() };
         words::report(recording, log.name(), survey, verdict.as_ref(), remarks)?;
         let extent = scene.finish()?;
-        let known: &[Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
-        let shown: Vec<&Plot> = known.iter().filter(|plot| plots.has(plot)).collect();
-        send_layout(recording, identity::APPLICATION, &extent, &shown, survey.events.is_empty())?;
-        Ok(done)
+        let known: &'static [Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
+        let plots = known.iter().filter(|plot| plots.has(plot)).collect();
+        Ok((
+            done,
+            Shown { extent, plots, phases_as_text: self.pace == Pace::Live || survey.events.is_empty() },
+        ))
     }
 
     fn tick(&mut self, tick: &ControllerTick, log_time_ns: u64) -> RecordingStreamResult<()> {
@@ -151,7 +234,7 @@ impl<'a> Export<'a> {
         self.times.at_vehicle_time(self.recording, tick.input.time_s);
         self.done.ticks += 1;
         self.phase(tick.input.phase)?;
-        let alone = self.survey.pose_source == PoseSource::Estimate;
+        let alone = self.pose_source == PoseSource::Estimate;
         self.plots.tick(tick, alone)?;
         let again = self.run_again(|again| again.tick(tick))?;
         self.scene.plan(tick, again.as_ref())?;
@@ -227,7 +310,7 @@ impl<'a> Export<'a> {
     fn telemetry(&mut self, telemetry: &Telemetry, log_time_ns: u64) -> RecordingStreamResult<()> {
         self.times.learn(telemetry.time_s, log_time_ns);
         self.times.at_vehicle_time(self.recording, telemetry.time_s);
-        let alone = self.survey.pose_source == PoseSource::Telemetry;
+        let alone = self.pose_source == PoseSource::Telemetry;
         self.plots.telemetry(telemetry, alone)?;
         if !alone {
             return Ok(());
@@ -274,11 +357,21 @@ impl<'a> Export<'a> {
 
     /// Events have log time only, so they wait until log time can be converted to vehicle time.
     fn events_until(&mut self, log_time_ns: u64) -> RecordingStreamResult<()> {
-        while let Some(event) = self.waiting.next_if(|event| event.log_time_ns <= log_time_ns) {
+        while let Some(event) = self.waiting.pop_front_if(|event| event.log_time_ns <= log_time_ns) {
             self.times.at_log_time(self.recording, event.log_time_ns);
-            words::event(self.recording, event)?;
+            words::event(self.recording, &event)?;
             self.done.events += 1;
         }
         Ok(())
+    }
+}
+
+/// The pose that a record brings.
+fn source_of(entry: &Entry) -> PoseSource {
+    match entry {
+        Entry::World(_) | Entry::Truth(_) => PoseSource::Truth,
+        Entry::Tick(_) => PoseSource::Estimate,
+        Entry::Telemetry(_) => PoseSource::Telemetry,
+        _ => PoseSource::None,
     }
 }

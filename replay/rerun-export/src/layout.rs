@@ -77,7 +77,7 @@ impl Layout<'_> {
         let close_up = self.close_up(extent)?;
         let spaces = self.container(ContainerKind::Horizontal, &[&overview, &close_up], &[3.0, 2.0])?;
         let states = self.view("StateTimeline", "Phase and control level", "states", &["$origin/**"], &[])?;
-        let mut texts = vec!["+ /log/events", "+ /log/replay", "+ /log/verdict"];
+        let mut texts = vec!["+ /log/events", "+ /log/replay", "+ /log/verdict", "+ /log/beside/**"];
         if phases_as_text {
             texts.push("+ /log/phases");
         }

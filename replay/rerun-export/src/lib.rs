@@ -4,6 +4,7 @@
 //! In reading order:
 //!
 //! * [`export`]: writes a log into a recording; [`export_file`] writes it into an `.rrd` file.
+//! * [`follow_file`]: the same while the log is being written, into a growing file or a running viewer.
 //! * [`survey`]: reads the log once before the export, for facts that the first record already needs.
 //! * [`entity`]: the entity paths of the recording, with their units.
 //! * [`pose`]: converts the planar state to the viewer's space.
@@ -19,6 +20,7 @@ mod error;
 pub mod export;
 mod file;
 mod flown;
+mod follow;
 mod identity;
 mod layout;
 mod plot_list;
@@ -29,8 +31,11 @@ mod scene;
 mod shape;
 pub mod survey;
 mod times;
+mod viewer;
 mod words;
 
 pub use error::ExportError;
 pub use export::Exported;
-pub use file::{Overwrite, export_file};
+pub use file::{Overwrite, export_file, export_file_with, send_file};
+pub use follow::{Growing, Towards, follow_file};
+pub use viewer::DEFAULT_ADDRESS;

@@ -22,6 +22,18 @@ const ORANGE: Rgba32 = Rgba32::from_rgb(255, 176, 59);
 const GREEN: Rgba32 = Rgba32::from_rgb(120, 200, 130);
 const VIOLET: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const RED: Rgba32 = Rgba32::from_rgb(200, 70, 70);
+const PINK: Rgba32 = Rgba32::from_rgb(255, 120, 190);
+const BROWN: Rgba32 = Rgba32::from_rgb(190, 130, 90);
+const TURQUOISE: Rgba32 = Rgba32::from_rgb(80, 200, 200);
+
+/// Which of two flights in one recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Whose {
+    /// The flight that the recording is of.
+    Own,
+    /// The one that is drawn beside it.
+    Beside,
+}
 
 /// The source of a line in a plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,15 +66,19 @@ impl Line {
         }
     }
 
-    fn style(self) -> SeriesLines {
-        let (color, width) = match self {
-            Self::Truth | Self::Actual | Self::Measured => (BLUE, 1.5),
-            Self::Estimate | Self::Commanded => (ORANGE, 1.0),
-            Self::Telemetry => (GREEN, 1.0),
-            Self::Replayed => (VIOLET, 0.75),
-            Self::Deadline | Self::Lowest | Self::Highest => (RED, 0.75),
+    fn style(self, whose: Whose) -> SeriesLines {
+        let (own, beside, width) = match self {
+            Self::Truth | Self::Actual | Self::Measured => (BLUE, PINK, 1.5),
+            Self::Estimate | Self::Commanded => (ORANGE, BROWN, 1.0),
+            Self::Telemetry => (GREEN, TURQUOISE, 1.0),
+            Self::Replayed => (VIOLET, BROWN, 0.75),
+            Self::Deadline | Self::Lowest | Self::Highest => (RED, RED, 0.75),
         };
-        let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([self.name()]);
+        let (color, name) = match whose {
+            Whose::Own => (own, self.name().to_owned()),
+            Whose::Beside => (beside, format!("{} (beside)", self.name())),
+        };
+        let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([name]);
         // The decision of a tick holds until the next tick.
         let steps = matches!(self, Self::Commanded | Self::Measured | Self::Replayed);
         if steps { style.with_interpolation_mode(InterpolationMode::StepAfter) } else { style }
@@ -72,6 +88,7 @@ impl Line {
 /// The plots being recorded.
 pub(crate) struct Plots<'a> {
     recording: &'a RecordingStream,
+    whose: Whose,
     styled: BTreeSet<String>,
     level: Option<u32>,
     level_replayed: Option<u32>,
@@ -79,8 +96,8 @@ pub(crate) struct Plots<'a> {
 }
 
 impl<'a> Plots<'a> {
-    pub(crate) fn new(recording: &'a RecordingStream) -> Self {
-        Self { recording, styled: BTreeSet::new(), level: None, level_replayed: None, phase: None }
+    pub(crate) fn new(recording: &'a RecordingStream, whose: Whose) -> Self {
+        Self { recording, whose, styled: BTreeSet::new(), level: None, level_replayed: None, phase: None }
     }
 
     /// Records the true state of the plant.
@@ -240,7 +257,7 @@ impl<'a> Plots<'a> {
     fn draw(&mut self, plot: &str, line: Line, value: f64) -> RecordingStreamResult<()> {
         let path = format!("{}/{plot}/{}", entity::PLOTS, line.name());
         if !self.styled.contains(&path) {
-            self.recording.log_static(path.as_str(), &line.style())?;
+            self.recording.log_static(path.as_str(), &line.style(self.whose))?;
             self.styled.insert(path.clone());
         }
         self.recording.log(path, &Scalars::single(value))

@@ -11,6 +11,7 @@ use re_sdk_types::datatypes::{Quaternion, Rgba32};
 
 use crate::entity;
 use crate::flown::FlownPath;
+use crate::plots::Whose;
 use crate::pose::{Pose, path_in_world_m};
 use crate::shape::RocketShape;
 use crate::survey::Survey;
@@ -25,6 +26,8 @@ const PREDICTED: Rgba32 = Rgba32::from_rgb(255, 205, 70);
 const REPLAYED: Rgba32 = Rgba32::from_rgb(190, 150, 255);
 const REHEARSED: Rgba32 = Rgba32::from_rgb(150, 140, 90);
 const FIRST_PLAN: Rgba32 = Rgba32::from_rgb(120, 95, 40);
+const FLOWN_BESIDE: Rgba32 = Rgba32::from_rgb(122, 84, 102);
+const TRAIL_BESIDE: Rgba32 = Rgba32::from_rgb(255, 120, 190);
 
 /// Pose and thrust of the rocket.
 #[derive(Debug, Clone, Copy)]
@@ -50,9 +53,48 @@ pub(crate) struct Extent {
     pub(crate) rocket_m: f32,
 }
 
+impl Extent {
+    /// Where a flight is expected before it is flown: between the height of its start and the pad.
+    pub(crate) fn expected(survey: &Survey) -> Self {
+        let shape = shape_of(survey);
+        let top_m = match (&survey.mission, &survey.profile) {
+            (Some(mission), _) => mission.start.height_m as f32,
+            (None, Some(profile)) => profile.start.altitude_m as f32,
+            (None, None) => 4.0 * shape.length_m(),
+        };
+        Self { top_m, x_m: (0.0, 0.0), ground_z_m: ground_z_m(survey, &shape), rocket_m: shape.length_m() }
+    }
+
+    /// The space around this one and another.
+    pub(crate) fn around(&self, other: &Self) -> Self {
+        Self {
+            top_m: self.top_m.max(other.top_m),
+            x_m: (self.x_m.0.min(other.x_m.0), self.x_m.1.max(other.x_m.1)),
+            ground_z_m: self.ground_z_m.min(other.ground_z_m),
+            rocket_m: self.rocket_m,
+        }
+    }
+}
+
+/// The altitude of a planar landing is 0 when it stands; heights from apogee are above the pad.
+fn ground_z_m(survey: &Survey, shape: &RocketShape) -> f32 {
+    if survey.from_apogee { 0.0 } else { -shape.standing_height_m() }
+}
+
+fn shape_of(survey: &Survey) -> RocketShape {
+    match (&survey.profile, &survey.mission) {
+        (Some(profile), _) => RocketShape::of(&profile.vehicle),
+        (None, Some(mission)) => {
+            RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
+        }
+        (None, None) => RocketShape::unknown(),
+    }
+}
+
 /// The space being recorded.
 pub(crate) struct Scene<'a> {
     recording: &'a RecordingStream,
+    whose: Whose,
     shape: RocketShape,
     ground_z_m: f32,
     gravity_m_s2: f64,
@@ -62,23 +104,20 @@ pub(crate) struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     /// Records the objects that never move.
-    pub(crate) fn new(recording: &'a RecordingStream, survey: &Survey) -> RecordingStreamResult<Self> {
+    pub(crate) fn new(
+        recording: &'a RecordingStream,
+        survey: &Survey,
+        whose: Whose,
+    ) -> RecordingStreamResult<Self> {
         let profile = survey.profile.as_ref();
-        let shape = match (profile, &survey.mission) {
-            (Some(profile), _) => RocketShape::of(&profile.vehicle),
-            (None, Some(mission)) => {
-                RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
-            }
-            (None, None) => RocketShape::unknown(),
-        };
+        let shape = shape_of(survey);
         recording.log_static(entity::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         recording.log_static(entity::BODY, &shape.body())?;
         recording.log_static(entity::LEGS, &shape.legs())?;
         recording.log_static(entity::BELL, &shape.bell())?;
         let marker = Points3D::new([[0.0; 3]]).with_colors([MARKER]);
         recording.log_static(entity::MARKER, &marker.with_radii([Radius::new_ui_points(5.0)]))?;
-        // The altitude of a planar landing is 0 when it stands; heights from apogee are above the pad.
-        let ground_z_m = if survey.from_apogee { 0.0 } else { -shape.standing_height_m() };
+        let ground_z_m = ground_z_m(survey, &shape);
         let pad_m = shape.length_m();
         let cross = [[[-pad_m, 0.0], [pad_m, 0.0]], [[0.0, -pad_m], [0.0, pad_m]]]
             .map(|ends| ends.map(|[x, y]| [x, y, ground_z_m]).to_vec());
@@ -100,6 +139,7 @@ impl<'a> Scene<'a> {
             .unwrap_or(STANDARD_GRAVITY_M_S2);
         Ok(Self {
             recording,
+            whose,
             shape,
             ground_z_m,
             gravity_m_s2,
@@ -128,7 +168,8 @@ impl<'a> Scene<'a> {
         }
         let here_m = seen.rocket.translation_m;
         if let Some(from_m) = self.flown.push(here_m) {
-            let piece = LineStrips3D::new([vec![from_m, here_m]]).with_colors([TRAIL]);
+            let color = if self.whose == Whose::Own { TRAIL } else { TRAIL_BESIDE };
+            let piece = LineStrips3D::new([vec![from_m, here_m]]).with_colors([color]);
             self.recording.log(entity::TRAIL, &piece.with_radii([Radius::new_ui_points(2.0)]))?;
         }
         Ok(())
@@ -181,7 +222,8 @@ impl<'a> Scene<'a> {
             rocket_m: self.shape.length_m(),
         };
         if points_m.len() > 1 {
-            let path = LineStrips3D::new([points_m]).with_colors([FLOWN]);
+            let color = if self.whose == Whose::Own { FLOWN } else { FLOWN_BESIDE };
+            let path = LineStrips3D::new([points_m]).with_colors([color]);
             self.recording.log_static(entity::FLOWN, &path.with_radii([Radius::new_ui_points(1.0)]))?;
         }
         Ok(extent)

@@ -43,6 +43,21 @@ pub struct StampedEvent {
     pub text: String,
 }
 
+impl StampedEvent {
+    pub(crate) fn of(log: &Log, log_time_ns: u64) -> Self {
+        let level = match log.level() {
+            Level::Unknown | Level::Debug | Level::Info => EventLevel::Info,
+            Level::Warning => EventLevel::Warning,
+            Level::Error => EventLevel::Error,
+            Level::Fatal => EventLevel::Fatal,
+        };
+        let said = printable(log.message.as_bytes());
+        let text =
+            if log.name.is_empty() { said } else { format!("{}: {said}", printable(log.name.as_bytes())) };
+        Self { log_time_ns, level, text }
+    }
+}
+
 /// Facts about a log.
 #[derive(Debug, Clone, Default)]
 pub struct Survey {
@@ -100,6 +115,24 @@ impl Survey {
         Ok(survey)
     }
 
+    /// As [`of`](Self::of), for a log that is being written, whose flight may not have begun: what is flown is told by its
+    /// mission.
+    ///
+    /// # Errors
+    /// The input cannot be read.
+    pub fn of_beginning(input: impl Read) -> std::io::Result<Self> {
+        let mut survey = Self::of(input)?;
+        if !survey.from_apogee
+            && let Some(text) = &survey.profile_toml
+            && let Ok(mission) = vehicles::mission::from_toml(text, ATTACHMENT_PROFILE)
+        {
+            survey.from_apogee = true;
+            survey.profile_problem = None;
+            survey.mission = Some(mission);
+        }
+        Ok(survey)
+    }
+
     /// Start of the run, ns since the Unix epoch: as the log says, or its first record.
     pub fn start_unix_ns(&self) -> Option<u64> {
         self.run.get("start_unix_ns").and_then(|text| text.parse().ok()).or(self.first_log_time_ns)
@@ -140,19 +173,7 @@ impl Survey {
     fn take_event(&mut self, log_time_ns: u64, data: &[u8]) {
         match Log::decode(data) {
             Ok(log) if self.events.len() < EVENTS_KEPT => {
-                let level = match log.level() {
-                    Level::Unknown | Level::Debug | Level::Info => EventLevel::Info,
-                    Level::Warning => EventLevel::Warning,
-                    Level::Error => EventLevel::Error,
-                    Level::Fatal => EventLevel::Fatal,
-                };
-                let said = printable(log.message.as_bytes());
-                let text = if log.name.is_empty() {
-                    said
-                } else {
-                    format!("{}: {said}", printable(log.name.as_bytes()))
-                };
-                self.events.push(StampedEvent { log_time_ns, level, text });
+                self.events.push(StampedEvent::of(&log, log_time_ns));
             }
             _ => self.events_left_out += 1,
         }

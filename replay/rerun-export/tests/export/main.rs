@@ -7,6 +7,7 @@ mod files;
 #[path = "../../../tests/replay/simulated.rs"]
 #[expect(dead_code, reason = "other tests fly more")]
 mod flown;
+mod follow;
 mod logs;
 mod outside_reader;
 mod read_back;
