@@ -1,0 +1,92 @@
+//! The log of a ground station that flew a real vehicle: what it says agrees with the vehicle's own log.
+
+use std::path::Path;
+
+use e2e::{Ended, Program, Running, auto_ground, expect_landing, program, vehicle};
+
+fn replay(folder: &Path, arguments: &[&str]) -> Ended {
+    let ended = Running::to_end(program(Program::Replay).args(arguments).current_dir(folder));
+    assert_eq!(ended.code, Some(0), "{arguments:?}: {}", ended.output);
+    ended
+}
+
+/// A column of a table, as text.
+fn column(table: &Path, name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(table).unwrap_or_else(|error| panic!("{}: {error}", table.display()));
+    let mut lines = text.lines().map(|line| line.split(','));
+    let mut head = lines.next().unwrap();
+    let place = head.position(|column| column == name).unwrap_or_else(|| panic!("{name} in {text:.200}"));
+    lines.map(|mut cells| cells.nth(place).unwrap().to_owned()).collect()
+}
+
+/// The line of `replay info` that begins with a word.
+fn fact<'a>(info: &'a Ended, word: &str) -> &'a str {
+    let line = info.output.lines().find(|line| line.trim_start().starts_with(word));
+    line.unwrap_or_else(|| panic!("no {word}: {}", info.output)).trim()
+}
+
+#[test]
+fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let ground = Running::start(&mut auto_ground(folder, &["udpin:127.0.0.1:0"]));
+    let mut fly = vehicle(folder, &[&ground.udp_link()]);
+    let flight = Running::start(fly.args(["--profile", "mk2"]));
+    expect_landing(flight, ground);
+
+    // The same verdict, in the words for what a station can know.
+    let [own, heard] = ["vehicle.mcap", "ground.mcap"].map(|log| replay(folder, &["info", log]));
+    for info in [&own, &heard] {
+        assert!(fact(info, "verdict").contains("LANDED"), "{}", info.output);
+    }
+    for row in ["vertical speed", "lateral speed", "tilt"] {
+        // Name, value and unit; the times before them are of two clocks.
+        let said = |info: &Ended| {
+            let line = fact(info, row).split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+            line[..row.split(' ').count() + 1].to_vec()
+        };
+        assert_eq!(said(&own), said(&heard), "{row}\n{}\n{}", own.output, heard.output);
+    }
+    for phase in ["POWERED", "TOUCHDOWN"] {
+        assert!(heard.output.contains(phase), "{phase}: {}", heard.output);
+    }
+
+    // The report says it, too.
+    for log in ["vehicle", "ground"] {
+        replay(folder, &["report", &format!("{log}.mcap")]);
+        let page = std::fs::read_to_string(folder.join(format!("{log}.html"))).unwrap();
+        assert!(page.contains("LANDED") && page.contains("touchdown"), "{log}");
+    }
+
+    // Each row of the station's tables is a row that the vehicle's log says it sent.
+    for log in ["vehicle", "ground"] {
+        replay(folder, &["export", &format!("{log}.mcap"), "--to", "csv", "--output", log]);
+    }
+    for (table, value) in [
+        ("mavlink_1_1_local_position_ned", "z"),
+        ("mavlink_1_1_td_flight_status", "time_boot_ms"),
+        ("mavlink_1_1_td_landing_verdict", "limits_violated"),
+    ] {
+        let of = |log: &str| {
+            let path = folder.join(log).join(format!("{table}.csv"));
+            column(&path, "time_boot_ms").into_iter().zip(column(&path, value)).collect::<Vec<_>>()
+        };
+        let (sent, received) = (of("vehicle"), of("ground"));
+        assert!(!received.is_empty(), "{table}");
+        for row in &received {
+            assert!(sent.contains(row), "{table}: {row:?} was never sent");
+        }
+        // Nothing is lost on this machine, but the station ends with the verdict and the vehicle a little later.
+        let of_all = if table.ends_with("verdict") { 0 } else { sent.len() * 9 / 10 };
+        assert!(received.len() >= of_all, "{table}: {} of {}", received.len(), sent.len());
+    }
+
+    // And `compare` finds nothing else.
+    let compared = Running::to_end(
+        program(Program::Replay)
+            .args(["compare", "vehicle.mcap", "ground.mcap", "--json"])
+            .current_dir(folder),
+    );
+    assert!(matches!(compared.code, Some(0 | 1)), "{}", compared.output);
+    assert!(compared.output.contains("mavlink_1_1_local_position_ned.x"), "{}", compared.output);
+}
