@@ -7,7 +7,8 @@
 //!
 //! * [`trace`]: a flight's frames.
 //! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust.
-//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its models.
+//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its
+//!   models, [`rest`] is what they leave.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`sensors`]: noises and biases.
 //! * [`stand`]: a burn on a test stand.
@@ -20,6 +21,7 @@ mod burn;
 mod least_squares;
 mod patch;
 mod pooled;
+mod rest;
 mod sensors;
 mod servo;
 mod stand;
