@@ -78,6 +78,7 @@ pub(crate) struct CampaignArguments {
 #[derive(Subcommand)]
 enum CampaignCommand {
     /// Merge the parts of a campaign that was flown in shards.
+    #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
     Merge {
         /// Directories of the parts.
         #[arg(required = true, value_name = "DIR")]
