@@ -101,7 +101,7 @@ enum Question {
     Sweep(sweep::Ask),
     /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
     #[command(
-        after_help = "Example: replay bisect flight.mcap plant.thrust_scale --of-plant --value 1 --lowest 0.9 --highest 1.1"
+        after_help = "Example: replay bisect a.mcap plant.thrust_scale --of-plant --value 1 --lowest 0.9 --highest 1.1"
     )]
     Bisect(bisect::Ask),
     /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
