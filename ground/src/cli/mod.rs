@@ -194,6 +194,18 @@ pub enum Command {
         #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
         from: Option<String>,
     },
+    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
+    ///
+    /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
+    /// it. In a station that holds the link, the key L does the same.
+    Download {
+        /// File on the vehicle. Default: its newest log.
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
+        /// Folder to write into.
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        to: PathBuf,
+    },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
     Status,
     /// End a station. This is refused while its vehicle is armed or in flight.

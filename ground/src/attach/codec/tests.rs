@@ -106,6 +106,7 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort))),
         ToStation::Request(Request::Parameters),
         ToStation::Request(Request::Report),
+        ToStation::Request(Request::Download),
         ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];
