@@ -33,17 +33,16 @@ fn verify(log: &Path) -> Ended {
 #[test]
 fn the_log_of_a_landed_vehicle_is_fetched_over_signed_udp_and_replays_bit_for_bit() {
     let (on_board, on_ground) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let key = on_board.path().join("flight.key");
-    keygen(&key);
-    let key = key.display().to_string();
+    keygen(on_board.path(), "flight.key");
+    let key = on_board.path().join("flight.key").display().to_string();
     let mut vehicle = landed_vehicle(on_board.path(), &["--key", &key]);
     let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));
-    // Without the key nothing is heard.
     let fetched = Running::to_end(download(on_ground.path(), &link).args(["--key", &key]));
     assert_eq!(fetched.code, Some(0), "{}", fetched.output);
     let log = on_ground.path().join("vehicle1-flight.mcap");
     assert!(fetched.output.contains("log ./vehicle1-flight.mcap"), "{}", fetched.output);
-    let there: Vec<_> = std::fs::read_dir(on_ground.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let there: Vec<_> =
+        std::fs::read_dir(on_ground.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(there, [log.clone()], "nothing else is left");
     let verified = verify(&log);
     assert_eq!(verified.code, Some(0), "{}", verified.output);
@@ -69,7 +68,7 @@ fn the_log_is_refused_in_flight() {
     command.args(["--log", "flight.mcap", "--mavlink", "udpin:127.0.0.1:0"]).current_dir(folder.path());
     let mut vehicle = Running::start(&mut command);
     let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));
-    vehicle.wait_for_line("phase");
+    vehicle.wait_for_line("to AERO_DESCENT");
     let refused = Running::to_end(&mut download(folder.path(), &link));
     assert_eq!(refused.code, Some(1), "{}", refused.output);
     assert!(refused.output.contains("it is armed or in flight"), "{}", refused.output);
@@ -85,9 +84,11 @@ fn a_download_over_a_serial_line_goes_on_after_a_kill() {
     let line = SerialLine::new(57_600);
     let mut ground = BareGround::new();
     let links = [ground.link(), line.near_link()];
-    let mut vehicle = Running::start(
-        vehicle(folder.path(), &[&links[0], &links[1]]).args(["--stay", "--serial-budget", "5760"]),
-    );
+    let vehicle = Running::start(vehicle(folder.path(), &[&links[0], &links[1]]).args([
+        "--stay",
+        "--serial-budget",
+        "5760",
+    ]));
     ground.wait_until_ready();
     ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
     assert_eq!(ground.command(ABORT, 1.0), ACCEPTED);

@@ -530,8 +530,7 @@ impl Station {
             Output::Lines(mut lines) => lines.show(model),
         }
         if let Some(mut download) = self.download {
-            // What is not remembered is fetched again.
-            let _ = download.remember();
+            download.remember();
         }
         if let Some(demo) = self.demo {
             demo.stop().await;

@@ -167,10 +167,13 @@ mod tests {
             }
         }
         let bytes = std::fs::read(recorder.finish().unwrap()).unwrap();
-        let first = ends[0].0 - 3000.min(ends[0].0);
+        let first = ends[0].0.saturating_sub(3000);
         for cut in first..=bytes.len() {
-            let whole = ends.iter().rev().find(|(end, _)| *end <= cut).map_or(0, |(_, records)| *records);
-            assert_eq!(read(&bytes[..cut]).0, whole, "cut at {cut}");
+            // Behind a chunk comes its index, which a reader from front to back does not need.
+            let before = ends.iter().rev().find(|(end, _)| *end <= cut).map_or(0, |(_, records)| *records);
+            let next = ends.iter().find(|(end, _)| *end > cut).map_or(40, |(_, records)| *records);
+            let found = read(&bytes[..cut]).0;
+            assert!(found == before || found == next, "cut at {cut}: {found}, not {before} or {next}");
         }
     }
 }

@@ -12,7 +12,9 @@ use e2e::{Bound, Program, Running, Signal, program, unshared_address};
 fn landed_vehicle(folder: &Path, link: &str) -> Running {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--profile", "paper-calibrated", "--auto-start", "--stay", "--speed", "20"]);
-    command.args(["--network-budget", "20000", "--log", "flight.mcap", "--mavlink", link]).current_dir(folder);
+    command
+        .args(["--network-budget", "20000", "--log", "flight.mcap", "--mavlink", link])
+        .current_dir(folder);
     let mut vehicle = Running::start(&mut command);
     vehicle.wait_for_line("TOUCHDOWN to SAFED");
     vehicle

@@ -44,7 +44,8 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
         let msgs = tokio::select! {
             biased;
             signal = signals.next() => {
-                downloading.remember()?;
+                downloading.remember();
+                drop(downloading);
                 shown.end();
                 anyhow::bail!("stopped by {signal}; the same command goes on with what is here");
             }

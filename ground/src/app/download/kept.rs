@@ -76,19 +76,16 @@ impl Kept {
         std::fs::rename(new, &self.memory)
     }
 
-    /// Computes the checksum of all pieces, for another thread.
-    pub(super) fn checksum_later(&self) -> impl FnOnce() -> std::io::Result<u32> + Send + 'static {
-        let pieces = self.pieces.clone();
-        move || {
-            let mut file = File::open(&pieces)?;
-            let (mut sum, mut piece) = (0, vec![0; READ_AT_ONCE]);
-            loop {
-                let read = file.read(&mut piece)?;
-                if read == 0 {
-                    return Ok(sum);
-                }
-                sum = crc::continued(sum, &piece[..read]);
+    /// The checksum of all pieces.
+    pub(super) fn checksum(&self) -> std::io::Result<u32> {
+        let mut file = File::open(&self.pieces)?;
+        let (mut sum, mut piece) = (0, vec![0; READ_AT_ONCE]);
+        loop {
+            let read = file.read(&mut piece)?;
+            if read == 0 {
+                return Ok(sum);
             }
+            sum = crc::continued(sum, &piece[..read]);
         }
     }
 
@@ -137,7 +134,7 @@ mod tests {
         let (mut kept, found) = Kept::open(folder.path(), 1, "../flight.mcap").unwrap();
         assert_eq!(found, Some(part));
         kept.write(0, b"abc").unwrap();
-        assert_eq!(kept.checksum_later()().unwrap(), crc::continued(0, b"abcdefg"));
+        assert_eq!(kept.checksum().unwrap(), crc::continued(0, b"abcdefg"));
         let whole = kept.finish().unwrap();
         assert_eq!(whole, folder.path().join("vehicle1-..flight.mcap"));
         assert_eq!(std::fs::read(&whole).unwrap(), b"abcdefg");

@@ -1,13 +1,13 @@
 //! Fetches the vehicle's own log (MAVLink FTP) and keeps it on disk.
 //!
-//! `protocol::ftp::download` decides what to ask for; this writes what arrives. A checksum is computed in a thread of
-//! its own, so that the station goes on.
+//! `protocol::ftp::download` decides what to ask for. What arrives is written by a thread of its own, so that neither
+//! the link nor the crew waits for the disk.
 
-pub mod alone;
+pub(super) mod alone;
+mod keeper;
 mod kept;
 
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use protocol::dialect::MavMessage;
@@ -16,6 +16,7 @@ use protocol::ftp::Packet;
 use protocol::ftp::download::{Download, News, Progress};
 use protocol::identity::Address;
 
+use self::keeper::{Keeper, Told};
 use self::kept::Kept;
 
 /// How often the pieces that have arrived are remembered on disk.
@@ -27,8 +28,10 @@ pub(super) struct Downloading {
     us: Address,
     vehicle: Address,
     folder: PathBuf,
-    kept: Option<Kept>,
-    summing: Option<Receiver<std::io::Result<u32>>>,
+    keeper: Option<Keeper>,
+    /// The checksum, or the name, was asked for.
+    summing: bool,
+    finishing: bool,
     remembered_at: Duration,
     /// Tenths of the file that were told.
     tenths: u32,
@@ -57,8 +60,9 @@ impl Downloading {
             us,
             vehicle,
             folder,
-            kept: None,
-            summing: None,
+            keeper: None,
+            summing: false,
+            finishing: false,
             remembered_at: Duration::ZERO,
             tenths: 0,
         }
@@ -71,7 +75,7 @@ impl Downloading {
     /// Takes a frame of the vehicle.
     ///
     /// # Errors
-    /// A piece cannot be written.
+    /// The log is here already, or its files cannot be made.
     pub(super) fn take(&mut self, frame: &Frame, now: Duration) -> anyhow::Result<()> {
         let Some((target, packet)) = Packet::answer_in(frame) else { return Ok(()) };
         if target != self.us || frame.source() != self.vehicle {
@@ -79,7 +83,8 @@ impl Downloading {
         }
         let news = self.download.take(&packet, now);
         self.open()?;
-        self.write(news)
+        self.write(news);
+        Ok(())
     }
 
     /// Goes on: what to send, and what there is to say.
@@ -90,45 +95,58 @@ impl Downloading {
         (messages, word)
     }
 
-    fn go_on(&mut self, now: Duration) -> anyhow::Result<Option<Word>> {
-        self.open()?;
-        self.sum()?;
-        if now.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
-            self.remembered_at = now;
-            self.remember()?;
-        }
-        match self.download.ended() {
-            Some(Ok(())) => match self.kept.take() {
-                Some(kept) => Ok(Some(Word::Done(kept.finish()?))),
-                None => Ok(None),
-            },
-            Some(Err(failure)) => {
-                self.remember()?;
-                anyhow::bail!(failure)
-            }
-            None => Ok(self.next_tenth().map(Word::Goes)),
+    /// Remembers what is there, so that the next download goes on with it.
+    pub(super) fn remember(&mut self) {
+        if let (Some(part), Some(keeper)) = (self.download.part(), &self.keeper) {
+            keeper.remember(part);
         }
     }
 
-    /// Remembers what is there, so that the next download goes on with it.
-    ///
-    /// # Errors
-    /// The disk fails.
-    pub(super) fn remember(&mut self) -> anyhow::Result<()> {
-        if let (Some(part), Some(kept)) = (self.download.part(), &mut self.kept) {
-            kept.remember(&part)?;
+    fn go_on(&mut self, now: Duration) -> anyhow::Result<Option<Word>> {
+        self.open()?;
+        while let Some(told) = self.keeper.as_ref().and_then(Keeper::told) {
+            match told {
+                Told::Sum(sum) => {
+                    self.summing = false;
+                    let news = self.download.compare(sum);
+                    self.write(news);
+                }
+                Told::Finished(path) => return Ok(Some(Word::Done(path))),
+                Told::Failed(error) => return Err(error),
+            }
         }
-        Ok(())
+        if now.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
+            self.remembered_at = now;
+            self.remember();
+        }
+        let Some(keeper) = &self.keeper else {
+            return self.download.ended().transpose().map(|_| None).map_err(Into::into);
+        };
+        match self.download.ended() {
+            Some(Ok(())) => {
+                if !std::mem::replace(&mut self.finishing, true) {
+                    keeper.finish();
+                }
+                Ok(None)
+            }
+            Some(Err(failure)) => anyhow::bail!(failure),
+            None => {
+                if self.download.is_whole() && !std::mem::replace(&mut self.summing, true) {
+                    keeper.sum();
+                }
+                Ok(self.next_tenth().map(Word::Goes))
+            }
+        }
     }
 
     /// Opens the files once the name is known.
     fn open(&mut self) -> anyhow::Result<()> {
-        if self.kept.is_none()
+        if self.keeper.is_none()
             && self.download.ended().is_none()
             && let Some(name) = self.download.name()
         {
             let (kept, part) = Kept::open(&self.folder, self.vehicle.system_id, name)?;
-            self.kept = Some(kept);
+            self.keeper = Some(Keeper::start(kept)?);
             if let Some(part) = part {
                 self.download.keep(part);
             }
@@ -136,44 +154,13 @@ impl Downloading {
         Ok(())
     }
 
-    fn write(&mut self, news: Option<News>) -> anyhow::Result<()> {
-        let Some(kept) = &mut self.kept else { return Ok(()) };
+    fn write(&mut self, news: Option<News>) {
+        let Some(keeper) = &self.keeper else { return };
         match news {
-            Some(News::Begins { fresh: true }) => kept.begin_again()?,
-            Some(News::Piece { offset, data }) => kept.write(offset, &data)?,
+            Some(News::Begins { fresh: true }) => keeper.begin_again(),
+            Some(News::Piece { offset, data }) => keeper.write(offset, data),
             Some(News::Begins { fresh: false }) | None => {}
         }
-        Ok(())
-    }
-
-    /// Compares the checksum of the whole file, once it is here.
-    fn sum(&mut self) -> anyhow::Result<()> {
-        if !self.download.is_whole() {
-            return Ok(());
-        }
-        match (self.summing.take(), &self.kept) {
-            (Some(summing), _) => match summing.try_recv() {
-                Ok(sum) => {
-                    let news = self.download.compare(sum?);
-                    self.write(news)?;
-                }
-                Err(std::sync::mpsc::TryRecvError::Empty) => self.summing = Some(summing),
-                Err(std::sync::mpsc::TryRecvError::Disconnected) => {
-                    anyhow::bail!("the checksum was not computed")
-                }
-            },
-            (None, Some(kept)) => {
-                let (tell, told) = sync_channel(1);
-                let checksum = kept.checksum_later();
-                std::thread::Builder::new().name("checksum".to_owned()).spawn(move || {
-                    // The station may have ended.
-                    let _ = tell.send(checksum());
-                })?;
-                self.summing = Some(told);
-            }
-            (None, None) => {}
-        }
-        Ok(())
     }
 
     /// A word at the beginning and at every tenth of the file.
@@ -187,7 +174,7 @@ impl Downloading {
     }
 }
 
-/// As in `1.2 of 10.0 MB, 3.6 kB/s, 41 min left`.
+/// As in `1.20 of 10.00 MB, 3.6 kB/s, 41 min left`.
 pub(super) fn in_words(progress: &Progress) -> String {
     let megabytes = |bytes: u32| f64::from(bytes) / 1e6;
     let left = match progress.left_s {

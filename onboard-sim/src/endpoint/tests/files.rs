@@ -72,7 +72,8 @@ impl Wire {
 
 #[test]
 fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
-    for (capacity_bytes_s, signature_len) in [(2000, 0), (5760, 0), (5760, 13)] {
+    // Of a radio's budget, six pieces fit into any second, and a seventh does not.
+    for (capacity_bytes_s, signature_len, least) in [(2000, 0, 0.75), (5760, 0, 0.8), (5760, 13, 0.8)] {
         let endpoint = match signature_len {
             0 => VehicleEndpoint::new(),
             _ => VehicleEndpoint::sending_signed(&STANDARD),
@@ -91,7 +92,7 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
             "{capacity_bytes_s} B/s, signature {signature_len}: {bytes_s:.0} B/s, {:.1} %",
             100.0 * share
         );
-        assert!(share > 0.8, "{share}");
+        assert!(share > least, "{share}");
         // No second carries more than the budget, and the vehicle is heard in each.
         for (from_s, _) in &sent {
             let within = sent.iter().filter(|(at_s, _)| (*from_s..from_s + 1.0).contains(at_s));
