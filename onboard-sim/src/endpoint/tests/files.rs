@@ -8,10 +8,10 @@ use protocol::identity::VEHICLE;
 
 use super::*;
 
-struct InMemory([FileEntry; 1], Vec<u8>);
+pub(super) struct InMemory([FileEntry; 1], Vec<u8>);
 
 impl InMemory {
-    fn boxed(len: usize) -> Box<Self> {
+    pub(super) fn boxed(len: usize) -> Box<Self> {
         let entry = FileEntry { name: "flight.mcap".to_owned(), len: len as u32 };
         Box::new(Self([entry], (0..len).map(|n| (n % 251) as u8).collect()))
     }

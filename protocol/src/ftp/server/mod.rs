@@ -110,7 +110,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Takes a request from a link. `open` says whether files may be read now.
+    /// Takes a request from a link. `open` says whether this client may read files now.
     pub fn take(
         &mut self,
         request: &FileRequest,
@@ -125,7 +125,6 @@ impl Server {
             || (!packet.path().is_empty() && place_of(packet.path(), files).is_some())
             || (packet.opcode == Opcode::ListDirectory && is_log_directory(packet.path()));
         if !open && of_file {
-            self.close_all();
             self.answer(link, *client, packet.nak(Refusal::Busy));
             return Taken::NotNow;
         }

@@ -174,7 +174,11 @@ fn nothing_is_read_while_it_is_not_allowed_and_other_paths_are_not_found() {
     // MAVProxy asks for it, and waits where it gets another answer.
     let parameters = Packet::request(10, 0, Opcode::OpenFileRo, 0, "@PARAM/param.pck");
     assert_eq!(refused(&mut server, &mut files, parameters), (Taken::Answered, Some(Refusal::FileNotFound)));
-    assert!(server.sessions.is_empty());
+    // Who may not read does not close what others read.
+    assert_eq!(server.sessions.len(), 1);
+    server.close_all();
+    let read = reading(11, session, Opcode::ReadFile, 0, 239);
+    assert_eq!(answer(&mut server, &mut files, read).refusal(), Some(Refusal::InvalidSession));
 }
 
 #[test]
