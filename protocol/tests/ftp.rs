@@ -82,7 +82,7 @@ impl Line {
         let bytes = frame.as_bytes();
         self.bytes += bytes.len();
         self.free_at_s = self.free_at_s.max(now_s) + bytes.len() as f64 / bytes_s;
-        for _ in 0..1 + usize::from(chance.happens(double)) {
+        for _ in 0..=usize::from(chance.happens(double)) {
             if chance.happens(loss) {
                 continue;
             }

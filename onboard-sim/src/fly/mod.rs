@@ -289,8 +289,7 @@ pub async fn fly_observed(
     let mut own_start = OwnStart { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
-    let mut dropped = 0;
-    let mut offer = Offer::default();
+    let (mut dropped, mut offer) = (0, Offer::default());
 
     let stopped = loop {
         if vehicle.time_s() >= log_state_due_s {
@@ -322,9 +321,7 @@ pub async fn fly_observed(
         }
         if let Some(recorder) = &options.recorder {
             record(recorder, &vehicle, &events);
-            if let Some(why) = offer.step(recorder, &vehicle, &mut endpoint) {
-                note(Some(recorder), time_s, &why);
-            }
+            offer.step(recorder, &vehicle, &mut endpoint);
         }
         let leaving = endpoint.poll(&vehicle);
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {

@@ -8,8 +8,8 @@ use protocol::ftp::server::{FileEntry, Files};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::ending;
 
-use crate::endpoint::VehicleEndpoint;
-use crate::endpoint::gives_out_its_log;
+use super::recording::note;
+use crate::endpoint::{VehicleEndpoint, gives_out_its_log};
 use crate::vehicle::Vehicle;
 
 /// How far the log is on its way to being offered.
@@ -24,13 +24,8 @@ pub(super) enum Offer {
 }
 
 impl Offer {
-    /// Goes on with it; returns why the log cannot be offered, once.
-    pub(super) fn step(
-        &mut self,
-        recorder: &Recorder,
-        vehicle: &Vehicle,
-        endpoint: &mut VehicleEndpoint,
-    ) -> Option<String> {
+    /// Goes on with it. If the log cannot be offered, it says why.
+    pub(super) fn step(&mut self, recorder: &Recorder, vehicle: &Vehicle, endpoint: &mut VehicleEndpoint) {
         match self {
             Self::NotYet if vehicle.is_over() && gives_out_its_log(vehicle) => {
                 if recorder.mark_soon() {
@@ -38,7 +33,7 @@ impl Offer {
                 }
             }
             Self::Marked => {
-                let bytes = recorder.marked_bytes()?;
+                let Some(bytes) = recorder.marked_bytes() else { return };
                 match MarkedLog::open(recorder, bytes) {
                     Ok(log) => {
                         *self = Self::Made;
@@ -46,13 +41,13 @@ impl Offer {
                     }
                     Err(error) => {
                         *self = Self::Impossible;
-                        return Some(format!("the log is not offered for download: {error}"));
+                        let words = format!("the log is not offered for download: {error}");
+                        note(Some(recorder), vehicle.time_s(), &words);
                     }
                 }
             }
             Self::NotYet | Self::Made | Self::Impossible => {}
         }
-        None
     }
 }
 
@@ -69,7 +64,7 @@ impl MarkedLog {
         let (path, ending) = (recorder.path(), ending());
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
         // A name is part of a packet of 239 bytes, and of a list that is cut at tabs.
-        let name: String = name.chars().filter(|letter| letter.is_ascii_graphic()).take(100).collect();
+        let name: String = name.chars().filter(char::is_ascii_graphic).take(100).collect();
         let len = u32::try_from(marked_bytes + ending.len() as u64)
             .map_err(|_too_long| std::io::Error::other("it is longer than 4 GB"))?;
         Ok(Self { entries: [FileEntry { name, len }], file: File::open(path)?, marked_bytes, ending })

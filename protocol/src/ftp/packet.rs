@@ -169,6 +169,7 @@ impl Packet {
     }
 
     /// The answer to this request; `data` is cut to what a packet holds.
+    #[must_use]
     pub fn ack(&self, data: &[u8]) -> Self {
         let data = data[..data.len().min(DATA_LEN)].to_vec();
         Self {
@@ -184,6 +185,7 @@ impl Packet {
     }
 
     /// The refusal of this request.
+    #[must_use]
     pub fn nak(&self, why: Refusal) -> Self {
         Self { opcode: Opcode::Nak, ..self.ack(&why.bytes()) }
     }

@@ -161,7 +161,7 @@ impl Download {
         (self.len > 0).then(|| {
             let bytes_s = match (self.rate.front(), self.rate.back()) {
                 (Some((from, before)), Some((to, after))) if to > from => {
-                    f64::from(after.saturating_sub(*before)) / (*to - *from).as_secs_f64()
+                    f64::from(after.saturating_sub(*before)) / to.saturating_sub(*from).as_secs_f64()
                 }
                 _ => 0.0,
             };
@@ -294,7 +294,7 @@ impl Download {
 
     /// The file is open: continues with what is kept of it, if it is the same file.
     fn opened(&mut self, crc: Option<u32>) -> Option<News> {
-        let Some(path) = self.path.clone() else { return None };
+        let path = self.path.clone()?;
         // A session that was opened again goes on with what is there.
         let so_far = (self.bytes > 0).then(|| std::mem::take(&mut self.have));
         let so_far = so_far.map(|have| Part { path: path.clone(), len: self.len, crc: self.crc, have });
