@@ -74,7 +74,7 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
                 shown.end();
                 return Err(error);
             }
-            Some(Word::Goes(words)) if !shown.in_place => shown.line(&words),
+            Some(Word::Goes(words)) if !shown.in_place => print_line(&words),
             Some(Word::Goes(_)) | None => {}
         }
         if shown.in_place && now >= shown.at + SHOW_EVERY {
@@ -99,13 +99,14 @@ impl Shown {
         self.len = words.len();
     }
 
-    fn line(&self, words: &str) {
-        let _ = writeln!(std::io::stderr(), "{words}");
-    }
-
     fn end(&mut self) {
         if std::mem::take(&mut self.len) > 0 {
             let _ = writeln!(std::io::stderr());
         }
     }
+}
+
+fn print_line(words: &str) {
+    // Nobody may read it.
+    let _ = writeln!(std::io::stderr(), "{words}");
 }

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
 use protocol::ftp::part::Part;
@@ -11,6 +11,8 @@ use super::kept::Kept;
 
 /// Most orders that may wait: about a minute of pieces of a radio.
 const MAX_WAITING: usize = 1024;
+/// Most that the thread has to say: two checksums, and how it ended.
+const MAX_TOLD: usize = 4;
 
 enum Order {
     BeginAgain,
@@ -45,7 +47,7 @@ impl Keeper {
     /// No thread can be started.
     pub(super) fn start(kept: Kept) -> io::Result<Self> {
         let (orders, inbox) = sync_channel(MAX_WAITING);
-        let (tell, told) = channel();
+        let (tell, told) = sync_channel(MAX_TOLD);
         let thread = std::thread::Builder::new()
             .name("download".to_owned())
             .spawn(move || serve(kept, &inbox, &tell))?;
@@ -98,7 +100,7 @@ impl Drop for Keeper {
     }
 }
 
-fn serve(mut kept: Kept, inbox: &Receiver<Order>, tell: &Sender<Told>) {
+fn serve(mut kept: Kept, inbox: &Receiver<Order>, tell: &SyncSender<Told>) {
     while let Ok(order) = inbox.recv() {
         let done = match order {
             Order::BeginAgain => kept.begin_again().map(|()| None),
