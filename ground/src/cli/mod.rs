@@ -281,8 +281,12 @@ impl Cli {
 
     /// A given flag that the command would ignore.
     pub fn ignored_flag(&self) -> Option<&'static str> {
-        let ignores =
-            matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        let downloads = matches!(self.command, Some(Command::Download { .. }));
+        let ignores = downloads
+            || matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        // A download has a link of its own.
+        let ignored =
+            |flag: &str| ignores && !(downloads && ["--connect", "--key", "--crew"].contains(&flag));
         let given = [
             ("--connect", !self.connect.is_empty()),
             ("--key", self.key.is_some()),
@@ -304,7 +308,7 @@ impl Cli {
             ("--timeout-s", self.timeout_s.is_some()),
             ("--alarm-command", self.alarm_command.is_some()),
         ];
-        given.into_iter().find(|(_, given)| ignores && *given).map(|(flag, _)| flag)
+        given.into_iter().find(|(flag, given)| *given && ignored(flag)).map(|(flag, _)| flag)
     }
 
     /// Whether the automatic mode starts the flight.
@@ -394,6 +398,9 @@ mod tests {
             for command in ["attach", "status", "stop"] {
                 assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
             }
+            let of_a_link = ["--connect", "--key"].contains(&flag);
+            let expected = (!of_a_link).then_some(flag);
+            assert_eq!(ignored(&format!("ground download {flag}{value}")), expected);
             assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
         }
         assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
