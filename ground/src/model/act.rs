@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TdPhase;
+
 use super::page::Page;
 use super::{Model, Role, permits};
 use crate::key::Key;
@@ -140,6 +142,12 @@ fn flown_here(model: &Model) -> bool {
     is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
 }
 
+/// Whether the vehicle is down and nothing is at risk: it may have a log to offer.
+fn is_down(model: &Model) -> bool {
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    !model.is_at_risk() && matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED))
+}
+
 impl Act {
     /// Whether the key would do something now.
     pub fn works(self, model: &Model, now: Duration) -> bool {
@@ -160,7 +168,7 @@ impl Act {
             Self::Checklist => model.checklist.is_some(),
             Self::ReplayFlight => flown_here(model),
             Self::Report => commands && flown_here(model),
-            Self::Download => commands && !model.is_at_risk() && model.vehicle.heartbeat.is_some(),
+            Self::Download => commands && is_down(model),
             Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold
