@@ -184,8 +184,10 @@ pub enum Command {
     /// A station without a screen: holds the link, records, and serves screens until `ground stop` or SIGTERM ends it.
     ///
     /// It keeps running when its screens close and when the session that started it ends.
+    #[command(after_help = "Example: ground daemon --connect serial:/dev/ttyUSB0:57600 --log flight.mcap")]
     Daemon,
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
+    #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
     Attach {
         /// Show only; command nothing.
         #[arg(long)]
@@ -207,34 +209,45 @@ pub enum Command {
         to: PathBuf,
     },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
+    #[command(after_help = "Example: ground status")]
     Status,
     /// End a station. This is refused while its vehicle is armed or in flight.
+    #[command(after_help = "Example: ground stop")]
     Stop {
         /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
         #[arg(long)]
         force: bool,
     },
     /// Check the settings file or print an example.
+    #[command(after_help = "Example: ground config check")]
     Config {
         /// Check the file, or print an example.
         #[command(subcommand)]
         command: ConfigCommand,
     },
     /// Print a shell's completions.
+    #[command(after_help = "Example: ground completions bash")]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
     },
     /// Print the manual page (roff).
+    #[command(after_help = "Example: ground man")]
     Man,
 }
 
 /// What can be done with the settings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 pub enum ConfigCommand {
-    /// Check the settings and print them.
-    Check,
+    /// Check the settings and print them as a table.
+    #[command(after_help = "Examples:\n  ground config check\n  ground config check field.toml")]
+    Check {
+        /// The file, as with --config.
+        #[arg(value_name = "FILE", conflicts_with = "config")]
+        file: Option<PathBuf>,
+    },
     /// Print a file with every key, its meaning and its default.
+    #[command(after_help = "Example: ground config example")]
     Example,
 }
 
