@@ -200,6 +200,9 @@ pub enum Command {
     ///
     /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
     /// it. In a station that holds the link, the key L does the same.
+    #[command(
+        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
+    )]
     Download {
         /// File on the vehicle. Default: its newest log.
         #[arg(value_name = "NAME")]
