@@ -196,6 +196,21 @@ pub enum Command {
         #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
         from: Option<String>,
     },
+    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
+    ///
+    /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
+    /// it. In a station that holds the link, the key L does the same.
+    #[command(
+        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
+    )]
+    Download {
+        /// File on the vehicle. Default: its newest log.
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
+        /// Folder to write into.
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        to: PathBuf,
+    },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
     #[command(after_help = "Example: ground status")]
     Status,
@@ -282,8 +297,12 @@ impl Cli {
 
     /// A given flag that the command would ignore.
     pub fn ignored_flag(&self) -> Option<&'static str> {
-        let ignores =
-            matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        let downloads = matches!(self.command, Some(Command::Download { .. }));
+        let ignores = downloads
+            || matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        // A download has a link of its own.
+        let ignored =
+            |flag: &str| ignores && !(downloads && ["--connect", "--key", "--crew"].contains(&flag));
         let given = [
             ("--connect", !self.connect.is_empty()),
             ("--key", self.key.is_some()),
@@ -305,7 +324,7 @@ impl Cli {
             ("--timeout-s", self.timeout_s.is_some()),
             ("--alarm-command", self.alarm_command.is_some()),
         ];
-        given.into_iter().find(|(_, given)| ignores && *given).map(|(flag, _)| flag)
+        given.into_iter().find(|(flag, given)| *given && ignored(flag)).map(|(flag, _)| flag)
     }
 
     /// Whether the automatic mode starts the flight.
@@ -395,6 +414,9 @@ mod tests {
             for command in ["attach", "status", "stop"] {
                 assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
             }
+            let of_a_link = ["--connect", "--key"].contains(&flag);
+            let expected = (!of_a_link).then_some(flag);
+            assert_eq!(ignored(&format!("ground download {flag}{value}")), expected);
             assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
         }
         assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
