@@ -84,3 +84,47 @@ fn every_command_on_a_page_is_understood_by_its_program() {
     assert!(commands > 40, "only {commands} commands were found");
     assert!(refused.is_empty(), "{}", refused.join("\n"));
 }
+
+/// The commands that a help lists, without `help` itself.
+fn listed_commands(help: &str) -> Vec<String> {
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names = lines.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
+    names
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The examples of a help: behind `Example:`, or the lines below `Examples:`.
+fn examples(help: &str) -> Vec<&str> {
+    let one = help.lines().filter_map(|line| line.strip_prefix("Example: "));
+    let several = help.lines().skip_while(|line| *line != "Examples:").skip(1);
+    one.chain(several.take_while(|line| !line.is_empty())).collect()
+}
+
+/// Every command of every program shows an example, and understands it.
+#[test]
+fn every_help_has_an_example_that_its_program_understands() {
+    let mut helps = 0;
+    for (name, which) in PROGRAMS {
+        let mut left = vec![Vec::new()];
+        while let Some(command) = left.pop() {
+            let help = Running::to_end(program(which).args(&command).arg("--help")).output;
+            helps += 1;
+            left.extend(
+                listed_commands(&help).into_iter().map(|next| [command.as_slice(), &[next]].concat()),
+            );
+            let found = examples(&help);
+            assert!(!found.is_empty(), "{name} {command:?} has no example: {help}");
+            for example in found {
+                let parsed = commands_of(example);
+                let [(which, words)] = &parsed[..] else { panic!("{name} {command:?}: {example}") };
+                assert!(words.starts_with(&command), "{name} {command:?}: {example} is of another command");
+                let answer = Running::to_end(program(*which).args(words).arg("--help"));
+                assert_eq!(answer.code, Some(0), "{example}: {}", answer.output);
+            }
+        }
+    }
+    assert!(helps > 35, "only {helps} commands were found");
+}

@@ -20,8 +20,13 @@ pub enum Exit {
     NotSeen = 5,
 }
 
-/// The exit codes as `--help` shows them.
+/// Examples and exit codes as `--help` shows them.
 pub const HELP: &str = "\
+Examples:
+  ground
+  ground --connect serial:/dev/ttyUSB0:57600 --key touchdown.key
+  ground --replay last
+
 Exit codes:
   0  landed inside every limit (full screen: also when closed before any flight began)
   1  an error: a file, a socket, the simulator

@@ -14,7 +14,11 @@ use protocol::signing::Key;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(
+    version,
+    arg_required_else_help = true,
+    after_help = "Example: onboard-sim fly --profile mk2 --log flight.mcap"
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -28,13 +32,20 @@ enum Command {
     ///
     /// Exit codes: 0 landed inside every limit (from apogee: the limits of the legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
+    #[command(
+        after_help = "Examples:\n  onboard-sim fly --profile mk2 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
+    )]
     Fly(cli::fly::FlyArguments),
     /// Map where a vehicle lands, over two quantities.
     ///
     /// A profile: where a plan exists that ends inside the touchdown limits, one solve for each cell. A mission: where its
     /// own guidance lands, one simulated flight for each cell, or with `--ask attainable` where a clairvoyant could.
+    #[command(after_help = "Example: onboard-sim landability --profile mk2 --svg mk2.svg")]
     Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
+    #[command(
+        after_help = "Example: onboard-sim campaign --profile mk2 --dispersion real --flights 1000 --seed 1 --out mk2-real"
+    )]
     Campaign(cli::campaign::CampaignArguments),
     /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
     ///
@@ -50,16 +61,20 @@ enum Command {
     #[command(after_help = cli::card::EXAMPLE)]
     Card(cli::card::CardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
+    #[command(after_help = "Example: onboard-sim paper --figures figures")]
     Paper(cli::paper::PaperArguments),
     /// Hardware in the loop: simulate the world of flights whose flight computer is another process.
     ///
     /// Each flight begins released, at apogee or on its rail. In lockstep it is the same, bit for bit, as a campaign's flight
     /// with `wire_resolution`. Exit codes: 0 all flown, and identical if compared; 1 error; 2 usage; 3 a flight differs;
     /// 5 the computer does not answer.
+    #[command(after_help = "Example: onboard-sim world --link udpout:127.0.0.1:14560 --flights 10 --compare")]
     World(cli::world::WorldArguments),
     /// Hardware in the loop: a flight computer whose world is another process; it answers until it is stopped.
+    #[command(after_help = "Example: onboard-sim computer --link udpin:127.0.0.1:14560")]
     Computer(cli::computer::ComputerArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
+    #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
     Keygen {
         /// The file; an existing one is not overwritten.
         #[arg(value_name = "FILE")]
@@ -71,6 +86,7 @@ enum Command {
         passphrase: bool,
     },
     /// List the built-in profiles, or print one as a file to start from.
+    #[command(after_help = "Example: onboard-sim profiles --show mk2")]
     Profiles {
         /// Print this profile's TOML.
         #[arg(long, value_name = "NAME")]

@@ -32,6 +32,10 @@ const ACK_PAYLOAD_LEN: usize = 10;
 /// The uplink report (TD_UPLINK): bytes of payload and rate, Hz.
 const UPLINK_PAYLOAD_LEN: usize = 16;
 const UPLINK_HZ: f64 = 2.0;
+/// While a client reads a file over the link, a message is sent at most this often, s: vital ones, and others. The
+/// vehicle is disarmed on the ground then.
+const SPARED_VITAL_S: f64 = 1.0;
+const SPARED_S: f64 = 10.0;
 /// Shortest interval of a message that is sent early, s.
 const HURRIED_S: f64 = 0.1;
 
@@ -257,9 +261,13 @@ impl Streams {
         in_window / WINDOW_S - UPLINK_HZ * uplink_len as f64
     }
 
-    /// The messages whose time has come, most important first.
-    pub(crate) fn due(&self, now_s: f64) -> Vec<Due> {
-        let due = |stream: &&Stream| stream.interval_s.is_some() && now_s >= stream.due_s;
+    /// The messages whose time has come, most important first; fewer if the link is spared for files.
+    pub(crate) fn due(&self, now_s: f64, spared: bool) -> Vec<Due> {
+        let due = |stream: &&Stream| {
+            let least_s = if is_vital(stream.message_id) { SPARED_VITAL_S } else { SPARED_S };
+            let is_spared = spared && now_s - stream.sent_s < least_s - 1e-9;
+            stream.interval_s.is_some() && now_s >= stream.due_s && !is_spared
+        };
         let named = |&Stream { message_id, frame_len, .. }: &Stream| Due {
             message_id,
             frame_len,

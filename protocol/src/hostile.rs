@@ -10,7 +10,10 @@ use std::time::Duration;
 use crate::command::{CommandAnswer, CommandRequest, CommandSender};
 use crate::dialect::MavMessage;
 use crate::frame::{Encoder, Frame, Framer};
-use crate::ftp::FileRequest;
+use crate::ftp::download::Download;
+use crate::ftp::part::Part;
+use crate::ftp::server::{NoFiles, Server};
+use crate::ftp::{FileRequest, Packet};
 use crate::hub::{Hub, News, Received};
 use crate::identity::{Address, GROUND};
 use crate::link_stats::LinkStats;
@@ -65,6 +68,7 @@ pub fn frames(data: &[u8]) {
     let mut texts = Reassembler::new();
     let mut stats = LinkStats::new();
     let mut sender = CommandSender::new();
+    let (mut files, mut download) = (Server::default(), Download::new(None, None, 0));
     let mut rest = data;
     let mut now = Duration::ZERO;
     while let [len, tail @ ..] = rest {
@@ -72,6 +76,15 @@ pub fn frames(data: &[u8]) {
         rest = after;
         now += Duration::from_millis(u64::from(*len));
         let Some(frame) = frame_of(piece) else { continue };
+        if let Some(request) = FileRequest::from_frame(&frame) {
+            files.take(&request, 0, len % 2 == 0, &NoFiles, now);
+            files.work(&mut NoFiles);
+            files.next(0, &mut NoFiles, now);
+        }
+        if let Some((_, answer)) = Packet::answer_in(&frame) {
+            download.take(&answer, now);
+            download.poll(now);
+        }
         let mut framer = Framer::new();
         framer.push_datagram(frame.as_bytes());
         assert_eq!(framer.next_frame().as_ref(), Some(&frame), "a frame changed when it was framed again");
@@ -188,6 +201,7 @@ fn every_decoder(frame: &Frame) {
     let _ = CommandAnswer::from_frame(frame);
     let _ = ParamRequest::from_frame(frame);
     if let Some(request) = FileRequest::from_frame(frame) {
-        Encoder::new(GROUND).encode(&request.decline());
+        Encoder::new(GROUND).encode(&request.packet.message(request.source));
+        let _ = Part::from_text(request.packet.path());
     }
 }

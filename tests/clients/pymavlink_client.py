@@ -184,7 +184,7 @@ def files(ground):
     began = time.monotonic()
     ground.link.mav.file_transfer_protocol_send(0, 1, 1, payload)
     answer = ground.message("FILE_TRANSFER_PROTOCOL")
-    check("FTP is declined", (answer.payload[3], answer.payload[5], answer.payload[0]) == (129, 4, 8))
+    check("FTP has no parameters", (answer.payload[3], answer.payload[5], answer.payload[0]) == (129, 4, 8))
     check("at once", time.monotonic() - began < 2)
 
 

@@ -75,27 +75,23 @@ impl Again {
     /// Takes what was typed while a replay is shown. Returns what the live screen has to do, and what of the message is
     /// for it: everything but keys, and the abort.
     pub(super) fn take(&mut self, msg: Msg) -> (Vec<Action>, Option<Msg>) {
-        let Some(player) = &mut self.playing else { return (Vec::new(), Some(msg)) };
-        let keys = match &msg {
-            Msg::Key(key) => vec![*key],
-            // Held or pasted keys count only if they scroll or move the time.
-            Msg::Keys(keys) if !keys.contains(&Key::CtrlX) => {
-                keys.iter().copied().filter(|key| key.scrolls()).collect()
-            }
-            Msg::Pasted => Vec::new(),
-            _ => {
-                let aborts = matches!(msg, Msg::Keys(_));
-                if aborts {
-                    self.leave();
-                }
-                return (Vec::new(), Some(msg));
-            }
-        };
-        if keys.contains(&Key::CtrlX) {
-            self.leave();
+        if self.playing.is_none() {
             return (Vec::new(), Some(msg));
         }
-        let actions: Vec<Action> = keys.into_iter().flat_map(|key| player.on_key(key)).collect();
+        let typed = match &msg {
+            Msg::Key(key) => vec![*key],
+            Msg::Keys(keys) => keys.clone(),
+            Msg::Pasted => Vec::new(),
+            _ => return (Vec::new(), Some(msg)),
+        };
+        if typed.contains(&Key::CtrlX) {
+            self.leave();
+        }
+        let Some(player) = &mut self.playing else { return (Vec::new(), Some(msg)) };
+        // Held or pasted keys count only if they scroll or move the time.
+        let several = matches!(msg, Msg::Keys(_));
+        let keys = typed.into_iter().filter(|key| !several || key.scrolls());
+        let actions: Vec<Action> = keys.flat_map(|key| player.on_key(key)).collect();
         if actions.contains(&Action::Quit) {
             self.leave();
         }

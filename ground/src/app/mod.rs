@@ -6,6 +6,7 @@ pub mod attached;
 mod book;
 mod checklist;
 pub mod clock;
+mod download;
 mod key_ring;
 pub mod lines;
 pub mod log;
@@ -92,6 +93,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
                 };
                 attached::session(socket, &viewer, config, interactive).await
             }
+            (Some(Command::Download { name, to }), _) => download::alone::run(cli, name.as_deref(), to).await,
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
             (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
             (_, None) => session(cli, config, interactive, operator).await,
@@ -238,6 +240,7 @@ async fn start(
         again: Again::default(),
         _watchers: watchers,
         report: None,
+        download: None,
         place_failed: false,
         report_at: Duration::ZERO,
     };

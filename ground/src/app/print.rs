@@ -1,6 +1,7 @@
 //! The commands that only print: settings, completions, the manual page.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::CommandFactory as _;
@@ -16,15 +17,16 @@ use crate::exit::Exit;
 pub fn config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
     match command {
         ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
-        ConfigCommand::Check => {
-            let config = Config::load(cli.config.as_deref())?;
-            let file = cli.config.clone().or_else(usual_path);
+        ConfigCommand::Check { file } => {
+            let named = file.as_ref().or(cli.config.as_ref());
+            let config = Config::load(named.map(PathBuf::as_path))?;
+            let file = named.cloned().or_else(usual_path);
             let said = match file {
                 Some(path) if path.exists() => format!("{}: valid", path.display()),
                 Some(path) => format!("{}: no such file; these are the defaults", path.display()),
                 None => "no settings file; these are the defaults".to_owned(),
             };
-            print(format!("{said}\n{config:#?}\n").as_bytes())?;
+            print(format!("{said}\n\n{}", config.table()).as_bytes())?;
         }
     }
     Ok(Exit::Landed)

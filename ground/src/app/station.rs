@@ -15,6 +15,7 @@ use super::again::Again;
 use super::book::StationBook;
 use super::checklist::SignatureFile;
 use super::clock::{Clock, LogTime};
+use super::download::{Downloading, Word};
 use super::lines::Lines;
 use super::output::Output;
 use super::server::{Server, ServerEvent, hello};
@@ -61,6 +62,8 @@ pub(super) struct Station {
     pub(super) again: Again,
     /// The report that is being written.
     pub(super) report: Option<report::Writing>,
+    /// The vehicle's own log, while it is fetched.
+    pub(super) download: Option<Downloading>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// Where the signatures of the checklist are kept; `None` without a checklist.
@@ -109,7 +112,8 @@ impl Station {
             };
             let mut next = Next::Go;
             let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
-            for msg in report.into_iter().chain(msgs) {
+            let fetched = self.go_on_fetching(&msgs, wire);
+            for msg in report.into_iter().chain(msgs).chain(fetched) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
                         self.lose_screen(Lines::closed(), model).await;
@@ -205,6 +209,7 @@ impl Station {
                 vec![Msg::SignAsked { step: step.into(), void, by }]
             }
             ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
+            ServerEvent::FromScreen(_, ToStation::Request(Request::Download)) => vec![Msg::DownloadWanted],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
             }
@@ -314,6 +319,7 @@ impl Station {
                 }
                 Action::ReplayFlight => self.replay(model, now),
                 Action::WriteReport => self.write_report(model, now),
+                Action::FetchLog => self.fetch_log(model, now),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(kind) => {
@@ -375,6 +381,49 @@ impl Station {
             Some(Err(why)) => model.warn(now, format!("no report: {why}")),
             None => {}
         }
+    }
+
+    /// Begins to fetch the vehicle's own log, beside the station's.
+    fn fetch_log(&mut self, model: &mut Model, now: Duration) {
+        if self.download.is_some() {
+            model.info(now, "the vehicle's log is being fetched already");
+            return;
+        }
+        let folder = self.recorder.as_ref().and_then(|recorder| recorder.path().parent());
+        let folder = folder.map(std::path::Path::to_owned).unwrap_or_default();
+        let addresses = (model.settings.us, model.settings.vehicle);
+        let first_sequence = (self.clock.unix_ns() >> 20) as u16;
+        self.download = Some(Downloading::begin(None, folder, addresses, first_sequence));
+    }
+
+    /// Gives what was heard to the download, and sends what it asks for.
+    fn go_on_fetching(&mut self, msgs: &[Msg], wire: &mut Wire) -> Option<Msg> {
+        let now = self.clock.now();
+        let download = self.download.as_mut()?;
+        let taken = msgs.iter().try_for_each(|msg| match msg {
+            Msg::Frame(frame) => download.take(frame, now),
+            _ => Ok(()),
+        });
+        let word = match taken {
+            Ok(()) => {
+                let (messages, word) = download.poll(now);
+                for message in &messages {
+                    wire.send(message);
+                }
+                word
+            }
+            Err(error) => Some(Word::Failed(error)),
+        };
+        if !matches!(word, Some(Word::Goes(_)) | None) {
+            self.download = None;
+        }
+        word.map(|word| {
+            Msg::Download(match word {
+                Word::Goes(words) => Ok(words),
+                Word::Done(path) => Ok(format!("the vehicle's log is here: {}", path.display())),
+                Word::Failed(error) => Err(format!("{error:#}")),
+            })
+        })
     }
 
     /// Writes the files for maps. A failure is told once.
@@ -479,6 +528,9 @@ impl Station {
         match self.output {
             Output::Screen(screen) => drop(screen),
             Output::Lines(mut lines) => lines.show(model),
+        }
+        if let Some(mut download) = self.download {
+            download.remember();
         }
         if let Some(demo) = self.demo {
             demo.stop().await;

@@ -184,8 +184,10 @@ pub enum Command {
     /// A station without a screen: holds the link, records, and serves screens until `ground stop` or SIGTERM ends it.
     ///
     /// It keeps running when its screens close and when the session that started it ends.
+    #[command(after_help = "Example: ground daemon --connect serial:/dev/ttyUSB0:57600 --log flight.mcap")]
     Daemon,
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
+    #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
     Attach {
         /// Show only; command nothing.
         #[arg(long)]
@@ -194,35 +196,61 @@ pub enum Command {
         #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
         from: Option<String>,
     },
+    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
+    ///
+    /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
+    /// it. In a station that holds the link, the key L does the same.
+    #[command(
+        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
+    )]
+    Download {
+        /// File on the vehicle. Default: its newest log.
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
+        /// Folder to write into.
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        to: PathBuf,
+    },
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
+    #[command(after_help = "Example: ground status")]
     Status,
     /// End a station. This is refused while its vehicle is armed or in flight.
+    #[command(after_help = "Example: ground stop")]
     Stop {
         /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
         #[arg(long)]
         force: bool,
     },
     /// Check the settings file or print an example.
+    #[command(after_help = "Example: ground config check")]
     Config {
         /// Check the file, or print an example.
         #[command(subcommand)]
         command: ConfigCommand,
     },
     /// Print a shell's completions.
+    #[command(after_help = "Example: ground completions bash")]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
     },
     /// Print the manual page (roff).
+    #[command(after_help = "Example: ground man")]
     Man,
 }
 
 /// What can be done with the settings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Subcommand)]
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 pub enum ConfigCommand {
-    /// Check the settings and print them.
-    Check,
+    /// Check the settings and print them as a table.
+    #[command(after_help = "Examples:\n  ground config check\n  ground config check field.toml")]
+    Check {
+        /// The file, as with --config.
+        #[arg(value_name = "FILE", conflicts_with = "config")]
+        file: Option<PathBuf>,
+    },
     /// Print a file with every key, its meaning and its default.
+    #[command(after_help = "Example: ground config example")]
     Example,
 }
 
@@ -269,8 +297,12 @@ impl Cli {
 
     /// A given flag that the command would ignore.
     pub fn ignored_flag(&self) -> Option<&'static str> {
-        let ignores =
-            matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        let downloads = matches!(self.command, Some(Command::Download { .. }));
+        let ignores = downloads
+            || matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        // A download has a link of its own.
+        let ignored =
+            |flag: &str| ignores && !(downloads && ["--connect", "--key", "--crew"].contains(&flag));
         let given = [
             ("--connect", !self.connect.is_empty()),
             ("--key", self.key.is_some()),
@@ -292,7 +324,7 @@ impl Cli {
             ("--timeout-s", self.timeout_s.is_some()),
             ("--alarm-command", self.alarm_command.is_some()),
         ];
-        given.into_iter().find(|(_, given)| ignores && *given).map(|(flag, _)| flag)
+        given.into_iter().find(|(flag, given)| *given && ignored(flag)).map(|(flag, _)| flag)
     }
 
     /// Whether the automatic mode starts the flight.
@@ -382,6 +414,9 @@ mod tests {
             for command in ["attach", "status", "stop"] {
                 assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
             }
+            let of_a_link = ["--connect", "--key"].contains(&flag);
+            let expected = (!of_a_link).then_some(flag);
+            assert_eq!(ignored(&format!("ground download {flag}{value}")), expected);
             assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
         }
         assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));

@@ -1,5 +1,7 @@
 //! The settings file (TOML). [`EXAMPLE`] documents every key; the flag of the same name overrides it.
 
+mod table;
+
 use std::path::{Path, PathBuf};
 
 use protocol::transport::LinkAddress;

@@ -140,3 +140,25 @@ fn flags_for_the_demonstration_and_none_override_the_file() {
     let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);
     assert!(empty.unwrap_err().to_string().contains("--alarm-command"));
 }
+
+/// The table has a line for every key; what the file does not give is in parentheses.
+#[test]
+fn the_table_shows_every_key() {
+    let usual = Config::default().table();
+    assert_eq!(usual.lines().count(), OVERRIDES.len());
+    for (key, in_file, ..) in OVERRIDES {
+        let line = |table: &str| {
+            let found = table.lines().find(|line| line.split(' ').next() == Some(key));
+            found.unwrap_or_else(|| panic!("no line for {key} in {table}")).to_owned()
+        };
+        assert!(line(&usual).ends_with(')'), "{}", line(&usual));
+        let given = line(&Config::parse(&format!("{key} = {in_file}")).unwrap().table());
+        assert!(!given.ends_with(')'), "{given}");
+        if key != "keys" {
+            let value = in_file.trim_matches(['[', ']']).trim_matches('"');
+            assert!(given.ends_with(value), "{given}: {value}");
+        }
+    }
+    let keys = Config::parse("keys = { theme = \"w\", path = \"m\" }").unwrap().table();
+    assert!(keys.contains("theme=w") && keys.contains("path=m"), "{keys}");
+}

@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TdPhase;
+
 use super::page::Page;
 use super::{Model, Role, permits};
 use crate::key::Key;
@@ -29,6 +31,8 @@ pub enum Act {
     ReplayFlight,
     /// Write the report of the flight.
     Report,
+    /// Fetch the vehicle's own log.
+    Download,
     /// Open the dialog that signs the chosen step of the checklist.
     SignStep,
     /// Open the dialog that takes the signature of the chosen step back.
@@ -58,7 +62,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 35] = [
+pub const DEFINITIONS: [Definition; 36] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -126,6 +130,7 @@ pub const DEFINITIONS: [Definition; 35] = [
         "the flight just flown, again on this screen; q ends it",
     ),
     define(Act::Report, "report", Key::Char('W'), "write the report of the flight beside the log"),
+    define(Act::Download, "download", Key::Char('L'), "fetch the vehicle's own log; disarmed on the ground"),
     define(Act::AskParameters, "ask", Key::Char('r'), "ask the vehicle for its parameters again"),
     define(Act::Redraw, "redraw", Key::CtrlL, "draw the screen again"),
     define(Act::Quit, "quit", Key::Char('q'), "quit; armed or in flight: then type QUIT and Enter"),
@@ -135,6 +140,12 @@ pub const DEFINITIONS: [Definition; 35] = [
 fn flown_here(model: &Model) -> bool {
     let is_live = model.settings.role != Role::Replaying;
     is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
+}
+
+/// Whether the vehicle is down and nothing is at risk: it may have a log to offer.
+fn is_down(model: &Model) -> bool {
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    !model.is_at_risk() && matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED))
 }
 
 impl Act {
@@ -157,6 +168,7 @@ impl Act {
             Self::Checklist => model.checklist.is_some(),
             Self::ReplayFlight => flown_here(model),
             Self::Report => commands && flown_here(model),
+            Self::Download => commands && is_down(model),
             Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold

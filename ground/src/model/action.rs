@@ -20,6 +20,8 @@ pub enum Request {
     Parameters,
     /// Write the report of the flight.
     Report,
+    /// Fetch the vehicle's own log.
+    Download,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
 }
@@ -49,6 +51,8 @@ pub enum Action {
     ReplayFlight,
     /// Write the report of the flight.
     WriteReport,
+    /// Fetch the vehicle's own log.
+    FetchLog,
     /// Enter this into the book.
     Enter(BookLine),
     /// Write the log to disk now.

@@ -249,6 +249,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::ReplayFlight => afterwards::replay(model, now),
         Act::Report => afterwards::report(model, now),
+        Act::Download => afterwards::download(model, now),
         Act::SignStep => checklist::open_dialog(model, false, now),
         Act::VoidStep => checklist::open_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),

@@ -66,6 +66,10 @@ pub enum Msg {
     ReportWanted,
     /// The report of the flight is here, or is not because of this.
     Report(Result<String, String>),
+    /// An attached screen asks for the vehicle's own log.
+    DownloadWanted,
+    /// How far the vehicle's own log is, or why it is not fetched.
+    Download(Result<String, String>),
     /// The last place of the vehicle, kept from before this run of the station.
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
@@ -140,6 +144,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Checklist(list) => model.checklist = Some(*list),
         Msg::ReportWanted => afterwards::report(model, now),
         Msg::Report(written) => afterwards::on_report(model, written, now),
+        Msg::DownloadWanted => afterwards::download(model, now),
+        Msg::Download(told) => afterwards::on_download(model, told, now),
         Msg::Place(place) => model.place = Some(*place),
         Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
         Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),

@@ -15,7 +15,7 @@ use flight::rules::phase::Phase;
 
 /// The flight computer as a program for a board.
 #[derive(Parser)]
-#[command(name = "board")]
+#[command(name = "board", after_help = "Example: board fly < frames > answers")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -24,11 +24,13 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Fly a recorded flight: frames from standard input, answers to standard output
+    #[command(after_help = "Example: board fly < frames > answers")]
     Fly,
     /// Compare what machines answered in recorded flights with what was recorded, frame by frame
     ///
     /// Each folder is a flight: the file `recorded`, and a file for each machine, with its name. Exit codes: 0 all
     /// frames identical, 1 error, 2 usage, 3 a frame differs.
+    #[command(after_help = "Example: board compare --machine x86-64 --machine aarch64 flights/0 flights/1")]
     Compare {
         /// A machine; may be repeated
         #[arg(long, value_name = "NAME", required = true)]
@@ -37,6 +39,7 @@ enum Command {
         folders: Vec<PathBuf>,
     },
     /// Say what frames and plans cost, from the files `costs` and `recorded` of flights on a Cortex-M7
+    #[command(after_help = "Example: board costs flights/0 flights/1")]
     Costs {
         #[arg(required = true)]
         folders: Vec<PathBuf>,

@@ -14,7 +14,7 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::site::Site;
 use nalgebra::Vector3;
 
-use crate::readings::{Readings, Switches};
+use crate::readings::{Feedback, Readings, Switches};
 
 /// A wire for the vehicle of one mission: it carries places on the globe and heights above the sea.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,15 +69,16 @@ impl Wire {
     /// The readings as the wire carries them.
     pub fn narrow(&self, readings: &Readings) -> CarriedReadings {
         let Measurements { imu, pressure_altitude_m, gnss, lidar_range_m } = &readings.measured;
+        let Feedback { gimbal_rad, fins_rad, switches } = readings.feedback;
         CarriedReadings {
             gyro_rad_s: single(&imu.gyro_rad_s),
             specific_force_m_s2: single(&imu.specific_force_m_s2),
             pressure_altitude_m: pressure_altitude_m.map(|height_m| (height_m + self.pad_altitude_m) as f32),
             fix: gnss.as_ref().map(|fix| self.narrow_fix(fix)),
             range_cm: lidar_range_m.map(|range_m| libm::round(100.0 * range_m) as u16),
-            gimbal_rad: readings.gimbal_rad.map(|angle| angle as f32),
-            fins_rad: readings.fins_rad.map(|angle| angle as f32),
-            switches: readings.switches,
+            gimbal_rad: gimbal_rad.map(|angle| angle as f32),
+            fins_rad: fins_rad.map(|angle| angle as f32),
+            switches,
         }
     }
 
@@ -96,9 +97,11 @@ impl Wire {
                 gnss: carried.fix.as_ref().map(|fix| self.widen_fix(fix)),
                 lidar_range_m: carried.range_cm.map(|range_cm| 0.01 * f64::from(range_cm)),
             },
-            gimbal_rad: carried.gimbal_rad.map(f64::from),
-            fins_rad: carried.fins_rad.map(f64::from),
-            switches: carried.switches,
+            feedback: Feedback {
+                gimbal_rad: carried.gimbal_rad.map(f64::from),
+                fins_rad: carried.fins_rad.map(f64::from),
+                switches: carried.switches,
+            },
         }
     }
 
@@ -209,9 +212,11 @@ mod tests {
         (measured, any::<[bool; 4]>(), proptest::array::uniform6(-1.6..1.6)).prop_map(
             |(measured, [contact, igniter_continuity, booster_attached, pin_out], angles)| Readings {
                 measured,
-                gimbal_rad: [angles[0], angles[1]],
-                fins_rad: [angles[2], angles[3], angles[4], angles[5]],
-                switches: Switches { contact, igniter_continuity, booster_attached, pin_out },
+                feedback: Feedback {
+                    gimbal_rad: [angles[0], angles[1]],
+                    fins_rad: [angles[2], angles[3], angles[4], angles[5]],
+                    switches: Switches { contact, igniter_continuity, booster_attached, pin_out },
+                },
             },
         )
     }
@@ -231,7 +236,7 @@ mod tests {
             let (before, after) = (&readings.measured, &carried.measured);
             prop_assert!((before.imu.gyro_rad_s - after.imu.gyro_rad_s).amax() <= 2e-6);
             prop_assert!((before.imu.specific_force_m_s2 - after.imu.specific_force_m_s2).amax() <= 1e-5);
-            prop_assert_eq!(readings.switches, carried.switches);
+            prop_assert_eq!(readings.feedback.switches, carried.feedback.switches);
             if let (Some(before), Some(after)) = (before.pressure_altitude_m, after.pressure_altitude_m) {
                 prop_assert!((before - after).abs() <= 6.2e-5);
             }

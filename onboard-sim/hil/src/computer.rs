@@ -12,7 +12,7 @@
 //! | one of another flight | ignored | ignored |
 
 use flight::computer::pilot::Sensed;
-use flight::computer::{Commands, Computer, Feeling, Input, LogState, Output, flight_time_s};
+use flight::computer::{Computer, Feeling, Input, LogState, Output, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
 use flight::rules::arming::Uplink;
@@ -20,7 +20,7 @@ use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 
 use crate::carried::{CarriedCommands, CarriedReadings, Wire};
-use crate::readings::Readings;
+use crate::readings::{Feedback, Readings};
 use crate::start::{Pace, Start};
 
 /// In real time at most this many lost frames in a row are flown: 5 s.
@@ -145,13 +145,13 @@ impl RemoteComputer {
     }
 
     fn step(&mut self, frame: u64, readings: &Readings) -> Output {
-        let switches = &readings.switches;
+        let Feedback { gimbal_rad, fins_rad, switches } = readings.feedback;
         self.computer.step(&Input {
             frame,
             time_s: flight_time_s(frame),
             feeling: Feeling::InSpace(Sensed::Measured(readings.measured)),
-            gimbal_rad: readings.gimbal_rad,
-            fins_rad: readings.fins_rad,
+            gimbal_rad,
+            fins_rad,
             contact: switches.contact,
             igniter_continuity: switches.igniter_continuity,
             booster_attached: switches.booster_attached,
@@ -173,15 +173,6 @@ impl RemoteComputer {
 
     pub fn counts(&self) -> &Counts {
         &self.counts
-    }
-
-    /// What the computer commands now, in full precision.
-    pub fn commands(&self) -> &Commands {
-        self.computer.commands()
-    }
-
-    pub fn computer(&self) -> &Computer {
-        &self.computer
     }
 }
 

@@ -93,7 +93,7 @@ impl Lockstep {
 
     /// What is due at this time. [`Due::SendAgain`] counts as done.
     pub fn due(&mut self, now: Duration) -> Due {
-        if now.saturating_sub(self.first_sent) >= self.patience.give_up_after {
+        if self.waited(now) >= self.patience.give_up_after {
             return Due::GiveUp;
         }
         let again_at = self.last_sent + self.patience.send_again_after;
@@ -103,6 +103,11 @@ impl Lockstep {
         self.last_sent = now;
         self.counts.sent_again += 1;
         Due::SendAgain
+    }
+
+    /// How long the frame that was sent last has been on its way.
+    pub fn waited(&self, now: Duration) -> Duration {
+        now.saturating_sub(self.first_sent)
     }
 
     /// The frame that was sent last.
@@ -147,6 +152,7 @@ mod tests {
         assert_eq!(world.due(ms(1480)), Due::SendAgain);
         assert_eq!(world.due(ms(1490)), Due::Wait(ms(1500)), "no longer than until it gives up");
         assert_eq!(world.due(ms(1500)), Due::GiveUp);
+        assert_eq!(world.waited(ms(1500)), ms(1000), "not since the start of the flight");
     }
 
     #[test]

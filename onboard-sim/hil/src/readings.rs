@@ -6,6 +6,12 @@ use flight::estimation::estimator::Measurements;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
     pub measured: Measurements,
+    pub feedback: Feedback,
+}
+
+/// What actuators and switches say at the end of the frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feedback {
     /// Where the gimbal is (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Where the fins are, rad.

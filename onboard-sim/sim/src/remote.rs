@@ -12,9 +12,9 @@ use hil::carried::{CarriedReadings, Wire};
 use hil::readings::Readings;
 use world::World;
 
-use crate::outcome::{Ending, Outcome, judge};
+use crate::outcome::Outcome;
 use crate::recipe::Recipe;
-use crate::sortie::{LONGEST_S, SetUpError, prepared, start};
+use crate::sortie::{SetUpError, prepared, start};
 use crate::surroundings::Surroundings;
 
 /// One flight, seen from the world.
@@ -27,7 +27,6 @@ pub struct RemoteFlight {
     frame: u64,
     phase: Phase,
     ignited: bool,
-    finite: bool,
 }
 
 impl RemoteFlight {
@@ -53,7 +52,6 @@ impl RemoteFlight {
             frame: 0,
             phase: Phase::Deploy,
             ignited: false,
-            finite: true,
         })
     }
 
@@ -68,12 +66,7 @@ impl RemoteFlight {
         self.frame += 1;
         let feedback = self.surroundings.feedback(true, true);
         let Sensed::Measured(measured) = sensed else { unreachable!("a flight with sensors") };
-        self.wire.narrow(&Readings {
-            measured,
-            gimbal_rad: feedback.gimbal_rad,
-            fins_rad: feedback.fins_rad,
-            switches: feedback.switches,
-        })
+        self.wire.narrow(&Readings { measured, feedback })
     }
 
     /// The computer's commands, and its phase.
@@ -81,14 +74,11 @@ impl RemoteFlight {
         self.surroundings.command(commands);
         self.phase = phase;
         self.ignited |= commands.ignite;
-        self.finite &= self.world().state().is_finite()
-            && commands.gimbal_rad.iter().chain(&commands.fins_rad).all(|angle| angle.is_finite());
     }
 
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
-        let world = self.world();
-        self.finite && world.rest().is_none() && world.time_s() < LONGEST_S && !self.phase.on_pad()
+        self.surroundings.go_on() && !self.phase.on_pad()
     }
 
     /// The truth.
@@ -108,16 +98,6 @@ impl RemoteFlight {
 
     /// The outcome so far.
     pub fn outcome(&self) -> Outcome {
-        let world = self.world();
-        let ending = Ending {
-            touchdown: world.touchdown().copied(),
-            rest: world.rest().map(|rest| rest.outcome),
-            phase: self.phase,
-            ignited: self.ignited,
-            lit: world.thrust_begins_s().is_some(),
-            parachute: world.parachute_ejected(),
-            finite: self.finite,
-        };
-        judge(&self.mission, &ending)
+        self.surroundings.outcome(&self.mission, self.phase, self.ignited)
     }
 }

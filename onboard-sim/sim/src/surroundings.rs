@@ -3,15 +3,17 @@
 use flight::computer::pilot::Sensed;
 use flight::computer::{Commands, FRAME_MS};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
+use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
-use hil::readings::Switches;
+use hil::readings::{Feedback, Switches};
 use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
 use world::{Actuators, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;
-use crate::sortie::{SetUpError, errors, start};
+use crate::outcome::{Ending, Outcome, judge};
+use crate::sortie::{LONGEST_S, SetUpError, errors, start};
 
 /// The world of one flight, and what is between it and its flight computer.
 #[derive(Debug, Clone)]
@@ -22,14 +24,8 @@ pub(crate) struct Surroundings {
     actuators: Actuators,
     /// The sensor samples of the last frame.
     measured: Option<Measurements>,
-}
-
-/// The feedback and the switches at the end of a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Feedback {
-    pub(crate) gimbal_rad: [f64; 2],
-    pub(crate) fins_rad: [f64; 4],
-    pub(crate) switches: Switches,
+    /// State and commands have been numbers throughout.
+    finite: bool,
 }
 
 impl Surroundings {
@@ -49,7 +45,7 @@ impl Surroundings {
         };
         let actuators = start::at_rest(mission);
         let faults = SensorFaults::default();
-        Ok((Self { world, sensors, faults, actuators, measured: None }, believed))
+        Ok((Self { world, sensors, faults, actuators, measured: None, finite: true }, believed))
     }
 
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
@@ -97,6 +93,27 @@ impl Surroundings {
         let Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = *commands;
         let (ignite_booster, separate) = (booster.ignite, booster.separate);
         self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute, ignite_booster, separate };
+        self.finite &= self.world.state().is_finite()
+            && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());
+    }
+
+    /// Whether the vehicle is still moving and the time limit has not passed.
+    pub(crate) fn go_on(&self) -> bool {
+        self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
+    }
+
+    /// The outcome so far of a flight whose computer is in this phase; `ignited`: it has fired the landing motor's igniter.
+    pub(crate) fn outcome(&self, mission: &Mission, phase: Phase, ignited: bool) -> Outcome {
+        let ending = Ending {
+            touchdown: self.world.touchdown().copied(),
+            rest: self.world.rest().map(|rest| rest.outcome),
+            phase,
+            ignited,
+            lit: self.world.thrust_begins_s().is_some(),
+            parachute: self.world.parachute_ejected(),
+            finite: self.finite,
+        };
+        judge(mission, &ending)
     }
 
     /// The sensor samples of the last frame; `None` if the computer gets the truth.

@@ -78,6 +78,7 @@ pub(crate) struct CampaignArguments {
 #[derive(Subcommand)]
 enum CampaignCommand {
     /// Merge the parts of a campaign that was flown in shards.
+    #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
     Merge {
         /// Directories of the parts.
         #[arg(required = true, value_name = "DIR")]
@@ -143,11 +144,7 @@ fn order_of(manifest: &Manifest, mission_toml: &str, dispersion_toml: &str) -> a
 }
 
 fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
-    let mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
-    let mission_toml = match arguments.start {
-        Some(start) => recipe::toml_starting_at(&mission_toml, &arguments.profile, start)?,
-        None => mission_toml,
-    };
+    let mission_toml = mission_text(&arguments.profile, arguments.start)?;
     let mut mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {
@@ -176,6 +173,15 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
         faults,
     };
     Ok((Order { recipe, flights: arguments.flights }, expected))
+}
+
+/// The text of a built-in mission or of a file, with the flights' start if one is given.
+pub(super) fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<String> {
+    let text = text_of(profile, vehicles::mission::BUILTIN, "mission")?;
+    Ok(match start {
+        Some(start) => recipe::toml_starting_at(&text, profile, start)?,
+        None => text,
+    })
 }
 
 /// The text of a built-in set, or of a file.

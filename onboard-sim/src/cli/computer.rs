@@ -12,9 +12,8 @@ use onboard_sim::hil::computer::{ComputerEnd, Event};
 use onboard_sim::hil::link::{Brought, HilLink};
 use protocol::identity::VEHICLE;
 use protocol::transport::LinkAddress;
-use sim::recipe::toml_starting_at;
 
-use super::campaign::text_of;
+use super::campaign::mission_text;
 use super::fly::interrupted;
 
 #[derive(Args)]
@@ -37,10 +36,7 @@ pub(crate) fn run(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
 }
 
 async fn answer(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
-    let mut mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
-    if let Some(start) = arguments.start {
-        mission_toml = toml_starting_at(&mission_toml, &arguments.profile, start)?;
-    }
+    let mission_toml = mission_text(&arguments.profile, arguments.start)?;
     let mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
     let mut end = ComputerEnd::new(&mission, &mission_toml);
     let mut link = HilLink::open(arguments.link, VEHICLE).await?;

@@ -47,11 +47,15 @@ pub(crate) struct FlyArguments {
     /// them. Needs --key, which all share.
     #[arg(long, value_name = "FILE", requires = "key")]
     crew: Option<PathBuf>,
-    /// Budget of a network link, bytes per second, 2000 to 1000000; a serial link stays at 2000. More is sent only if a
-    /// station asks for it.
+    /// Budget of a network link, bytes per second, 2000 to 1000000. More is sent only if a station asks for it.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     network_budget: u32,
+    /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it carries, at most what its baud
+    /// rate does. More than 2000 is sent only if a station asks for it, or fetches the log.
+    #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
+        value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
+    serial_budget: u32,
     /// Number of this boot on the wire, instead of a random one.
     #[arg(long, value_name = "NUMBER")]
     boot_number: Option<NonZeroU32>,
@@ -153,6 +157,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let on_the_wire = OnTheWire {
         boot_number: arguments.boot_number.unwrap_or(drawn.boot_number),
         network_bytes_s: arguments.network_budget,
+        serial_bytes_s: arguments.serial_budget,
     };
     let options = FlyOptions {
         on_the_wire,

@@ -16,7 +16,7 @@ const FLIGHTS_MAX: u64 = 100_000;
 
 /// For the help.
 pub(crate) const EXAMPLE: &str = "Example: onboard-sim motors --mission mini-f10 --from \
-    node_modules/thrustcurve-db/thrustcurve-db.json --csv motors.csv";
+    thrustcurve-db.json --csv motors.csv";
 
 #[derive(Args)]
 pub(crate) struct MotorsArguments {

@@ -15,9 +15,9 @@ use onboard_sim::hil::world::{HilError, Manner, fly};
 use protocol::identity::Address;
 use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
-use sim::recipe::{Recipe, toml_starting_at};
+use sim::recipe::Recipe;
 
-use super::campaign::text_of;
+use super::campaign::{mission_text, text_of};
 use super::fly::{WIND_MAX_M_S, with_wind};
 
 /// A simulator's address (MAV_COMP_ID_ALL is not one): any but the vehicle's.
@@ -71,10 +71,7 @@ pub(crate) fn run(arguments: WorldArguments) -> anyhow::Result<ExitCode> {
 }
 
 fn recipe(arguments: &WorldArguments) -> anyhow::Result<Recipe> {
-    let mut mission_toml = text_of(&arguments.profile, vehicles::mission::BUILTIN, "mission")?;
-    if let Some(start) = arguments.start {
-        mission_toml = toml_starting_at(&mission_toml, &arguments.profile, start)?;
-    }
+    let mission_toml = mission_text(&arguments.profile, arguments.start)?;
     let mut toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
     if let Some(wind_m_s) = arguments.wind {
         anyhow::ensure!(
@@ -104,7 +101,7 @@ async fn fly_all(arguments: WorldArguments) -> anyhow::Result<ExitCode> {
     writeln!(out, "world at {}", link.address())?;
     let mut total = Total::default();
     let first_id = OnTheWire::drawn().boot_number.get();
-    for number in arguments.first..arguments.first + arguments.flights {
+    for number in arguments.first..arguments.first.saturating_add(arguments.flights) {
         let flight_id = first_id.wrapping_add((number - arguments.first) as u32);
         let report = match Box::pin(fly(&mut link, &recipe, number, flight_id, &manner)).await {
             Err(error @ (HilError::NoComputer { .. } | HilError::Silent { .. } | HilError::LinkEnded)) => {

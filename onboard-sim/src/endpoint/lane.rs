@@ -11,6 +11,7 @@ use protocol::frame::{Encoder, Frame};
 use protocol::identity::Address;
 
 use super::budget::{BRIEFLY_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
+use super::files::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::stations::MAX_STATIONS;
 use crate::streams::{Due, Streams, WINDOW_S, kept_free_bytes, share_bytes_s};
@@ -19,6 +20,8 @@ use crate::{parameters, telemetry};
 
 /// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
 const MAX_WAITING: usize = 32;
+/// The longest frame with a piece of a file, without its signature.
+const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
 /// Shortest interval between answers to a repeated abort, s.
 const ABORT_ANSWERED_S: f64 = 0.09;
 
@@ -61,6 +64,8 @@ pub(super) struct Lane {
     requested: VecDeque<MavMessage>,
     /// The next parameter of a requested list; `None` when the list has been sent.
     next_parameter: Option<u16>,
+    /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
+    piece_due_s: f64,
 }
 
 impl Lane {
@@ -87,6 +92,7 @@ impl Lane {
             answers: VecDeque::new(),
             requested: VecDeque::new(),
             next_parameter: None,
+            piece_due_s: 0.0,
         };
         let capacity_bytes_s = lane.streams.capacity_bytes_s();
         lane.set_capacity(capacity_bytes_s);
@@ -149,12 +155,13 @@ impl Lane {
     }
 
     /// The frames to send now: vital messages first, then answers, then telemetry by importance, then requested
-    /// messages. The budget holds in every second.
+    /// messages, then pieces of files. The budget holds in every second.
     pub(super) fn poll(
         &mut self,
         context: &Context,
         vehicle: &Vehicle,
         snapshot: &mut Option<Snapshot>,
+        files: &mut FileService,
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
         self.sent.move_to(now_s);
@@ -163,7 +170,7 @@ impl Lane {
         self.answered.move_to(now_s);
         self.said.move_to(now_s);
         let mut frames = Vec::new();
-        let due = self.streams.due(now_s);
+        let due = self.streams.due(now_s, files.is_busy(&self.links, now_s));
         for due in due.iter().filter(|due| due.vital) {
             if due.frame_len > self.sent.room() {
                 break;
@@ -207,6 +214,11 @@ impl Lane {
             }
             self.send(due, context, vehicle, snapshot, &mut frames);
         }
+        while self.requested.len() < MAX_REQUESTED
+            && let Some(answer) = files.next_answer(&self.links)
+        {
+            self.requested.push_back(answer);
+        }
         let longest = self.streams.longest_frame_len();
         while let Some(message) = self.next_requested(vehicle) {
             // Some room is also kept free for telemetry that falls due in the meantime.
@@ -218,7 +230,24 @@ impl Lane {
                 self.next_parameter = self.next_parameter.map(|place| place + 1);
             }
         }
+        self.send_pieces(now_s, files, &mut frames);
         frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
+    }
+
+    /// Sends pieces of files in all the room that is left, evenly spread.
+    fn send_pieces(&mut self, now_s: f64, files: &mut FileService, frames: &mut Vec<Frame>) {
+        let longest = PIECE_FRAME_LEN + self.signature_len;
+        let spacing_s = longest as f64 / f64::from(self.streams.capacity_bytes_s());
+        // A poll that comes late is caught up with, a pause is not.
+        self.piece_due_s = self.piece_due_s.max(now_s - spacing_s);
+        while now_s >= self.piece_due_s
+            && self.room() >= longest
+            && let Some(message) = files.next_piece(&self.links, now_s)
+        {
+            let frame = self.encoder.encode(&message);
+            self.piece_due_s += spacing_s;
+            self.put(frame, now_s, frames);
+        }
     }
 
     /// Room for messages that are not vital. Some of the budget is kept free so that vital messages never wait.

@@ -4,6 +4,7 @@
 //! and texts within their own shares, then telemetry, then requested messages.
 
 mod budget;
+mod files;
 mod lane;
 mod lists;
 mod mission;
@@ -32,6 +33,8 @@ use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
 
+use self::files::FileService;
+pub(crate) use self::files::gives_out_its_log;
 use self::lane::{Answer, Lane};
 use self::refusals::{Refusals, Warnings};
 use self::requests::Waiting;
@@ -73,6 +76,7 @@ pub struct VehicleEndpoint {
     told: Option<Told>,
     told_crew: Option<(TwoPerson, Option<Operator>, Option<Address>)>,
     aborted_at_s: Option<f64>,
+    files: FileService,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -152,6 +156,7 @@ impl VehicleEndpoint {
             told: None,
             told_crew: None,
             aborted_at_s: None,
+            files: FileService::default(),
         }
     }
 
@@ -286,7 +291,9 @@ impl VehicleEndpoint {
                 lane.tell_of_uplink(message.clone());
             }
         }
-        self.lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, &mut snapshot)).collect()
+        self.serve_files(vehicle);
+        let Self { lanes, files, .. } = self;
+        lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, &mut snapshot, files)).collect()
     }
 
     /// Reports a change of state to the crew at once, with the two messages that carry it.
@@ -409,6 +416,17 @@ impl VehicleEndpoint {
             self.lanes.push(own);
         }
         done
+    }
+
+    /// Gives a link a lane of its own, if it shared one.
+    fn separate(&mut self, link: usize) {
+        let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
+        let lane = self.lane(link);
+        if lane.links.len() > 1 {
+            let mut own = lane.of_its_own(link);
+            own.set_capacity(capacity_bytes_s);
+            self.lanes.push(own);
+        }
     }
 
     fn send_message(

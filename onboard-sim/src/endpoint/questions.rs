@@ -14,12 +14,15 @@ use flight::computer::news::Severity;
 impl VehicleEndpoint {
     /// Answers a question about parameters, files or lists; returns whether the frame was one.
     pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &Vehicle) -> bool {
-        let unkept = FileRequest::from_frame(frame)
-            .map(|request| (request.target, request.decline()))
-            .or_else(|| ListQuestion::from_frame(frame).map(|question| (question.target, question.answer)));
-        if let Some((target, answer)) = unkept {
-            if self.us.accepts(target) {
-                self.lane(link).request(vec![answer]);
+        if let Some(request) = FileRequest::from_frame(frame) {
+            if self.us.accepts(request.target) {
+                self.on_file_request(link, &request, operator_of(frame, vehicle), vehicle);
+            }
+            return true;
+        }
+        if let Some(question) = ListQuestion::from_frame(frame) {
+            if self.us.accepts(question.target) {
+                self.lane(link).request(vec![question.answer]);
             }
             return true;
         }

@@ -11,8 +11,10 @@ use protocol::transport::LinkAddress;
 pub struct OnTheWire {
     /// Random number drawn once at each power-up: a different number means a different boot.
     pub boot_number: NonZeroU32,
-    /// Budget of each network link, bytes per second; a serial link leads to a radio and has the radio's budget.
+    /// Budget of each network link, bytes per second.
     pub network_bytes_s: u32,
+    /// Budget of each serial link, bytes per second, as far as its baud rate goes: what a radio behind it carries.
+    pub serial_bytes_s: u32,
 }
 
 impl OnTheWire {
@@ -21,12 +23,14 @@ impl OnTheWire {
         // The standard library's random hash keys differ in every process.
         let drawn = RandomState::new().build_hasher().finish() as u32;
         let boot_number = NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN);
-        Self { boot_number, network_bytes_s: RADIO_BUDGET_BYTES_S }
+        Self { boot_number, network_bytes_s: RADIO_BUDGET_BYTES_S, serial_bytes_s: RADIO_BUDGET_BYTES_S }
     }
 
     pub(super) fn capacity_bytes_s(self, link: &LinkAddress) -> u32 {
         match link {
-            LinkAddress::Serial { .. } => RADIO_BUDGET_BYTES_S,
+            LinkAddress::Serial { baud, .. } => {
+                self.serial_bytes_s.min((baud / 10).max(RADIO_BUDGET_BYTES_S))
+            }
             LinkAddress::UdpIn(_)
             | LinkAddress::UdpOut(_)
             | LinkAddress::TcpIn(_)
@@ -50,6 +54,9 @@ mod tests {
     #[test]
     fn a_network_link_may_carry_more_and_a_serial_line_has_the_radio_s_budget() {
         let wire = OnTheWire { network_bytes_s: 20_000, ..OnTheWire::drawn() };
+        let cable = OnTheWire { serial_bytes_s: 20_000, ..OnTheWire::drawn() };
+        let line: LinkAddress = "serial:/dev/ttyUSB0:57600".parse().unwrap();
+        assert_eq!(cable.capacity_bytes_s(&line), 5_760, "what the line carries");
         let capacity = |link: &str| wire.capacity_bytes_s(&link.parse().unwrap());
         assert_eq!(capacity("udpout:127.0.0.1:14550"), 20_000);
         assert_eq!(capacity("tcpin:127.0.0.1:5760"), 20_000);

@@ -4,6 +4,7 @@ mod boot;
 mod crew;
 mod links;
 mod load;
+mod offered;
 mod own_start;
 mod pace;
 mod radio;
@@ -26,6 +27,7 @@ use vehicles::file_error::FileError;
 pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_flight, load_planar, log_header};
+use self::offered::Offer;
 use self::own_start::OwnStart;
 pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
@@ -287,7 +289,7 @@ pub async fn fly_observed(
     let mut own_start = OwnStart { wanted: options.auto_start, refused: None };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
-    let mut dropped = 0;
+    let (mut dropped, mut offer) = (0, Offer::default());
 
     let stopped = loop {
         if vehicle.time_s() >= log_state_due_s {
@@ -319,6 +321,7 @@ pub async fn fly_observed(
         }
         if let Some(recorder) = &options.recorder {
             record(recorder, &vehicle, &events);
+            offer.step(recorder, &vehicle, &mut endpoint);
         }
         let leaving = endpoint.poll(&vehicle);
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {

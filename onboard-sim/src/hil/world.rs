@@ -20,7 +20,7 @@ use super::messages::{of_frame, of_start};
 use super::report::{FlightReport, Jitter, WireReport};
 use crate::fly::Lateness;
 
-/// Longest flight in real time of which unanswered frames are still told apart, frames.
+/// In real time as many frames are remembered that wait for their answers.
 const ASKED_LEN: usize = 4096;
 
 /// Why a flight of hardware in the loop ended before its end.
@@ -115,7 +115,7 @@ impl Session<'_> {
                     continue;
                 }
                 Due::GiveUp => {
-                    let waited = self.now();
+                    let waited = lockstep.waited(self.now());
                     return Err(HilError::Silent { frame: lockstep.frame(), waited });
                 }
             };
@@ -158,9 +158,9 @@ impl Session<'_> {
             }
             let answer = self.answered(&mut lockstep, &messages).await?;
             self.flight.act(&answer.commands.widen(), answer.phase);
-            let same = shadow.as_ref().is_some_and(|shadow| decided_the_same(shadow, &answer));
-            identical +=
-                u64::from(same && shadow.as_ref().is_some_and(|shadow| same_truth(shadow, &self.flight)));
+            let same =
+                |shadow: &Sortie| decided_the_same(shadow, &answer) && same_truth(shadow, &self.flight);
+            identical += u64::from(shadow.as_ref().is_some_and(same));
         }
         Ok(FlightReport {
             number,

@@ -100,9 +100,19 @@ impl Frame {
         if self.is_signed() { self.with_flags(0) } else { self.clone() }
     }
 
-    /// Returns the bytes that may be logged: without the signature, and `None` for a message that contains a key.
+    /// Returns the bytes that may be logged: without the signature, and `None` for a message that contains a key. A
+    /// piece of a file is logged without its content: a log that is downloaded would contain itself.
     pub fn for_log(&self) -> Option<Vec<u8>> {
-        (self.message_id() != SETUP_SIGNING_ID).then(|| self.without_signature().bytes)
+        if self.message_id() == SETUP_SIGNING_ID {
+            return None;
+        }
+        let content = crate::ftp::packet::piece_begins_at(self.message_id(), self.payload());
+        let cut = content.filter(|from| *from < self.payload().len()).map(|from| {
+            let mut bytes = self.bytes[..HEADER_LEN + from].to_vec();
+            bytes[1] = from as u8;
+            Self { bytes }.with_flags(0).bytes
+        });
+        Some(cut.unwrap_or_else(|| self.without_signature().bytes))
     }
 
     fn with_flags(&self, flags: u8) -> Self {

@@ -46,6 +46,7 @@ pub enum RecorderError {
 enum Order {
     Write(Box<Record>, u64),
     SyncSoon,
+    Mark,
     Finish,
 }
 
@@ -61,6 +62,8 @@ struct Shared {
     tlog_path: Option<PathBuf>,
     dropped: AtomicU64,
     failed: AtomicBool,
+    /// Length of the log up to the mark, bytes; 0 without one.
+    marked_bytes: AtomicU64,
     thread: Mutex<Option<JoinHandle<Result<(), LogWriteError>>>>,
 }
 
@@ -104,6 +107,7 @@ impl Recorder {
             tlog_path,
             dropped: AtomicU64::new(0),
             failed: AtomicBool::new(false),
+            marked_bytes: AtomicU64::new(0),
             thread: Mutex::new(None),
         });
         let for_thread = Arc::clone(&shared);
@@ -121,7 +125,8 @@ impl Recorder {
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
-                let ended = write_until_finished(writer, tlog, &disk, &inbox, &sync_wanted);
+                let ended =
+                    write_until_finished(writer, tlog, &disk, &inbox, &sync_wanted, &for_thread.marked_bytes);
                 for_thread.failed.store(ended.is_err(), Ordering::Release);
                 ended
             })
@@ -171,6 +176,17 @@ impl Recorder {
         let _ = self.orders.try_send(Order::SyncSoon);
     }
 
+    /// Asks for a mark here: everything before it can be read from the file, and does not change any more. Returns
+    /// whether there was room in the queue.
+    pub fn mark_soon(&self) -> bool {
+        self.orders.try_send(Order::Mark).is_ok()
+    }
+
+    /// Length of the file up to the last mark, bytes, once that is written.
+    pub fn marked_bytes(&self) -> Option<u64> {
+        Some(self.shared.marked_bytes.load(Ordering::Acquire)).filter(|bytes| *bytes > 0)
+    }
+
     /// Ends the log with its summary and waits until it is written. Records that other handles send later count as
     /// dropped.
     ///
@@ -199,6 +215,7 @@ fn write_until_finished(
     disk: &File,
     inbox: &Receiver<Order>,
     sync_wanted: &SyncSender<()>,
+    marked_bytes: &AtomicU64,
 ) -> Result<(), LogWriteError> {
     let mut flush_due: Option<Instant> = None;
     loop {
@@ -222,6 +239,12 @@ fn write_until_finished(
             Ok(Order::SyncSoon) | Err(RecvTimeoutError::Timeout) => {
                 hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                 flush_due = None;
+            }
+            Ok(Order::Mark) => {
+                hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
+                flush_due = None;
+                let bytes = disk.metadata().map_err(mcap::McapError::from)?.len();
+                marked_bytes.store(bytes, Ordering::Release);
             }
             Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
                 if let Some(tlog) = &mut tlog {

@@ -309,6 +309,24 @@ impl<W: Write + Seek> LogWriter<W> {
     }
 }
 
+/// The end of a log without a summary: it makes a whole log of the records up to a mark
+/// ([`super::recorder::Recorder::mark_soon`]).
+pub fn ending() -> Vec<u8> {
+    // The lengths of the two records, and zeros: no checksum, no summary.
+    const DATA_END_BYTES: u8 = 4;
+    const FOOTER_BYTES: u8 = 20;
+    let mut bytes = Vec::new();
+    for (opcode, len) in
+        [(mcap::records::op::DATA_END, DATA_END_BYTES), (mcap::records::op::FOOTER, FOOTER_BYTES)]
+    {
+        bytes.push(opcode);
+        bytes.extend_from_slice(&u64::from(len).to_le_bytes());
+        bytes.resize(bytes.len() + usize::from(len), 0);
+    }
+    bytes.extend_from_slice(mcap::MAGIC);
+    bytes
+}
+
 const RAW_FRAME_SCHEMA: &[u8] =
     b"One whole MAVLink frame, start marker to signature. Definitions: the attached dialect and its includes.";
 

@@ -56,7 +56,14 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 /// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict (implied by
 /// --junit) and by compare.
 #[derive(Debug, Parser)]
-#[command(name = "replay", version, about, long_about, verbatim_doc_comment)]
+#[command(
+    name = "replay",
+    version,
+    about,
+    long_about,
+    verbatim_doc_comment,
+    after_help = "Example: replay verify flight.mcap"
+)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     question: Question,
@@ -65,6 +72,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 enum Question {
     /// Describes a log: grade, run, build, phases, verdict, ticks, channels, damage.
+    #[command(after_help = "Example: replay info flight.mcap")]
     Info(info::Ask),
     /// Runs the flight computer of a log again and compares its decisions bit for bit.
     ///
@@ -72,8 +80,10 @@ enum Question {
     /// log has no frames from power-up, only the controller ticks are compared. All fields of the output and the digest
     /// of the memory are compared; measured times are not. For a divergence the report says how it grows, and whether
     /// the landing would end differently (simulated from the first tick that differs).
+    #[command(after_help = "Example: replay verify flight.mcap")]
     Verify(verify::Ask),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
+    #[command(after_help = "Example: replay evaluate flight.mcap --set nmpc.weights.w=90@6.5")]
     Evaluate(evaluate::Ask),
     /// Closed loop: flies the flight again in simulation from a chosen moment, with other settings.
     ///
@@ -82,53 +92,76 @@ enum Question {
     ///
     /// A flight in space is flown again from its start with the recorded draw up to that moment, because a log does not
     /// hold the internal states of gusts, servos and sensors. The answer says how many recorded frames were reproduced.
+    #[command(
+        after_help = "Examples:\n  replay refly flight.mcap --plant plant.thrust_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out"
+    )]
     Refly(refly::Ask),
     /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.
+    #[command(after_help = "Example: replay sweep a.mcap b.mcap --vary nmpc.weights.w=50:110:7")]
     Sweep(sweep::Ask),
     /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
+    #[command(
+        after_help = "Example: replay bisect a.mcap plant.thrust_scale --of-plant --value 1 --lowest 0.9 --highest 1.1"
+    )]
     Bisect(bisect::Ask),
     /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
     ///
     /// One table (and one JUnit file) says which flights got better, worse, flipped between landed and not landed,
     /// diverged or are missing. Exit code 0 if none got worse, 1 if some did, 2 without an answer.
+    #[command(
+        after_help = "Examples:\n  replay gate logs --baseline baseline.json --accept\n  replay gate logs --baseline baseline.json --junit gate.xml"
+    )]
     Gate(gate::Ask),
     /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
     ///
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
+    #[command(after_help = "Example: replay compare old.mcap new.mcap")]
     Compare(compare::Ask),
     /// Flies along: holds the telemetry of a vehicle in flight against what the flight computer of this build expects.
     ///
     /// It only listens. It prints a line for each difference as its frame arrives, records what it heard and flagged, and says
     /// at the end which checks ran at the rates it heard. Signatures are not checked. Exit code 1 if something was flagged.
+    #[command(after_help = "Example: replay shadow --connect udpin:127.0.0.1:14560 --profile mk2 --once")]
     Shadow(shadow::Ask),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
+    #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Ask),
     /// Writes a log's content as CSV, Parquet, .tlog or a Rerun recording.
+    #[command(after_help = "Example: replay export flight.mcap --to parquet --output tables")]
     Export(export::Ask),
     /// Writes a flight as the frames that `board fly` reads, and the answers that it should give.
+    #[command(after_help = "Example: replay frames flight.mcap frames recorded")]
     Frames(frames::Ask),
     /// Converts a ground station's .tlog to a flight log: telemetry only, nothing can be re-executed.
+    #[command(after_help = "Example: replay import flight.tlog")]
     Import(import::Ask),
     /// Proves the books of ground stations (who did what when), or names the first broken link.
     ///
     /// Exit code 0 if every book is whole and its end is vouched for (by its signed last entry, a vehicle's log or --head), 1 if
     /// not, 2 if there is no book.
+    #[command(after_help = "Example: replay audit ground.mcap vehicle.mcap")]
     Audit(audit::Ask),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
+    #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Ask),
     /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
     ///
     /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
     /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is
     /// compared with its motor's certified curve.
+    #[command(
+        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W"
+    )]
     Fit(fit::Ask),
     /// Learns a motor lot, an airframe and a site from all flights so far, and says GO or NO-GO for the next one.
     ///
     /// The prior is a set of dispersions; each burn moves it. The day's flights are simulated with motors that the lot may
     /// have, and the landing rate gets an interval. GO (exit code 0) if the probability of a rate below the limit is at most
     /// the risk that is taken, NO-GO (exit code 1) if not.
+    #[command(after_help = "Example: replay learn fits.json --mission mk2 --limit 0.95 --risk 0.1 --out day")]
     Learn(learn::Ask),
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
+    #[command(after_help = "Example: replay tick flight.mcap 2040")]
     Tick(tick::Ask),
 }
 

@@ -98,6 +98,10 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
             let (Ok(text) | Err(text)) = written;
             out.kind(23).u8(u8::from(written.is_ok())).text(text);
         }
+        Msg::Download(told) => {
+            let (Ok(text) | Err(text)) = told;
+            out.kind(24).u8(u8::from(told.is_ok())).text(text);
+        }
         Msg::Place(place) => drop(out.kind(22).text(&place_file::geojson(place))),
         Msg::Book { head: SignedHead { head, signature }, is_signed } => {
             out.kind(21).u64(head.book).u32(head.entries).raw(&head.hash).raw(signature);
@@ -113,6 +117,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         | Msg::Pasted
         | Msg::SignAsked { .. }
         | Msg::ReportWanted
+        | Msg::DownloadWanted
         | Msg::Terminate(_)
         | Msg::Commanded(_)
         | Msg::ScreenTick => return None,
@@ -175,6 +180,10 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         23 => {
             let (is_written, text) = (rest.u8()? != 0, rest.text()?);
             ToScreen::Msg(Msg::Report(if is_written { Ok(text) } else { Err(text) }))
+        }
+        24 => {
+            let (goes_on, text) = (rest.u8()? != 0, rest.text()?);
+            ToScreen::Msg(Msg::Download(if goes_on { Ok(text) } else { Err(text) }))
         }
         22 => {
             let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
@@ -244,6 +253,7 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Parameters) => out.kind(3),
         ToStation::Request(Request::Sign { step, void }) => out.kind(7).u8(*step).u8(u8::from(*void)),
         ToStation::Request(Request::Report) => out.kind(8),
+        ToStation::Request(Request::Download) => out.kind(9),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -271,6 +281,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         5 => ToStation::Status,
         6 => ToStation::Stop { force: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? },
         8 => ToStation::Request(Request::Report),
+        9 => ToStation::Request(Request::Download),
         7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };

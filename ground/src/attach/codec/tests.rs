@@ -39,10 +39,11 @@ fn greeting_end_of_history_status_and_stopping_survive_the_round_trip() {
 }
 
 #[test]
-fn a_report_survives_the_round_trip() {
+fn a_report_and_a_download_survive_the_round_trip() {
     for written in [Ok("flight.html".to_owned()), Err("disk full".to_owned())] {
-        let told = ToScreen::Msg(Msg::Report(written));
-        assert_eq!(back(&told, Duration::ZERO).0, told);
+        for told in [Msg::Report(written.clone()), Msg::Download(written)].map(ToScreen::Msg) {
+            assert_eq!(back(&told, Duration::ZERO).0, told);
+        }
     }
 }
 
@@ -106,6 +107,7 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort))),
         ToStation::Request(Request::Parameters),
         ToStation::Request(Request::Report),
+        ToStation::Request(Request::Download),
         ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];

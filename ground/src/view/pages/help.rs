@@ -43,7 +43,8 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     }
     let keys = &model.settings.keys;
     let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
-    for definition in works.filter(|definition| !matches!(definition.act, Act::Show(_))) {
+    // The smallest screen has no room for every key after a landing; the palette lists this one, too.
+    for definition in works.filter(|definition| !matches!(definition.act, Act::Show(_) | Act::Redraw)) {
         lines.push(line(keys.name(definition.act), definition.words));
     }
     let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {

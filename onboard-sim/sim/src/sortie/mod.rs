@@ -23,7 +23,7 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use hil::carried::{CarriedCommands, Wire};
-use hil::readings::Readings;
+use hil::readings::{Feedback, Readings};
 use nalgebra::Vector3;
 use world::World;
 use world::sensors::SensorParamError;
@@ -32,10 +32,10 @@ use world::world::WorldError;
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw};
 use crate::fault::Injector;
-use crate::outcome::{Ending, Outcome, judge};
+use crate::outcome::Outcome;
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
-use crate::surroundings::{Feedback, Surroundings};
+use crate::surroundings::Surroundings;
 
 /// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
 pub(crate) const LONGEST_S: f64 = 150.0;
@@ -87,7 +87,6 @@ pub struct Sortie {
     /// Frames since power-up.
     frame: u64,
     abort: bool,
-    finite: bool,
     largest_errors: EstimatorErrors,
 }
 
@@ -159,7 +158,6 @@ impl Sortie {
             dead: false,
             frame: 0,
             abort: false,
-            finite: true,
             largest_errors: EstimatorErrors::default(),
             mission: mission.clone(),
             dispersion: *dispersion,
@@ -251,11 +249,8 @@ impl Sortie {
         let (Some(wire), Sensed::Measured(measured)) = (&self.wire, sensed) else {
             return (Feeling::InSpace(*sensed), feedback);
         };
-        let Feedback { gimbal_rad, fins_rad, switches } = feedback;
-        let told = wire.carry(&Readings { measured: *measured, gimbal_rad, fins_rad, switches });
-        let feedback =
-            Feedback { gimbal_rad: told.gimbal_rad, fins_rad: told.fins_rad, switches: told.switches };
-        (Feeling::InSpace(Sensed::Measured(told.measured)), feedback)
+        let told = wire.carry(&Readings { measured: *measured, feedback });
+        (Feeling::InSpace(Sensed::Measured(told.measured)), told.feedback)
     }
 
     fn command(&mut self, commands: &Commands) {
@@ -264,12 +259,9 @@ impl Sortie {
         self.surroundings.command(commands);
         let falls = !self.computer.mode().phase.before_apogee();
         if falls && self.fall.is_none() {
-            self.fall = Some(*self.surroundings.world.state());
+            self.fall = Some(*self.world().state());
         }
-        self.finite &= self.surroundings.world.state().is_finite()
-            && commands.gimbal_rad.iter().chain(&commands.fins_rad).all(|angle| angle.is_finite());
-        if falls && self.surroundings.world.touchdown().is_none() && self.surroundings.world.height_m() < 10.0
-        {
+        if falls && self.world().touchdown().is_none() && self.world().height_m() < 10.0 {
             self.largest_errors = self.largest_errors.or_larger(&self.errors());
         }
     }
@@ -278,7 +270,7 @@ impl Sortie {
     fn let_go_when_cleared(&mut self) {
         let after_s = self.mission.drop.map_or(0.0, |drop| drop.release_after_s);
         let ended_s = self.computer.mode().countdown_end_s;
-        if self.surroundings.world.hangs()
+        if self.world().hangs()
             && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
         {
             self.surroundings.world.let_go();
@@ -293,10 +285,7 @@ impl Sortie {
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
         let stays = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
-        self.finite
-            && self.surroundings.world.rest().is_none()
-            && self.surroundings.world.time_s() < LONGEST_S
-            && !stays
+        self.surroundings.go_on() && !stays
     }
 
     /// Flies to the end.
@@ -406,16 +395,8 @@ impl Sortie {
 
     /// The outcome so far.
     pub fn outcome(&self) -> Outcome {
-        let ending = Ending {
-            touchdown: self.surroundings.world.touchdown().copied(),
-            rest: self.surroundings.world.rest().map(|rest| rest.outcome),
-            phase: self.computer.mode().phase,
-            ignited: self.pilot().ignited_at_s().is_some(),
-            lit: self.surroundings.world.thrust_begins_s().is_some(),
-            parachute: self.surroundings.world.parachute_ejected(),
-            finite: self.finite,
-        };
-        judge(&self.mission, &ending)
+        let ignited = self.pilot().ignited_at_s().is_some();
+        self.surroundings.outcome(&self.mission, self.computer.mode().phase, ignited)
     }
 }
 

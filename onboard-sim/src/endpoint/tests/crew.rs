@@ -461,3 +461,31 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
     assert!(armed > 50 && sent > 20_000, "{armed} times armed by {sent} frames: too few to show anything");
     assert_eq!(launch.hub.signing().map(|counters| counters.wrong > 1_000), Some(true));
 }
+
+/// A log that is fetched thins the telemetry, so only an operator fetches it.
+#[test]
+fn the_log_is_for_operators() {
+    use protocol::ftp::packet::Refusal;
+    use protocol::ftp::{Opcode, Packet};
+    use protocol::identity::VEHICLE;
+
+    let mut launch = Launch::two();
+    launch.endpoint.offer(super::files::InMemory::boxed(1000));
+    let fetches = |launch: &mut Launch, station: usize, packet: &Packet| {
+        let frame = launch.signed(station, &packet.message(VEHICLE));
+        launch.sent.clear();
+        launch.deliver(&frame);
+        launch.run(0.5);
+        let answer = launch.sent.iter().find_map(Packet::answer_in).map(|(_, answer)| answer);
+        (answer, texts(&launch.sent).join("; "))
+    };
+    let open = Packet::request(1, 0, Opcode::OpenFileRo, 0, "/log/flight.mcap");
+    let read = Packet { size: 239, ..Packet::request(2, 0, Opcode::ReadFile, 0, "") };
+    assert_eq!(fetches(&mut launch, FLIGHT, &open).0.unwrap().number(), Some(1000));
+    let (refused, words) = fetches(&mut launch, OBSERVER, &open);
+    assert_eq!(refused.unwrap().refusal(), Some(Refusal::Busy));
+    assert!(words.contains("log refused: only an operator"), "{words}");
+    assert_eq!(fetches(&mut launch, STRANGER, &open).0, None, "not signed with a known key");
+    // The operator's file is still open.
+    assert_eq!(fetches(&mut launch, FLIGHT, &read).0.unwrap().data.len(), 239);
+}

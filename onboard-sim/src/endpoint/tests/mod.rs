@@ -364,6 +364,7 @@ proptest! {
 mod book;
 mod budget;
 mod crew;
+mod files;
 mod links;
 mod manners;
 mod questions;
