@@ -44,7 +44,7 @@ enum Command {
     Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     #[command(
-        after_help = "Example: onboard-sim campaign --profile mk2 --dispersion real --flights 1000 --seed 1 --out mk2-real"
+        after_help = "Example: onboard-sim campaign --profile mk2 --dispersion real --flights 1000 --out mk2-real"
     )]
     Campaign(cli::campaign::CampaignArguments),
     /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
