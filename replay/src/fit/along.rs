@@ -13,10 +13,10 @@
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
-use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
+use flight::vehicle::airframe::{MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2};
 use world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
@@ -101,23 +101,6 @@ impl Along {
         (total, libm::sqrt(variance + of_speed * of_speed + of_scale * of_scale))
     }
 
-    /// Force of the air along the nose with what was found of it, N.
-    pub(super) fn air_force_n(
-        &self,
-        airframe: &Airframe,
-        mass: &MassProperties,
-        density_kg_m3: f64,
-        through_air_m_s: &Vector3<f64>,
-        fins_rad: [f64; 4],
-        burning: bool,
-    ) -> f64 {
-        let values = &self.solution.values;
-        let left = |loss: usize| if burning { 1.0 - values.get(loss).copied().unwrap_or(0.0) } else { 1.0 };
-        let vehicle = VehicleNow::of(airframe, mass, density_kg_m3, fins_rad, false, 0.0);
-        let (body_n, fins_n) = along_nose_n(&vehicle, through_air_m_s, &Vector3::zeros());
-        values[BODY] * left(BODY_LOSS) * body_n + values[FINS] * left(FIN_LOSS) * fins_n
-    }
-
     pub(super) fn burn<'a>(&self, trace: &'a Trace) -> Burn<'a> {
         burn_of(trace, &self.solution.values)
     }
@@ -183,15 +166,16 @@ fn samples(
         let height_m = state.position_m.z;
         let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
         let vehicle = VehicleNow::of(&mission.airframe, mass, density, fins_rad, false, 0.0);
+        let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
+        let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
         let rate = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
-        let up = state.world_from_body.inverse_transform_vector(&Vector3::z());
-        let (body_n, fins_n) = along_nose_n(&vehicle, &through_air, &rate);
+        let up = state.world_from_body.inverse_transform_vector(&nalgebra::Vector3::z());
         let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;
         Sample {
             end_s: frame.time_s,
             felt_m_s2: frame.measured.imu.specific_force_m_s2.x,
-            body_n,
-            fins_n,
+            body_n: body.air_force_n(&through_air, &rate).x,
+            fins_n: fins.air_force_n(&through_air, &rate).x,
             by_updraught: 0.5 * (in_updraught(1.0) - in_updraught(-1.0)),
             // The length does not depend on the wind.
             way: near.then(|| through_air.norm() * FRAME_S / GustScales::at(height_m, 0.0).vertical_m),
@@ -199,13 +183,6 @@ fn samples(
         }
     });
     sampled.collect()
-}
-
-/// Air force along the nose on body and fins by the airframe's data, N.
-fn along_nose_n(vehicle: &VehicleNow, through_air_m_s: &Vector3<f64>, rate: &Vector3<f64>) -> (f64, f64) {
-    let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..*vehicle };
-    let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..*vehicle };
-    (body.air_force_n(through_air_m_s, rate).x, fins.air_force_n(through_air_m_s, rate).x)
 }
 
 /// Vertical gusts of unit intensity: two equal lags in a row, over a fraction of the length.

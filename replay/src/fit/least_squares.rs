@@ -133,7 +133,7 @@ pub(super) fn inflate(
 }
 
 /// Central differences.
-pub(super) fn derivatives(
+fn derivatives(
     values: &[f64],
     priors: &[Prior],
     residuals: &impl Fn(&[f64]) -> Vec<f64>,

@@ -7,8 +7,7 @@
 //!
 //! * [`trace`]: a flight's frames.
 //! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust.
-//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its
-//!   models, [`rest`] is what they leave.
+//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its models.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`sensors`]: noises and biases.
 //! * [`stand`]: a burn on a test stand.
@@ -21,7 +20,6 @@ mod burn;
 mod least_squares;
 mod patch;
 mod pooled;
-mod rest;
 mod sensors;
 mod servo;
 mod stand;

@@ -6,23 +6,20 @@
 //! pilot's commands answer to that rest, so it has to be a part of the model: treated as noise without memory it would
 //! pass for an effect of the commands (L. Ljung, System Identification, 2nd edition, section 13.4).
 //!
-//! The drag does not pass through a centre of gravity beside the axis and turns the vehicle, a fifth as much as the thrust
-//! does: without that, the misalignment has an error of 0.03 degrees for a millimetre that no interval has.
-//!
 //! The data's inertia cannot be told from the gimbal's gain, and a centre of gravity beside the axis not from a crooked
 //! nozzle: gain and misalignment are those of the whole.
 
 use flight::computer::FRAME_S;
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::atmosphere::Air;
-use nalgebra::Vector3;
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::air_moment::air_moment_n_m;
 use super::along::{Along, BLOCK, FINS, IMPULSE, falling, follows, white_variance};
-use super::least_squares::{Prior, Solution, derivatives, inflate, solve_from};
-use super::rest::{Line, Rest};
+use super::least_squares::{Prior, Solution, inflate, solve_from};
 use super::servo::{PARTS, ServoModel};
 use super::trace::Trace;
+use super::whiten::{NoiseStep, Whitener, lowest};
 
 pub(super) const DELAY: usize = 0;
 pub(super) const RATE: usize = 1;
@@ -30,10 +27,6 @@ pub(super) const GAIN: usize = 2;
 pub(super) const PITCH: usize = 3;
 pub(super) const YAW: usize = 4;
 pub(super) const PLAY: usize = 5;
-/// How far the centre of gravity lies beside the axis, towards body z and y, m.
-const CENTRE: usize = 6;
-/// Standard deviation of a centre of gravity beside the axis: a rocket that is rolled on a table is balanced to a millimetre.
-const CENTRE_SIGMA_M: f64 = 0.001;
 
 /// Noise of a feedback potentiometer, rad: a tenth of a degree.
 const FEEDBACK_RAD: f64 = 0.001_745;
@@ -59,9 +52,8 @@ struct Sample {
     known_rad_s2: [f64; 2],
     /// Angular acceleration of a unit sine of the gimbal's angle, rad/s^2.
     by_gimbal_rad_s2: f64,
-    /// Angular acceleration for a metre of the centre of gravity beside the axis: the drag passes by it.
-    by_centre_rad_s2: f64,
     burning: bool,
+    begins: bool,
 }
 
 /// Fits the gimbal over the burn; an error is the reason why it cannot be.
@@ -95,19 +87,16 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
         Prior { mean: 0.0, sigma: 0.1 },
         // Printed linkages have half a degree to a degree.
         Prior { mean: servo.slop_rad(), sigma: 0.5_f64.to_radians() },
-        Prior { mean: 0.0, sigma: CENTRE_SIGMA_M },
-        Prior { mean: 0.0, sigma: CENTRE_SIGMA_M },
     ];
     let model = Model { samples: &samples, commands_rad: &commands_rad, limit_rad: gimbal.limit_rad() };
     let felt = |axis: usize| samples.iter().map(|sample| sample.felt_rad_s[axis]).collect::<Vec<_>>();
     let white = [0, 1].map(|axis| white_variance(&felt(axis)).unwrap_or(1e-6));
     let white = 0.5 * (white[0] + white[1]);
-    let values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    let mut values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
     let mut rest = Rest { sigma_rad_s2: 1.0, lasts_s: 0.3, rough: 0.01 };
-    let frames = samples.len();
     let whitened = |rest: Rest| {
         let (model, reported_rad) = (&model, &reported_rad);
-        let whitener = rest.whitener(frames, white);
+        let whitener = rest.whitener(&samples, white);
         move |values: &[f64]| {
             let [pitch, yaw] = model.missed(values);
             let mut all = whitener.apply(&pitch);
@@ -116,29 +105,13 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
             all
         }
     };
-    let plain = |values: &[f64]| {
-        let [mut all, yaw] = model.missed(values);
-        all.extend(yaw);
-        all.extend(model.feedback(values, &reported_rad));
-        all
-    };
-    let mut found = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
     for _ in 0..2 {
-        rest = line(&found.values, &priors, &plain, frames, white).most_likely(rest);
-        found = solve_from(&found.values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+        let found = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+        values = found.values;
+        rest = rest.most_likely(&samples, white, &model.missed(&values));
     }
-    // What is wrong with the model beside the rest's process, as its residuals show it, widens the mixture as well.
-    let known = found.covariance.diagonal();
-    inflate(&mut found, &priors, whitened(rest), BLOCK);
-    let wider: Vec<f64> =
-        (0..priors.len()).map(|k| libm::sqrt(found.covariance[(k, k)] / known[k])).collect();
-    let mut solution =
-        line(&found.values, &priors, &plain, frames, white).posterior(rest).ok_or(NOT_SOLVED)?;
-    for row in 0..priors.len() {
-        for column in 0..priors.len() {
-            solution.covariance[(row, column)] *= wider[row] * wider[column];
-        }
-    }
+    let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+    inflate(&mut solution, &priors, whitened(rest), BLOCK);
     // The gain is that of thrust times arm over inertia, and the thrust has its own error.
     let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
         / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
@@ -146,25 +119,56 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
     Ok(Turning { solution, priors: priors.to_vec(), reported })
 }
 
-/// The model around some values. `plain` gives the residuals of both axes, one after the other, and of the feedback.
-fn line<'a>(
-    values: &'a [f64],
-    priors: &'a [Prior],
-    plain: &impl Fn(&[f64]) -> Vec<f64>,
-    frames: usize,
-    white: f64,
-) -> Line<'a> {
-    let missed = plain(values);
-    let slopes = derivatives(values, priors, plain, missed.len());
-    let axis = |axis: usize| slopes.rows(axis * frames, frames).into_owned();
-    Line {
-        values,
-        priors,
-        missed: [missed[..frames].to_vec(), missed[frames..2 * frames].to_vec()],
-        slopes: [axis(0), axis(1)],
-        other: missed[2 * frames..].to_vec(),
-        other_slopes: slopes.rows(2 * frames, missed.len() - 2 * frames).into_owned(),
-        white,
+/// The process of the rotation that the model does not explain.
+#[derive(Clone, Copy)]
+struct Rest {
+    sigma_rad_s2: f64,
+    lasts_s: f64,
+    /// Density of what has no memory, rad/s^2/sqrt(Hz).
+    rough: f64,
+}
+
+impl Rest {
+    fn whitener(&self, samples: &[Sample], white: f64) -> Whitener {
+        let kept = libm::exp(-FRAME_S / self.lasts_s);
+        let variance = self.sigma_rad_s2 * self.sigma_rad_s2;
+        let steps = samples.iter().map(|sample| NoiseStep {
+            transition: Matrix2::new(1.0, FRAME_S, 0.0, kept),
+            process: Matrix2::new(
+                self.rough * self.rough * FRAME_S,
+                0.0,
+                0.0,
+                variance * (1.0 - kept * kept),
+            ),
+            // The rate at the beginning, and the gyro's bias with it, is free.
+            begins: sample.begins.then(|| Matrix2::new(1.0, 0.0, 0.0, variance)),
+            // The gyro has the mean over the frame.
+            seen: Vector2::new(1.0, -0.5 * FRAME_S),
+            white,
+        });
+        Whitener::new(steps)
+    }
+
+    /// The most likely process for these residuals, each number in turn.
+    fn most_likely(self, samples: &[Sample], white: f64, missed: &[Vec<f64>; 2]) -> Self {
+        let surprise = |rest: Self| {
+            let whitener = rest.whitener(samples, white);
+            missed.iter().map(|axis| whitener.surprise(axis)).sum::<f64>()
+        };
+        let mut rest = self;
+        for _ in 0..2 {
+            let of_sigma = |logarithm: f64| Self { sigma_rad_s2: libm::exp(logarithm), ..rest };
+            let sigma_rad_s2 =
+                libm::exp(lowest(libm::log(0.01), libm::log(30.0), 14, |at| surprise(of_sigma(at))));
+            rest = Self { sigma_rad_s2, ..rest };
+            let of_time = |logarithm: f64| Self { lasts_s: libm::exp(logarithm), ..rest };
+            let lasts_s = libm::exp(lowest(libm::log(0.02), libm::log(5.0), 14, |at| surprise(of_time(at))));
+            rest = Self { lasts_s, ..rest };
+            let of_rough = |logarithm: f64| Self { rough: libm::exp(logarithm), ..rest };
+            let rough = libm::exp(lowest(libm::log(1e-4), libm::log(1.0), 14, |at| surprise(of_rough(at))));
+            rest = Self { rough, ..rest };
+        }
+        rest
     }
 }
 
@@ -195,9 +199,6 @@ impl Model<'_> {
             let missed = self.samples.iter().enumerate().map(|(place, sample)| {
                 // The thrust turns about the pitch axis inside what the yaw axis leaves.
                 let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
-                // Towards body z it turns about y, towards y the other way about z; the offsets' signs are the gimbal's.
-                let known_rad_s2 =
-                    sample.known_rad_s2[axis] - sample.by_centre_rad_s2 * values[CENTRE + axis];
                 let mut mean_rad_s = 0.0;
                 for angle_rad in both[axis][place].0 {
                     let turn = if sample.burning {
@@ -205,7 +206,7 @@ impl Model<'_> {
                     } else {
                         0.0
                     };
-                    let by_rad_s = (turn + known_rad_s2) * part_s;
+                    let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
                     rate_rad_s += by_rad_s;
                     // As the simulated unit, which adds up the rates at the end of each millisecond.
                     mean_rad_s += rate_rad_s / PARTS as f64;
@@ -242,8 +243,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
     let burn = along.burn(trace);
     let flow_kg_n_s = curve.propellant_mass_kg() / (curve.total_impulse_n_s() * burn.impulse_scale);
     let frames = falling(trace);
-    let pairs = frames[first - 1..].windows(2);
-    let samples = pairs.map(|pair| {
+    let pairs = frames[first - 1..].windows(2).enumerate();
+    let samples = pairs.map(|(place, pair)| {
         let (before, frame) = (&pair[0], &pair[1]);
         let to_s = frame.time_s - begins_s;
         let burning = to_s > 0.0;
@@ -272,9 +273,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
                 air.z / inertia - coupling * rate.y - damping * rate.z,
             ],
             by_gimbal_rad_s2: thrust_n * arm_m / inertia,
-            by_centre_rad_s2: along.air_force_n(airframe, &mass, density, &through_air, fins_rad, burning)
-                / inertia,
             burning,
+            begins: place == 0,
         }
     });
     samples.collect()
