@@ -529,8 +529,8 @@ impl Station {
             Output::Screen(screen) => drop(screen),
             Output::Lines(mut lines) => lines.show(model),
         }
-        if let Some(mut download) = self.download {
-            download.remember();
+        if let Some(download) = self.download {
+            download.stop();
         }
         if let Some(demo) = self.demo {
             demo.stop().await;

@@ -44,8 +44,7 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
         let msgs = tokio::select! {
             biased;
             signal = signals.next() => {
-                downloading.remember();
-                drop(downloading);
+                downloading.stop();
                 shown.end();
                 anyhow::bail!("stopped by {signal}; the same command goes on with what is here");
             }

@@ -1,8 +1,8 @@
-//! The thread that has the files of a download: nothing else waits for the disk.
+//! The thread that has the files of a download. Nothing else waits for the disk: a disk that hangs must not hold up an abort.
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
 use protocol::ftp::part::Part;
@@ -32,12 +32,17 @@ pub(super) enum Told {
     Failed(anyhow::Error),
 }
 
-/// A handle to the thread.
+/// The disk does not keep up: what has arrived is lost.
+#[derive(Debug, thiserror::Error)]
+#[error("the disk does not keep up with the link; the next download goes on with what is there")]
+pub(super) struct Behind;
+
+/// A handle to the thread. Without it the thread does what it was told, and ends.
 #[derive(Debug)]
 pub(super) struct Keeper {
-    orders: Option<SyncSender<Order>>,
+    orders: SyncSender<Order>,
     told: Receiver<Told>,
-    thread: Option<JoinHandle<()>>,
+    thread: JoinHandle<()>,
 }
 
 impl Keeper {
@@ -51,29 +56,29 @@ impl Keeper {
         let thread = std::thread::Builder::new()
             .name("download".to_owned())
             .spawn(move || serve(kept, &inbox, &tell))?;
-        Ok(Self { orders: Some(orders), told, thread: Some(thread) })
+        Ok(Self { orders, told, thread })
     }
 
-    pub(super) fn begin_again(&self) {
-        self.order(Order::BeginAgain);
+    pub(super) fn begin_again(&self) -> Result<(), Behind> {
+        self.order(Order::BeginAgain)
     }
 
-    pub(super) fn write(&self, offset: u32, piece: Vec<u8>) {
-        self.order(Order::Write { offset, piece });
+    pub(super) fn write(&self, offset: u32, piece: Vec<u8>) -> Result<(), Behind> {
+        self.order(Order::Write { offset, piece })
     }
 
-    pub(super) fn remember(&self, part: Part) {
-        self.order(Order::Remember(Box::new(part)));
+    pub(super) fn remember(&self, part: Part) -> Result<(), Behind> {
+        self.order(Order::Remember(Box::new(part)))
     }
 
     /// Asks for the checksum of everything that was written.
-    pub(super) fn sum(&self) {
-        self.order(Order::Sum);
+    pub(super) fn sum(&self) -> Result<(), Behind> {
+        self.order(Order::Sum)
     }
 
     /// The log is whole: it gets its name.
-    pub(super) fn finish(&self) {
-        self.order(Order::Finish);
+    pub(super) fn finish(&self) -> Result<(), Behind> {
+        self.order(Order::Finish)
     }
 
     /// What the thread has said since.
@@ -81,21 +86,18 @@ impl Keeper {
         self.told.try_recv().ok()
     }
 
-    fn order(&self, order: Order) {
-        if let Some(orders) = &self.orders {
-            // A thread that has ended has said why.
-            let _ = orders.send(order);
-        }
+    /// Waits until everything is on disk, for a program that ends.
+    pub(super) fn close(self) {
+        drop(self.orders);
+        // A panic was printed already.
+        let _ = self.thread.join();
     }
-}
 
-impl Drop for Keeper {
-    /// Waits until everything is on disk.
-    fn drop(&mut self) {
-        self.orders = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic was printed already.
-            let _ = thread.join();
+    fn order(&self, order: Order) -> Result<(), Behind> {
+        match self.orders.try_send(order) {
+            // A thread that has ended has said why.
+            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(()),
+            Err(TrySendError::Full(_)) => Err(Behind),
         }
     }
 }
@@ -121,5 +123,20 @@ fn serve(mut kept: Kept, inbox: &Receiver<Order>, tell: &SyncSender<Told>) {
                 return;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The thread is not there to take anything: as with a disk that hangs.
+    #[test]
+    fn a_disk_that_hangs_fails_the_download_and_holds_nothing_up() {
+        let (orders, _inbox) = sync_channel(2);
+        let (_tell, told) = sync_channel(1);
+        let keeper = Keeper { orders, told, thread: std::thread::spawn(|| {}) };
+        assert!(keeper.write(0, vec![1]).is_ok() && keeper.write(1, vec![2]).is_ok());
+        assert!(keeper.write(2, vec![3]).unwrap_err().to_string().contains("does not keep up"));
     }
 }

@@ -83,8 +83,7 @@ impl Downloading {
         }
         let news = self.download.take(&packet, now);
         self.open()?;
-        self.write(news);
-        Ok(())
+        self.write(news)
     }
 
     /// Goes on: what to send, and what there is to say.
@@ -95,11 +94,21 @@ impl Downloading {
         (messages, word)
     }
 
-    /// Remembers what is there, so that the next download goes on with it.
-    pub(super) fn remember(&mut self) {
-        if let (Some(part), Some(keeper)) = (self.download.part(), &self.keeper) {
-            keeper.remember(part);
+    /// Stops, for a program that ends: waits until what has arrived is on disk and remembered.
+    pub(super) fn stop(mut self) {
+        // If the disk does not keep up, the next download fetches more.
+        let _ = self.remember();
+        if let Some(keeper) = self.keeper.take() {
+            keeper.close();
         }
+    }
+
+    /// Remembers what is there, so that the next download goes on with it.
+    fn remember(&self) -> anyhow::Result<()> {
+        if let (Some(part), Some(keeper)) = (self.download.part(), &self.keeper) {
+            keeper.remember(part)?;
+        }
+        Ok(())
     }
 
     fn go_on(&mut self, now: Duration) -> anyhow::Result<Option<Word>> {
@@ -109,7 +118,7 @@ impl Downloading {
                 Told::Sum(sum) => {
                     self.summing = false;
                     let news = self.download.compare(sum);
-                    self.write(news);
+                    self.write(news)?;
                 }
                 Told::Finished(path) => return Ok(Some(Word::Done(path))),
                 Told::Failed(error) => return Err(error),
@@ -117,7 +126,7 @@ impl Downloading {
         }
         if now.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
             self.remembered_at = now;
-            self.remember();
+            self.remember()?;
         }
         let Some(keeper) = &self.keeper else {
             return self.download.ended().transpose().map(|_| None).map_err(Into::into);
@@ -125,14 +134,14 @@ impl Downloading {
         match self.download.ended() {
             Some(Ok(())) => {
                 if !std::mem::replace(&mut self.finishing, true) {
-                    keeper.finish();
+                    keeper.finish()?;
                 }
                 Ok(None)
             }
             Some(Err(failure)) => anyhow::bail!(failure),
             None => {
                 if self.download.is_whole() && !std::mem::replace(&mut self.summing, true) {
-                    keeper.sum();
+                    keeper.sum()?;
                 }
                 Ok(self.next_tenth().map(Word::Goes))
             }
@@ -154,13 +163,14 @@ impl Downloading {
         Ok(())
     }
 
-    fn write(&mut self, news: Option<News>) {
-        let Some(keeper) = &self.keeper else { return };
+    fn write(&self, news: Option<News>) -> anyhow::Result<()> {
+        let Some(keeper) = &self.keeper else { return Ok(()) };
         match news {
-            Some(News::Begins { fresh: true }) => keeper.begin_again(),
-            Some(News::Piece { offset, data }) => keeper.write(offset, data),
+            Some(News::Begins { fresh: true }) => keeper.begin_again()?,
+            Some(News::Piece { offset, data }) => keeper.write(offset, data)?,
             Some(News::Begins { fresh: false }) | None => {}
         }
+        Ok(())
     }
 
     /// A word at the beginning and at every tenth of the file.
