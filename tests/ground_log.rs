@@ -14,9 +14,9 @@ fn replay(folder: &Path, arguments: &[&str]) -> Ended {
 fn column(table: &Path, name: &str) -> Vec<String> {
     let text = std::fs::read_to_string(table).unwrap_or_else(|error| panic!("{}: {error}", table.display()));
     let mut lines = text.lines().map(|line| line.split(','));
-    let mut head = lines.next().unwrap();
+    let mut head = lines.next().expect("a table begins with its columns");
     let place = head.position(|column| column == name).unwrap_or_else(|| panic!("{name} in {text:.200}"));
-    lines.map(|mut cells| cells.nth(place).unwrap().to_owned()).collect()
+    lines.map(|mut cells| cells.nth(place).expect("every row has every column").to_owned()).collect()
 }
 
 /// The line of `replay info` that begins with a word.
@@ -43,7 +43,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
         // Name, value and unit; the times before them are of two clocks.
         let said = |info: &Ended| {
             let line = fact(info, row).split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-            line[..row.split(' ').count() + 1].to_vec()
+            line[..=row.split(' ').count()].to_vec()
         };
         assert_eq!(said(&own), said(&heard), "{row}\n{}\n{}", own.output, heard.output);
     }

@@ -135,7 +135,8 @@ mod tests {
     fn a_disk_that_hangs_fails_the_download_and_holds_nothing_up() {
         let (orders, _inbox) = sync_channel(2);
         let (_tell, told) = sync_channel(1);
-        let keeper = Keeper { orders, told, thread: std::thread::spawn(|| {}) };
+        let thread = std::thread::Builder::new().name("idle".to_owned()).spawn(|| {}).unwrap();
+        let keeper = Keeper { orders, told, thread };
         assert!(keeper.write(0, vec![1]).is_ok() && keeper.write(1, vec![2]).is_ok());
         assert!(keeper.write(2, vec![3]).unwrap_err().to_string().contains("does not keep up"));
     }
