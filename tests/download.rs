@@ -4,7 +4,8 @@ use std::path::Path;
 use std::process::Command;
 
 use e2e::{
-    ABORT, ACCEPTED, BareGround, Bound, Ended, Program, Running, SerialLine, Signal, keygen, program, vehicle,
+    ABORT, ACCEPTED, BareGround, Bound, Program, Running, SerialLine, Signal, expect_identical_replay,
+    keygen, landed_vehicle, program, vehicle,
 };
 use protocol::dialect::TdPhase;
 
@@ -14,27 +15,12 @@ fn download(folder: &Path, link: &str) -> Command {
     command
 }
 
-/// A vehicle that flies by itself and stays; its simulated time runs so fast that its motor is cold after seconds.
-fn landed_vehicle(folder: &Path, more: &[&str]) -> Running {
-    let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--profile", "mk2", "--seed", "1", "--auto-start", "--stay", "--speed", "20"]);
-    command.args(["--network-budget", "20000", "--log", "flight.mcap", "--mavlink", "udpin:127.0.0.1:0"]);
-    command.args(more).current_dir(folder);
-    let mut vehicle = Running::start(&mut command);
-    vehicle.wait_for_line("TOUCHDOWN to SAFED");
-    vehicle
-}
-
-fn verify(log: &Path) -> Ended {
-    Running::to_end(program(Program::Replay).arg("verify").arg(log))
-}
-
 #[test]
 fn the_log_of_a_landed_vehicle_is_fetched_over_signed_udp_and_replays_bit_for_bit() {
     let (on_board, on_ground) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     keygen(on_board.path(), "flight.key");
     let key = on_board.path().join("flight.key").display().to_string();
-    let mut vehicle = landed_vehicle(on_board.path(), &["--key", &key]);
+    let mut vehicle = landed_vehicle(on_board.path(), "mk2", "udpin:127.0.0.1:0", &["--key", &key]);
     let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));
     let fetched = Running::to_end(download(on_ground.path(), &link).args(["--key", &key]));
     assert_eq!(fetched.code, Some(0), "{}", fetched.output);
@@ -43,9 +29,7 @@ fn the_log_of_a_landed_vehicle_is_fetched_over_signed_udp_and_replays_bit_for_bi
     let there: Vec<_> =
         std::fs::read_dir(on_ground.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(there, std::slice::from_ref(&log), "nothing else is left");
-    let verified = verify(&log);
-    assert_eq!(verified.code, Some(0), "{}", verified.output);
-    assert!(verified.output.contains("identical"), "{}", verified.output);
+    expect_identical_replay(on_ground.path(), "vehicle1-flight.mcap");
     // All of the flight is in it: recording went on behind it, so the log on board has it as its beginning.
     let (fetched_bytes, kept_bytes) =
         (std::fs::read(&log).unwrap(), std::fs::read(on_board.path().join("flight.mcap")).unwrap());
@@ -108,8 +92,7 @@ fn a_download_over_a_serial_line_goes_on_after_a_kill() {
     let len = std::fs::metadata(&log).unwrap().len();
     println!("{len} bytes; the line carried {} for the second part", line.carried()[0] - before);
     assert!(!pieces.exists() && !memory.exists());
-    let verified = verify(&log);
-    assert_eq!(verified.code, Some(0), "{}", verified.output);
+    expect_identical_replay(folder.path(), "vehicle1-vehicle.mcap");
     vehicle.signal(Signal::SIGTERM);
     vehicle.wait();
 }

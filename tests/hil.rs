@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use e2e::{Bound, Ended, Impairment, Program, Running, SerialLine, Signal, UdpProxy, program};
+use e2e::{
+    Bound, Ended, Impairment, Program, Running, SerialLine, Signal, UdpProxy, program, wait_for_content,
+};
 
 fn computer(link: &str) -> Running {
     Running::start(program(Program::OnboardSim).args(["computer", "--link", link]))
@@ -112,6 +114,31 @@ fn a_computer_that_is_killed_in_flight_ends_the_flight_with_its_exit_code() {
     let ended = world.wait();
     assert_eq!(ended.code, Some(5), "{}", ended.output);
     assert!(ended.output.contains("LINK LOST: "), "{}", ended.output);
+}
+
+/// A watchdog's reset: the process is killed in flight and started again with what it had saved.
+#[test]
+fn a_computer_that_is_killed_in_flight_and_started_again_flies_on_from_what_it_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = |link: &str| {
+        let mut command = program(Program::OnboardSim);
+        command.args(["computer", "--link", link, "--saved", "saved"]).current_dir(folder.path());
+        Running::start(&mut command)
+    };
+    let mut computer = start("udpin:127.0.0.1:0");
+    let port = computer.bound_port(Bound::Udp);
+    let world = world(&format!("udpout:127.0.0.1:{port}"), &["--flights", "1", "--give-up", "60"]);
+    computer.wait_for_line("begins in lockstep");
+    // Both slots were written: frame 2 is flown.
+    for slot in ["saved-0", "saved-1"] {
+        wait_for_content(&folder.path().join(slot));
+    }
+    computer.signal(Signal::SIGKILL);
+    computer.wait();
+    let mut again = start(&format!("udpin:127.0.0.1:{port}"));
+    again.wait_for_line("goes on behind frame");
+    let ended = world.wait();
+    assert_eq!(ended.code, Some(0), "{}", ended.output);
 }
 
 #[test]

@@ -79,6 +79,7 @@ impl Demo {
             auto_start: false,
             exit_when_safed: false,
             deadline_policy: DeadlinePolicy::Observe,
+            board: None,
             log_clock: Some(log_clock),
         };
         let (stop, stopped) = watch::channel(false);

@@ -80,6 +80,16 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         Ok(Command::Vehicle(Asked::Tap))
     } else if request.is(MavCmd::MAV_CMD_TD_TAKE_COMMAND) {
         Ok(Command::Vehicle(Asked::TakeCommand))
+    } else if request.is(MavCmd::MAV_CMD_TD_PAD_CHECK) {
+        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill];
+        let asked = (0_u8..).zip(kinds).find(|(number, _)| f32::from(*number).to_bits() == param1.to_bits());
+        match asked {
+            Some((_, asked)) => Ok(Command::Vehicle(asked)),
+            None => unfit(
+                MavResult::MAV_RESULT_DENIED,
+                format!("check: param1 = {param1}, must be 0 (end), 1 (all) or 2 (without motion)"),
+            ),
+        }
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
         Ok(Command::SetInterval { message_id: message_id(param1)?, interval_us: param2 })
     } else if request.is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
@@ -169,6 +179,16 @@ mod tests {
         assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(Asked::Hold)));
         for param1 in [1.0, 0.5, -1.0, f32::NAN] {
             assert_eq!(result_of(&command(193, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
+        }
+    }
+
+    #[test]
+    fn a_check_is_begun_and_ended_by_exact_numbers() {
+        for (param1, asked) in [(0.0, Asked::EndCheck), (1.0, Asked::Check), (2.0, Asked::CheckStill)] {
+            assert_eq!(parse(&command(54002, param1, f32::NAN)), Ok(Command::Vehicle(asked)));
+        }
+        for param1 in [0.5, 3.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(result_of(&command(54002, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
     }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use onboard_sim::fly::{builtins, load_flight};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
@@ -92,6 +92,15 @@ enum Command {
         #[arg(long, value_name = "NAME")]
         show: Option<String>,
     },
+    /// Print a shell's completions.
+    #[command(after_help = "Example: onboard-sim completions bash")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    #[command(after_help = "Example: onboard-sim man")]
+    Man,
 }
 
 fn main() -> ExitCode {
@@ -117,6 +126,8 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
+        Command::Completions { shell } => cli::manual::completions(Arguments::command(), shell),
+        Command::Man => cli::manual::page(Arguments::command()),
     }
 }
 

@@ -5,9 +5,9 @@ use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA,
     CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
     GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
-    MESSAGE_INTERVAL_DATA, MavMessage, MavResult, SYS_STATUS_DATA, SYSTEM_TIME_DATA, TD_CONTROLLER_DATA,
-    TD_CREW_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
+    MESSAGE_INTERVAL_DATA, MavMessage, MavResult, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
+    SYSTEM_TIME_DATA, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
     TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
@@ -80,7 +80,7 @@ impl Standard {
 }
 
 /// The periodic messages of the planar vehicle. If the budget runs short, the last ones are dropped first.
-pub const STANDARD: [Standard; 24] = [
+pub const STANDARD: [Standard; 25] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
     // More often whenever something changes.
@@ -109,10 +109,14 @@ pub const STANDARD: [Standard; 24] = [
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
     standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
+    STORAGE,
 ];
 
+/// Without its extensions, which have nothing to say here.
+const STORAGE: Standard = standard::<STORAGE_INFORMATION_DATA>("RATE_STORAGE", 0.1).cut_to(27);
+
 /// The periodic messages of the rocket from apogee, in the same order.
-pub const FROM_APOGEE: [Standard; 28] = [
+pub const FROM_APOGEE: [Standard; 29] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
     // More often whenever something changes.
@@ -146,6 +150,7 @@ pub const FROM_APOGEE: [Standard; 28] = [
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
     standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
+    STORAGE,
 ];
 
 #[derive(Debug, Clone, Copy)]

@@ -81,6 +81,14 @@ struct SourceStats {
     first_seen: Duration,
     last_seen: Duration,
     buckets: Buckets,
+    counts: FrameCounts,
+}
+
+/// How many frames of a component arrived, and how many were lost, since it was first heard.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FrameCounts {
+    pub arrived: u64,
+    pub lost: u64,
 }
 
 /// The statistics of a link, as one end sees it.
@@ -144,9 +152,12 @@ impl LinkStats {
                 first_seen: now,
                 last_seen: now,
                 buckets: Buckets::default(),
+                counts: FrameCounts::default(),
             });
             (source.last_sequence, source.last_seen) = (last_sequence, now);
             source.buckets.on_frame(lost, late, now);
+            source.counts.arrived += 1;
+            source.counts.lost = (source.counts.lost + lost).saturating_sub(u64::from(late));
         }
         let message = (address, frame.message_id());
         if self.messages.len() < MAX_MESSAGES || self.messages.contains_key(&message) {
@@ -154,6 +165,11 @@ impl LinkStats {
         }
         self.first_activity.get_or_insert(now);
         self.buckets.on_frame(lost, late, now);
+    }
+
+    /// Returns how many frames of this component arrived and were lost since it was first heard.
+    pub fn counts(&self, source: Address) -> FrameCounts {
+        self.sources.get(&source).map_or_else(FrameCounts::default, |source| source.counts)
     }
 
     /// Returns the time since the last frame of this component; `None` if it was never heard.

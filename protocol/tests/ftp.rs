@@ -9,7 +9,7 @@ use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::ftp::download::{Download, Failure, News};
 use protocol::ftp::part::Part;
-use protocol::ftp::server::{FileEntry, Files, Server};
+use protocol::ftp::server::{InMemory, Server};
 use protocol::ftp::{DATA_LEN, FileRequest, Packet, crc};
 use protocol::identity::{GROUND, VEHICLE};
 
@@ -26,21 +26,6 @@ impl Chance {
 
     fn happens(&mut self, probability: f64) -> bool {
         (self.next() >> 11) as f64 / ((1_u64 << 53) as f64) < probability
-    }
-}
-
-struct InMemory(Vec<FileEntry>, Vec<u8>);
-
-impl Files for InMemory {
-    fn entries(&self) -> &[FileEntry] {
-        &self.0
-    }
-
-    fn read(&mut self, _place: usize, offset: u32, into: &mut [u8]) -> Option<usize> {
-        let from = self.1.get(offset as usize..)?;
-        let read = from.len().min(into.len());
-        into[..read].copy_from_slice(&from[..read]);
-        Some(read)
     }
 }
 
@@ -114,6 +99,8 @@ struct World {
     chance: Chance,
     server: Server,
     files: InMemory,
+    /// What is in the only file.
+    file: Vec<u8>,
     down: Line,
     up: Line,
     encoders: (Encoder, Encoder),
@@ -129,12 +116,12 @@ impl World {
     fn new(len: usize, settings: LineSettings, seed: u64) -> Self {
         let mut chance = Chance(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let file: Vec<u8> = (0..len).map(|_| chance.next() as u8).collect();
-        let entry = |name: &str, len| FileEntry { name: name.to_owned(), len };
         Self {
             now_s: 0.0,
             chance,
             server: Server::default(),
-            files: InMemory(vec![entry("flight.mcap", len as u32)], file),
+            files: InMemory::new([("flight.mcap", file.clone())]),
+            file,
             down: Line::new(settings),
             up: Line::new(settings),
             encoders: (Encoder::new(VEHICLE), Encoder::new(GROUND)),
@@ -185,7 +172,7 @@ impl World {
         match news {
             Some(News::Begins { fresh: true }) => {
                 self.begun_fresh += 1;
-                self.written = vec![0; self.files.1.len()];
+                self.written = vec![0; self.file.len()];
             }
             Some(News::Piece { offset, data }) => {
                 self.pieces += 1;
@@ -231,7 +218,7 @@ fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five
             world.step(None);
         }
     }
-    assert!(world.written == world.files.1, "the file is another");
+    assert!(world.written == world.file, "the file is another");
     assert_eq!(world.begun_fresh, 1, "it began at zero more than once");
     // What the line can carry of files: whole frames, of which 30 % are lost.
     let carried_bytes =
@@ -252,7 +239,7 @@ fn a_slow_line_and_a_quick_one_are_filled_as_well() {
             let mut world = World::new(len, settings, 7);
             let mut download = Download::new(None, None, 0);
             assert_eq!(world.run(&mut download, 10_000.0), Some(Ok(())));
-            assert!(world.written == world.files.1);
+            assert!(world.written == world.file);
             let share = len as f64 / (world.now_s * bytes_s * (1.0 - loss)) * 266.0 / 239.0;
             println!("{bytes_s} B/s, latency {latency_s} s, loss {loss}: {:.1} %", 100.0 * share);
             assert!(share >= 0.8, "{bytes_s} B/s, latency {latency_s} s, loss {loss}: {share}");
@@ -297,14 +284,14 @@ fn what_was_kept_of_another_file_is_thrown_away() {
         let mut download = Download::new(None, Some(kept), 0);
         assert_eq!(world.run(&mut download, 100.0), Some(Ok(())));
         assert_eq!(world.begun_fresh, 1);
-        assert!(world.written == world.files.1);
+        assert!(world.written == world.file);
     }
     // The pieces of the same file are damaged on the ground's disk: the checksum finds it, and all is fetched again.
     let mut world = World::new(50_000, settings, 5);
     world.written = vec![0xEE; 50_000];
     let mut download = Download::new(None, Some(part), 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Ok(())));
-    assert!(world.written == world.files.1);
+    assert!(world.written == world.file);
 }
 
 #[test]
@@ -314,7 +301,7 @@ fn a_session_that_the_vehicle_has_closed_is_opened_again() {
     world.run(&mut download, 20.0);
     world.server.close_all();
     assert_eq!(world.run(&mut download, 1000.0), Some(Ok(())));
-    assert!(world.written == world.files.1);
+    assert!(world.written == world.file);
     assert_eq!(world.begun_fresh, 1);
 }
 
@@ -355,7 +342,7 @@ proptest! {
         }
         let mut download = Download::new(None, kept, seed as u16);
         prop_assert_eq!(world.run(&mut download, 2000.0), Some(Ok(())));
-        prop_assert!(world.written == world.files.1);
+        prop_assert!(world.written == world.file);
         prop_assert!(world.pieces <= (kills.len() + 2) * len.div_ceil(DATA_LEN));
     }
 }

@@ -48,6 +48,7 @@ fn start_vehicle(
         auto_start: true,
         exit_when_safed: true,
         deadline_policy: DeadlinePolicy::Observe,
+        board: None,
         log_clock: None,
     };
     let fly = move || -> Result<(), Failure> {

@@ -12,13 +12,9 @@ from mavsdk import Configuration, ConnectionResult, Mavsdk
 from mavsdk.component_type import ComponentType
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.ftp.ftp import FtpError, FtpResult
+from facts import check
 
 PATIENCE_S = 120
-
-
-def check(fact, holds):
-    assert holds, fact
-    print("ok", fact, flush=True)
 
 
 def main():

@@ -8,13 +8,9 @@ import sys
 
 os.environ["MAVLINK20"] = "1"
 from pymavlink import mavftp, mavutil  # noqa: E402  (reads the environment when imported)
+from facts import check
 
 PATIENCE_S = 60
-
-
-def check(fact, holds):
-    assert holds, fact
-    print("ok", fact, flush=True)
 
 
 def main():

@@ -11,13 +11,9 @@ import sys
 import mavsdk
 from mavsdk import System
 from mavsdk.action import ActionError
+from facts import check
 
 PATIENCE_S = 60
-
-
-def check(fact, holds):
-    assert holds, fact
-    print("ok", fact, flush=True)
 
 
 async def first(stream, wanted):

@@ -12,13 +12,9 @@ from mavsdk.plugins.action import Action
 from mavsdk.plugins.info import Info
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
+from facts import check
 
 PATIENCE_S = 30
-
-
-def check(fact, holds):
-    assert holds, fact
-    print("ok", fact, flush=True)
 
 
 def until(what, holds):

@@ -12,6 +12,7 @@ import time
 os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil  # noqa: E402  (reads the environment when imported)
 from pymavlink.dialects.v20 import touchdown as mav  # noqa: E402
+from facts import check
 
 PATIENCE_S = 30
 ACCEPTED, REJECTED_NOW, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
@@ -87,11 +88,6 @@ class Ground:
             return next((text for text in self.texts if words in text), None)
 
         return wanted(None) or self.wait(f"the words `{words}`", wanted)
-
-
-def check(fact, holds):
-    assert holds, fact
-    print("ok", fact, flush=True)
 
 
 def ready(ground):

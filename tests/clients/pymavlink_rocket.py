@@ -5,8 +5,9 @@ Usage: pymavlink_rocket.py PORT, or pymavlink_rocket.py DEVICE BAUD. Prints a li
 
 import sys
 
+from facts import check
 from pymavlink import mavutil
-from pymavlink_client import ACCEPTED, Ground, check, mav
+from pymavlink_client import ACCEPTED, Ground, mav
 
 UNKNOWN_MV = 65535
 

@@ -6,8 +6,9 @@ Usage: signed_client.py PORT KEYFILE.
 import sys
 import time
 
+from facts import check
 from pymavlink import mavutil
-from pymavlink_client import ACCEPTED, Ground, check
+from pymavlink_client import ACCEPTED, Ground
 
 EPOCH_S = 1420070400
 

@@ -5,7 +5,8 @@ Usage: two_grounds.py PORT.
 
 import sys
 
-from pymavlink_client import ACCEPTED, DENIED, Ground, check, ready
+from facts import check
+from pymavlink_client import ACCEPTED, DENIED, Ground, ready
 
 
 def main():

@@ -4,6 +4,7 @@
 //! A helper that waits has a time limit, waits for an event, and panics (fails the test) if the event does not come.
 #![expect(clippy::missing_panics_doc, reason = "a helper that panics fails its test, which is its purpose")]
 
+mod appears;
 mod bare_ground;
 mod flight;
 mod keys;
@@ -18,8 +19,11 @@ mod time;
 mod udp_proxy;
 mod window;
 
+pub use appears::wait_for_content;
 pub use bare_ground::{ABORT, ACCEPTED, ARM, BareGround, START, command_frame, heartbeat_frame};
-pub use flight::{auto_ground, expect_identical_replay, expect_landing, last_time_s, vehicle};
+pub use flight::{
+    auto_ground, expect_identical_replay, expect_landing, landed_vehicle, last_time_s, vehicle,
+};
 pub use keys::{keygen, signing_with_key_in};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;

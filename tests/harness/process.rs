@@ -96,6 +96,11 @@ impl Running {
         Ended { code: status.code(), output: self.seen.join("\n") }
     }
 
+    /// The id of the process.
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
     /// The processor time that the program has used so far.
     pub fn processor_time(&self) -> Duration {
         processor_time_of(self.child.id())

@@ -210,6 +210,7 @@ impl Station {
             }
             ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Download)) => vec![Msg::DownloadWanted],
+            ServerEvent::FromScreen(by, ToStation::Request(Request::RangeTest)) => vec![Msg::RangeTest(by)],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
             }
@@ -322,9 +323,15 @@ impl Station {
                 Action::FetchLog => self.fetch_log(model, now),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
-                Action::Tell(kind) => {
-                    if let Some(server) = &mut self.server {
-                        server.publish(&Msg::Requested { kind, by: model.settings.seat.clone() }, now);
+                Action::Tell(request) => {
+                    let by = model.settings.seat.clone();
+                    let msg = match request {
+                        Request::Command(kind) => Some(Msg::Requested { kind, by }),
+                        Request::RangeTest => Some(Msg::RangeTest(by)),
+                        _ => None,
+                    };
+                    if let Some((server, msg)) = self.server.as_mut().zip(msg) {
+                        server.publish(&msg, now);
                     }
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),
@@ -392,8 +399,7 @@ impl Station {
         let folder = self.recorder.as_ref().and_then(|recorder| recorder.path().parent());
         let folder = folder.map(std::path::Path::to_owned).unwrap_or_default();
         let addresses = (model.settings.us, model.settings.vehicle);
-        let first_sequence = (self.clock.unix_ns() >> 20) as u16;
-        self.download = Some(Downloading::begin(None, folder, addresses, first_sequence));
+        self.download = Some(Downloading::begin(None, folder, addresses, self.clock.unix_ns()));
     }
 
     /// Gives what was heard to the download, and sends what it asks for.

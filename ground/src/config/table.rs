@@ -3,10 +3,12 @@
 use std::fmt::Write as _;
 
 use clap::ValueEnum;
+use protocol::identity::{GROUND, VEHICLE};
 
 use super::Config;
 use crate::cli::{Seconds, ThemeChoice};
 use crate::model::act::DEFINITIONS;
+use crate::model::callouts::Talk;
 
 /// Values begin in this column.
 const VALUES: usize = 15;
@@ -37,6 +39,7 @@ impl Config {
             talk_every_s,
         } = self;
         let usual = Self::default();
+        let seconds = |time: std::time::Duration| time.as_secs_f64().to_string();
         let given =
             |value: Option<String>, otherwise: &str| value.unwrap_or_else(|| format!("({otherwise})"));
         let chosen = |name: String, is_usual: bool| if is_usual { format!("({name})") } else { name };
@@ -52,8 +55,8 @@ impl Config {
         };
         let rows = [
             ("connect", given((!connect.is_empty()).then(|| connect.join(" ")), "the demonstration")),
-            ("sysid", given(sysid.map(|id| id.to_string()), "255")),
-            ("vehicle_sysid", given(vehicle_sysid.map(|id| id.to_string()), "1")),
+            ("sysid", given(sysid.map(|id| id.to_string()), &GROUND.system_id.to_string())),
+            ("vehicle_sysid", given(vehicle_sysid.map(|id| id.to_string()), &VEHICLE.system_id.to_string())),
             ("key", given(path(key), "nothing is signed")),
             ("crew", given(path(crew), "nobody is named")),
             ("operator", given(operator.clone(), "the user and the terminal, or the SSH client")),
@@ -70,7 +73,10 @@ impl Config {
             ("talk", chosen(value_name(talk), *talk == usual.talk)),
             (
                 "talk_every_s",
-                given(talk_every_s.map(|Seconds(every)| every.as_secs_f64().to_string()), "1.5"),
+                given(
+                    talk_every_s.map(|Seconds(every)| seconds(every)),
+                    &seconds(Talk::default().height_every),
+                ),
             ),
             ("keys", given((!other_keys.is_empty()).then(|| other_keys.join(" ")), "the usual ones")),
         ];

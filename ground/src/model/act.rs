@@ -24,6 +24,12 @@ pub enum Act {
     Tap,
     /// Open the dialog that takes command.
     TakeCommand,
+    /// Open the dialog that checks the vehicle; end the check that runs.
+    Check,
+    /// The same for a check without motion.
+    CheckStill,
+    /// Begin the radio range test.
+    RangeTest,
     Acknowledge,
     /// Show the checklist on the Pad page, or the arming checks again.
     Checklist,
@@ -62,7 +68,7 @@ const fn define(act: Act, name: &'static str, usual: Key, words: &'static str) -
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 36] = [
+pub const DEFINITIONS: [Definition; 40] = [
     define(Act::Arm, "arm", Key::Char('A'), "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", Key::Char('S'), "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", Key::Char('D'), "disarm: then Enter within 5 s"),
@@ -79,6 +85,9 @@ pub const DEFINITIONS: [Definition; 36] = [
         Key::Char('C'),
         "take command from a silent station: then TAKE and Enter",
     ),
+    define(Act::Check, "check", Key::Char('X'), "check the vehicle: then Enter; fins and gimbal MOVE"),
+    define(Act::CheckStill, "check-still", Key::Char('E'), "the same check without motion: then Enter"),
+    define(Act::RangeTest, "range-test", Key::Char('U'), "radio range test: 30 s, nothing is commanded"),
     define(Act::Acknowledge, "acknowledge", Key::Char(' '), "acknowledge the shown alarm"),
     define(
         Act::Checklist,
@@ -108,6 +117,12 @@ pub const DEFINITIONS: [Definition; 36] = [
         "find",
         Key::Char('f'),
         "page: where to look for the vehicle, and the way there",
+    ),
+    define(
+        Act::Show(Page::Checks),
+        "checks",
+        Key::Char('x'),
+        "page: checks on the pad, radio range, battery and storage",
     ),
     define(
         Act::Show(Page::Values),
@@ -161,6 +176,9 @@ impl Act {
             }
             Self::Tap => commands && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
             Self::TakeCommand => commands && permits::why_not_take(model, now).is_none(),
+            Self::Check | Self::CheckStill | Self::RangeTest => {
+                commands && permits::why_not_check(model, now).is_none()
+            }
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
@@ -190,6 +208,9 @@ impl Act {
                 | Self::HoldCountdown
                 | Self::Tap
                 | Self::TakeCommand
+                | Self::Check
+                | Self::CheckStill
+                | Self::RangeTest
                 | Self::SignStep
                 | Self::VoidStep
         )

@@ -22,6 +22,8 @@ pub enum Request {
     Report,
     /// Fetch the vehicle's own log.
     Download,
+    /// Begin the radio range test.
+    RangeTest,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
 }
@@ -64,7 +66,7 @@ pub enum Action {
     /// Ask the station, from a screen in another process.
     Request(Request),
     /// Tell the other screens that the crew has asked for this on the station's own screen.
-    Tell(CommandKind),
+    Tell(Request),
     /// Give the terminal back and continue without a screen.
     LeaveScreen,
     Bell,

@@ -39,6 +39,10 @@ pub enum AlarmKind {
     /// The motor may still light.
     LiveMotor,
     Held,
+    /// The vehicle's battery is low.
+    Battery,
+    /// The vehicle does not write its log, or has no room for it.
+    VehicleLog,
 }
 
 impl AlarmKind {
@@ -60,6 +64,8 @@ impl AlarmKind {
             Self::Log,
             Self::LiveMotor,
             Self::Held,
+            Self::Battery,
+            Self::VehicleLog,
         ];
         others.into_iter().chain(of_commands)
     }

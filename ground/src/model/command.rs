@@ -28,10 +28,16 @@ pub enum CommandKind {
     Tap,
     /// Take command from a station that is silent.
     TakeCommand,
+    /// Check the vehicle on its pad; gimbal and fins move.
+    Check,
+    /// The same without motion.
+    CheckStill,
+    /// End the running check.
+    EndCheck,
 }
 
 impl CommandKind {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::Arm,
         Self::Disarm,
         Self::Start,
@@ -41,6 +47,9 @@ impl CommandKind {
         Self::Hold,
         Self::Tap,
         Self::TakeCommand,
+        Self::Check,
+        Self::CheckStill,
+        Self::EndCheck,
     ];
 
     /// The name on screens and in the log.
@@ -55,6 +64,9 @@ impl CommandKind {
             Self::Hold => "HOLD",
             Self::Tap => "TAP",
             Self::TakeCommand => "TAKE COMMAND",
+            Self::Check => "CHECK",
+            Self::CheckStill => "CHECK WITHOUT MOTION",
+            Self::EndCheck => "END OF CHECK",
         }
     }
 
@@ -67,16 +79,25 @@ impl CommandKind {
             Self::Hold => (MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
             Self::Tap => (MavCmd::MAV_CMD_TD_TAP, 0.0),
             Self::TakeCommand => (MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0),
+            Self::EndCheck => (MavCmd::MAV_CMD_TD_PAD_CHECK, 0.0),
+            Self::Check => (MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0),
+            Self::CheckStill => (MavCmd::MAV_CMD_TD_PAD_CHECK, 2.0),
             Self::Abort => (MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0),
         }
     }
 
     /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe. A
-    /// confirmation is for one ask, and a tap for one moment.
+    /// confirmation is for one ask, and a tap for one moment. A check is not repeated either: it would move what somebody
+    /// has just laid hands on.
     pub fn resend(self) -> Resend {
         match self {
-            Self::Arm | Self::ConfirmArm | Self::ConfirmStart | Self::Tap => Resend::Never,
-            Self::Disarm | Self::Start | Self::Hold | Self::TakeCommand => Resend::Times(3),
+            Self::Arm
+            | Self::ConfirmArm
+            | Self::ConfirmStart
+            | Self::Tap
+            | Self::Check
+            | Self::CheckStill => Resend::Never,
+            Self::Disarm | Self::Start | Self::Hold | Self::TakeCommand | Self::EndCheck => Resend::Times(3),
             Self::Abort => Resend::UntilWithdrawn,
         }
     }
@@ -94,7 +115,7 @@ impl CommandKind {
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
             // The answer is all there is to see.
-            Self::Tap | Self::TakeCommand => false,
+            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
@@ -106,7 +127,7 @@ impl CommandKind {
 
     /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
     pub fn shows_nothing(self) -> bool {
-        matches!(self, Self::Tap | Self::TakeCommand)
+        matches!(self, Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck)
     }
 
     /// What shows the effect, for the event "observed".
@@ -116,7 +137,7 @@ impl CommandKind {
             Self::Disarm => "HEARTBEAT says disarmed",
             Self::Start | Self::ConfirmStart => "countdown runs",
             Self::Hold => "no countdown",
-            Self::Tap | Self::TakeCommand => "accepted",
+            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck => "accepted",
             Self::Abort => "abort latched",
         }
     }

@@ -57,6 +57,12 @@ pub enum Dialog {
     Hold {
         until: Duration,
     },
+    /// Checks the vehicle on its pad.
+    Check {
+        /// Gimbal and fins move.
+        moves: bool,
+        until: Duration,
+    },
     /// Signs a step of the checklist, or takes its signature back.
     Sign {
         /// Counted from zero.
@@ -93,6 +99,10 @@ impl Dialog {
         Self::Hold { until: now + CONFIRM_TIME_LIMIT }
     }
 
+    pub fn check(moves: bool, now: Duration) -> Self {
+        Self::Check { moves, until: now + CONFIRM_TIME_LIMIT }
+    }
+
     pub fn sign(step: usize, void: bool, now: Duration) -> Self {
         Self::Sign { step, void, until: now + CONFIRM_TIME_LIMIT }
     }
@@ -115,6 +125,7 @@ impl Dialog {
             | Self::TakeCommand { until, .. }
             | Self::Disarm { until }
             | Self::Hold { until }
+            | Self::Check { until, .. }
             | Self::Sign { until, .. }
             | Self::Quit { until, .. } => Some(*until),
         }
@@ -130,6 +141,7 @@ impl Dialog {
             Self::TakeCommand { .. } => "take-over",
             Self::Disarm { .. } => "disarm",
             Self::Hold { .. } => "hold",
+            Self::Check { .. } => "check",
             Self::Sign { void: false, .. } => "signature",
             Self::Sign { void: true, .. } => "voiding",
             Self::Quit { .. } => "quit",
@@ -139,7 +151,11 @@ impl Dialog {
     /// The word to type; `None` where Enter alone confirms.
     pub fn word(&self) -> Option<&'static str> {
         match self {
-            Self::Closed | Self::Disarm { .. } | Self::Hold { .. } | Self::Sign { .. } => None,
+            Self::Closed
+            | Self::Disarm { .. }
+            | Self::Hold { .. }
+            | Self::Check { .. }
+            | Self::Sign { .. } => None,
             Self::Confirm { .. } => Some(CONFIRM_WORD),
             Self::TakeCommand { .. } => Some(TAKE_WORD),
             Self::Arm { .. } => Some(ARM_WORD),
@@ -152,7 +168,7 @@ impl Dialog {
     pub fn is_complete(&self) -> bool {
         match self {
             Self::Closed => false,
-            Self::Disarm { .. } | Self::Hold { .. } | Self::Sign { .. } => true,
+            Self::Disarm { .. } | Self::Hold { .. } | Self::Check { .. } | Self::Sign { .. } => true,
             Self::Arm { typed, .. }
             | Self::Start { typed, .. }
             | Self::Confirm { typed, .. }

@@ -28,12 +28,14 @@ pub mod link;
 pub mod link_state;
 pub mod motion;
 pub mod motor;
+pub mod pad_check;
 pub mod page;
 pub mod palette;
 pub mod parameters;
 pub mod permits;
 pub mod place;
 pub mod quantity;
+pub mod range_test;
 pub mod recall;
 pub mod seat;
 pub mod telemetry;
@@ -74,6 +76,7 @@ use link::Link;
 use page::{Page, Pages};
 use parameters::Parameters;
 use place::{Degrees, LastPlace};
+use range_test::RangeTest;
 use recall::{LookBack, Recall};
 use seat::Seat;
 use two_person::KeyOwner;
@@ -240,6 +243,10 @@ pub struct Model {
     pub place: Option<LastPlace>,
     /// When it is looked at next.
     pub(crate) place_due: Option<Duration>,
+    /// The radio range test, once one has begun.
+    pub range_test: Option<RangeTest>,
+    /// The check on the pad that is in the book.
+    pub(crate) check_entered: Option<(u32, u16)>,
     /// The end of the station's book.
     pub book: BookState,
     /// What has been called out.
@@ -286,6 +293,8 @@ impl Model {
             checklist: None,
             place: None,
             place_due: None,
+            range_test: None,
+            check_entered: None,
             book: BookState::default(),
             called: Called::default(),
             playing: None,

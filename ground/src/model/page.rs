@@ -30,6 +30,8 @@ pub enum Page {
     Path,
     /// Where to look for the vehicle.
     Find,
+    /// The checks on the pad.
+    Checks,
     /// Every value, with the solver's residuals.
     Values,
     /// One quantity over time.
@@ -51,7 +53,8 @@ impl Page {
         Self::Alarms,
     ];
     /// The pages with a letter or a mark.
-    pub const LETTERED: [Self; 5] = [Self::Path, Self::Find, Self::Values, Self::Plot, Self::Help];
+    pub const LETTERED: [Self; 6] =
+        [Self::Path, Self::Find, Self::Checks, Self::Values, Self::Plot, Self::Help];
 
     /// The page whose key shows this one: ascent and descent share one.
     #[must_use]
@@ -84,6 +87,7 @@ impl Page {
             Self::Alarms => "Alarms",
             Self::Path => "Path",
             Self::Find => "Find",
+            Self::Checks => "Check",
             Self::Values => "Values",
             Self::Plot => "Plot",
             Self::Help => "Help",

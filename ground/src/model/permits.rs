@@ -59,6 +59,24 @@ pub fn why_not_confirm(model: &Model, ask: &Ask, now: Duration) -> Option<String
     }
 }
 
+/// Why the ground asks for no check of the vehicle, and tests no radio.
+pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
+    if !model.link.state(now).carries() {
+        return Some("the vehicle is not heard".to_owned());
+    }
+    if model.vehicle.armed().is_some_and(|armed| armed.value) {
+        return Some("armed: disarm first".to_owned());
+    }
+    if let Some(why) = why_no_key(model) {
+        return Some(why);
+    }
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    match phase {
+        None => Some("the phase is unknown".to_owned()),
+        Some(phase) => (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase))),
+    }
+}
+
 /// Why the ground does not take command.
 pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {

@@ -47,7 +47,7 @@ impl Quantity {
 }
 
 /// How many quantities there are.
-pub const COUNT: usize = 33;
+pub const COUNT: usize = 36;
 
 pub static ALL: [Quantity; COUNT] = [
     Quantity { name: "height", unit: "m", decimals: 1, read: |model, _| model.vehicle.height_m() },
@@ -171,6 +171,31 @@ pub static ALL: [Quantity; COUNT] = [
         read: |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0),
     },
     Quantity { name: "cost", unit: "", decimals: 1, read: |m, _| solver(m, |c| f64::from(c.cost)) },
+    Quantity {
+        name: "battery",
+        unit: "V",
+        decimals: 2,
+        read: |m, _| m.vehicle.battery.map(|battery| battery.map(|battery| battery.volts)),
+    },
+    Quantity {
+        name: "battery left",
+        unit: "%",
+        decimals: 0,
+        read: |m, _| {
+            let battery = m.vehicle.battery?;
+            battery.value.percent.map(|percent| Sample::new(percent.into(), battery.received_at))
+        },
+    },
+    // Known only of a check that has seen everything.
+    Quantity {
+        name: "check failures",
+        unit: "",
+        decimals: 0,
+        read: |m, _| {
+            let check = m.vehicle.pad_check.as_ref().filter(|check| check.is_judged())?;
+            Some(Sample::new(check.failing().count() as f64, check.told_at))
+        },
+    },
     Quantity {
         name: "link rate",
         unit: "B/s",

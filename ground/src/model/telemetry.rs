@@ -11,9 +11,10 @@ use protocol::mission::MissionHash;
 
 use super::boot::MessageBoot;
 use super::motion::{Attitude, Motion};
+use super::pad_check::PadCheck;
 use super::touchdown::Touchdown;
 use super::vehicle::{
-    Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
+    Battery, Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
 };
 
 /// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted; then everything received
@@ -89,6 +90,15 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             let ready =
                 data.onboard_control_sensors_health.contains(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK);
             vehicle.ready_to_arm = Some(Sample::new(ready, now));
+            let volts = (data.voltage_battery != u16::MAX).then(|| f64::from(data.voltage_battery) / 1e3);
+            let percent = u8::try_from(data.battery_remaining).ok();
+            vehicle.battery = volts.map(|volts| Sample::new(Battery { volts, percent }, now));
+        }
+        MavMessage::STORAGE_INFORMATION(data) => {
+            vehicle.log_space_mib = Some(Sample::new(data.available_capacity.into(), now));
+        }
+        MavMessage::TD_PAD_CHECK(data) => {
+            vehicle.pad_check = Some(PadCheck::with(vehicle.pad_check.take(), data, now));
         }
         _ => {}
     }

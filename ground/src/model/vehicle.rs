@@ -12,6 +12,7 @@ use protocol::mission::MissionHash;
 use super::boot::Boot;
 use super::flown_path::FlownPath;
 use super::motion::{Attitude, BodySpeed, Motion};
+use super::pad_check::PadCheck;
 use super::touchdown::Touchdown;
 use super::trend::Trend;
 
@@ -82,6 +83,14 @@ pub struct Prediction {
     pub touchdown: Touchdown,
 }
 
+/// The vehicle's battery.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Battery {
+    pub volts: f64,
+    /// What is left, percent; `None` if the vehicle does not know.
+    pub percent: Option<u8>,
+}
+
 /// The vehicle's own verdict on its landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
@@ -120,6 +129,12 @@ pub struct Vehicle {
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: whether the vehicle's arming checks pass.
     pub ready_to_arm: Option<Sample<bool>>,
+    /// `SYS_STATUS`: the battery; `None` if the vehicle has none to tell of.
+    pub battery: Option<Sample<Battery>>,
+    /// `STORAGE_INFORMATION`: free space for its log, MiB.
+    pub log_space_mib: Option<Sample<f64>>,
+    /// `TD_PAD_CHECK`: the last check on the pad.
+    pub pad_check: Option<PadCheck>,
     /// The recent change of its velocity.
     pub trend: Trend,
     /// The path it flew.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdControlLevel, TdInterlock, TdPhase};
+use protocol::dialect::{TdCheck, TdControlLevel, TdInterlock, TdPhase};
 
 use protocol::log::record::EventLevel;
 
@@ -18,6 +18,8 @@ use crate::model::{Model, Role};
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
 /// How long the stabiliser may fly after ignition, until the first plan is used, without an alarm.
 const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
+/// Six minutes of the simulated vehicle, and where the voltage of lithium-polymer cells begins to fall steeply.
+const BATTERY_LOW_PERCENT: u8 = 10;
 /// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
@@ -118,6 +120,8 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
         found.push((AlarmKind::Held, words));
     }
+    found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
+    found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
     if let Some(locks) = vehicle.interlocks() {
         let latched = [
             (TdInterlock::TD_INTERLOCK_ABORT_LATCHED, AlarmKind::Aborted, "ABORT LATCHED on the vehicle"),
@@ -152,6 +156,34 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(names) = vehicle.prediction.and_then(|prediction| prediction.value.touchdown.violations()) {
         found.push((AlarmKind::PlanOutside, format!("plan ends OUTSIDE {names}")));
     }
+}
+
+/// A battery below the vehicle's own limit, which it tells on its pad; or nearly empty, anywhere.
+fn battery(model: &Model) -> Option<String> {
+    let battery = model.vehicle.battery?.value;
+    let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
+    let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
+    let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
+    (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
+}
+
+/// Before the self-test is over a log may still be about to begin.
+fn vehicle_log(model: &Model) -> Option<String> {
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
+        return None;
+    }
+    if fails(model, TdCheck::TD_CHECK_LOG) {
+        return Some("VEHICLE LOG not running".to_owned());
+    }
+    let space =
+        model.vehicle.log_space_mib.map_or_else(String::new, |space| format!(": {:.0} MiB", space.value));
+    fails(model, TdCheck::TD_CHECK_LOG_SPACE).then(|| format!("VEHICLE LOG has too little space{space}"))
+}
+
+/// Whether the vehicle says that it fails this check; it says so on its pad only.
+fn fails(model: &Model, check: TdCheck) -> bool {
+    model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.contains(check))
 }
 
 fn is_live(danger: Danger) -> bool {

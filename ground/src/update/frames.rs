@@ -9,7 +9,7 @@ use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
-use super::{Action, book, commands, vehicle_changes};
+use super::{Action, book, commands, pad_check, vehicle_changes};
 use crate::model::events::Speaker;
 use crate::model::{Model, telemetry};
 
@@ -24,6 +24,9 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.stats.on_frame(frame, now);
     if frame.message_id() == RADIO_STATUS_ID {
         if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
+            if let Some(test) = &mut model.range_test {
+                test.hear_radio(&radio);
+            }
             model.link.radio = Some((radio, now));
         }
     } else if frame.source() == model.settings.us {
@@ -104,6 +107,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         now,
     );
     book::on_change(model, &crew_before);
+    pad_check::enter(model, now);
     commands::observe(model, now);
 }
 
@@ -163,6 +167,9 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
     } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
         let round_trip = Duration::from_nanos(nanoseconds);
         // A longer time belongs to a request that was given up.
+        if let Some(test) = &mut model.range_test {
+            test.answered(data.ts1);
+        }
         if round_trip < Duration::from_secs(10) {
             model.link.round_trip = Some(round_trip);
             model.link.uplink.answered(now.saturating_sub(round_trip));

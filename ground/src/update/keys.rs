@@ -9,7 +9,7 @@ use std::time::Duration;
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, afterwards, checklist, commands, entry};
+use super::{Action, Request, afterwards, checklist, commands, entry, pad_check};
 use crate::key::Key;
 use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
@@ -17,8 +17,9 @@ use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
+use crate::model::pad_check::PadCheck;
 use crate::model::page::Page;
-use crate::model::permits::{why_not_arm, why_not_confirm, why_not_start, why_not_take};
+use crate::model::permits::{why_not_arm, why_not_check, why_not_confirm, why_not_start, why_not_take};
 use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, quantity};
@@ -144,6 +145,8 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
         Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
         Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
+        Dialog::Check { moves: true, .. } => ask(model, CommandKind::Check, now),
+        Dialog::Check { moves: false, .. } => ask(model, CommandKind::CheckStill, now),
         Dialog::Sign { step, void, .. } => checklist::ask(model, (*step, *void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Dialog::Quit { .. } => {
@@ -239,6 +242,22 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => model.dialog = Dialog::take_command(now),
             Some(why) => model.warn(now, format!("cannot take command: {why}")),
         },
+        Act::Check | Act::CheckStill
+            if model.vehicle.pad_check.as_ref().is_some_and(PadCheck::is_running) =>
+        {
+            ask(model, CommandKind::EndCheck, now);
+        }
+        Act::Check | Act::CheckStill => match why_not_check(model, now) {
+            None => {
+                model.pages.hold(Some(Page::Checks));
+                model.dialog = Dialog::check(act == Act::Check, now);
+            }
+            Some(why) => model.warn(now, format!("cannot check: {why}")),
+        },
+        Act::RangeTest => {
+            model.pages.hold(Some(Page::Checks));
+            test_range(model, now);
+        }
         Act::Acknowledge => see_alarm(model, now),
         Act::Checklist if model.checklist.is_none() => model.info(now, "there is no checklist (--checklist)"),
         Act::Checklist => {
@@ -341,11 +360,20 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
         Role::Attached => model.outbox.push(Action::Request(Request::Command(kind))),
         Role::Station => {
             let by = model.settings.seat.clone();
-            model.outbox.push(Action::Tell(kind));
+            model.outbox.push(Action::Tell(Request::Command(kind)));
             command(model, kind, &by, now);
         }
         Role::Watching | Role::Replaying => {}
     }
+}
+
+/// Begins the radio range test, or asks the station to.
+fn test_range(model: &mut Model, now: Duration) {
+    if model.settings.role == Role::Attached {
+        return model.outbox.push(Action::Request(Request::RangeTest));
+    }
+    model.outbox.push(Action::Tell(Request::RangeTest));
+    pad_check::begin_range_test(model, model.settings.seat.clone(), now);
 }
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
@@ -364,7 +392,10 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
             let ours = model.tapping(now).is_some_and(|(by, _)| by == model.own_number());
             (!ours).then(|| "no tap of this operator is waited for".to_owned())
         }
-        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort => None,
+        CommandKind::Check | CommandKind::CheckStill => {
+            already_sent(model, kind, now).or_else(|| why_not_check(model, now))
+        }
+        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
     };
     match why_not {
         None if kind == CommandKind::Tap => tap(model, by, now),

@@ -13,6 +13,7 @@ pub mod crew;
 mod entry;
 pub mod frames;
 pub mod keys;
+mod pad_check;
 mod place;
 pub mod tick;
 pub mod vehicle_changes;
@@ -47,6 +48,8 @@ pub enum Msg {
     Frame(Frame),
     /// In a replay: the crew gave this command at this time.
     Commanded(CommandKind),
+    /// The operator on this screen has asked for the radio range test.
+    RangeTest(Seat),
     /// The crew has completed every step of this command on a screen of the station.
     Requested {
         kind: CommandKind,
@@ -135,6 +138,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
+        Msg::RangeTest(by) => pad_check::begin_range_test(model, by, now),
         Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
         Msg::Crew(seats) => {
             model.crew.set_seats(seats, now);

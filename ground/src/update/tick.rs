@@ -8,7 +8,7 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, book, callouts, commands, crew, frames, keys, place};
+use super::{Action, auto, book, callouts, commands, crew, frames, keys, pad_check, place};
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link_state::LinkState;
@@ -60,6 +60,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     commands::poll(model, now);
     commands::observe(model, now);
     crew::step(model, now);
+    pad_check::pass(model, now);
     book::pass(model, now);
     place::pass(model, now);
     if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {

@@ -68,6 +68,18 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 plain("Then only a new start counts down again. Any other key cancels.".to_owned()),
             ],
         ),
+        Dialog::Check { moves, .. } => (
+            "CHECK the vehicle",
+            vec![
+                if *moves {
+                    strong(format!("Gimbal and fins MOVE for 8 s: hands off. Enter within {left:.0} s."))
+                } else {
+                    strong(format!("Nothing moves. Enter within {left:.0} s begins."))
+                },
+                plain("Then the sensors are watched for 5 s: touch nothing.".to_owned()),
+                plain("Any other key cancels.".to_owned()),
+            ],
+        ),
         Dialog::Sign { step, void, .. } => sign(model, (*step, *void), left, theme),
         Dialog::Disarm { .. } => (
             "DISARM",

@@ -8,7 +8,9 @@ use super::theme::{TextRole, Theme};
 use crate::model::touchdown::Touchdown;
 
 /// The least columns of a bar with its brackets.
-pub const COLUMNS_MIN: usize = 8;
+pub const COLUMNS_MIN: usize = 6;
+/// A cell filled from the left, in eighths.
+const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
 /// The most columns: a longer one says no more.
 const COLUMNS_MAX: usize = 24;
 
@@ -27,8 +29,9 @@ pub fn used(touchdown: &Touchdown, limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [f64; 6
     ]
 }
 
-/// A bar of this many columns; beyond the limit it ends in `>`.
-pub fn bar(used: f64, columns: usize, theme: Theme) -> Vec<Span<'static>> {
+/// A bar of this many columns; beyond the limit it ends in `>`. It has one colour and blanks: six of them with more are
+/// too much for a slow line when the page changes.
+pub fn bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
     let cells = columns.min(COLUMNS_MAX).saturating_sub(3);
     // Not finite: the vehicle has sent no such limit.
     let (share, end, role) = match used {
@@ -36,13 +39,14 @@ pub fn bar(used: f64, columns: usize, theme: Theme) -> Vec<Span<'static>> {
         used if used > 1.0 => (1.0, ">", TextRole::Alarm),
         used => (used, "]", TextRole::Plain),
     };
-    let filled = ((share * cells as f64).round() as usize).min(cells);
-    vec![
-        Span::styled(" [", theme.style(TextRole::Label)),
-        Span::styled("█".repeat(filled), theme.style(role)),
-        Span::styled("·".repeat(cells - filled), theme.style(TextRole::Label)),
-        Span::styled(end, theme.style(role)),
-    ]
+    // A short bar still shows eighths of a cell, where the terminal has them.
+    let steps = if theme.ascii { 1 } else { EIGHTHS.len() };
+    let filled = ((share * (cells * steps) as f64).round() as usize).min(cells * steps);
+    let mut text = "█".repeat(filled / steps);
+    if !filled.is_multiple_of(steps) {
+        text.push(EIGHTHS[filled % steps]);
+    }
+    Span::styled(format!(" [{text:<cells$}{end}"), theme.style(role))
 }
 
 #[cfg(test)]
@@ -53,16 +57,18 @@ mod tests {
 
     fn text(used: f64, columns: usize) -> String {
         let theme = Theme { palette: Palette::None, ascii: false };
-        bar(used, columns, theme).iter().map(|span| span.content.to_string()).collect()
+        bar(used, columns, theme).content.into_owned()
     }
 
     #[test]
     fn a_bar_is_full_at_the_limit_and_pointed_beyond_it() {
-        assert_eq!(text(0.0, 13), " [··········]");
-        assert_eq!(text(0.5, 13), " [█████·····]");
+        assert_eq!(text(0.0, 13), " [          ]");
+        assert_eq!(text(0.5, 13), " [█████     ]");
+        assert_eq!(text(0.5, 6), " [█▌ ]");
+        assert_eq!(text(0.04, 6), " [▏  ]");
         assert_eq!(text(1.0, 13), " [██████████]");
         assert_eq!(text(1.01, 13), " [██████████>");
-        assert_eq!(text(f64::NAN, 8), " [·····?");
+        assert_eq!(text(f64::NAN, 8), " [     ?");
         for columns in 0..40 {
             for used in [0.0, 0.3, 7.0, f64::INFINITY] {
                 assert!(text(used, columns).chars().count() <= columns.max(3), "{columns}");

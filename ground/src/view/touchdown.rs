@@ -63,7 +63,7 @@ pub fn panel_with_bars(
         for (row, used) in rows.iter_mut().zip(used) {
             let gap = widest - row.width();
             row.spans.push(Span::raw(" ".repeat(gap)));
-            row.spans.extend(limit_bar::bar(used, room, theme));
+            row.spans.push(limit_bar::bar(used, room, theme));
         }
     }
     (title, rows)

@@ -86,7 +86,7 @@ fn the_palette_only_tells_how_to_abort() {
 fn the_abort_works_in_the_palette_and_in_the_filter() {
     for opened in [typed(":"), typed("/pin"), typed(":arm"), typed("t")] {
         let mut settings = settings(false, true);
-        settings.keys = "theme=x,path=X,filter=/".parse().unwrap();
+        settings.keys = "theme=m,path=M,filter=/".parse().unwrap();
         let mut rig = Rig::new(settings);
         rig.run(1.0);
         rig.keys(&opened);

@@ -210,6 +210,9 @@ impl Watched {
                 ends_in_ladder(history, &[Key::Char('A')], "ARM", 10)
             } else if is(&sent, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
                 ends_in_ladder(history, &[Key::Char('D')], "", 5)
+            } else if is(&sent, MavCmd::MAV_CMD_TD_PAD_CHECK) {
+                let key = if sent.param1 > 1.5 { 'E' } else { 'X' };
+                sent.param1 > 0.5 && ends_in_ladder(history, &[Key::Char(key)], "", 5)
             } else {
                 ends_in_ladder(history, &[Key::Char('S')], "START", 10)
             };

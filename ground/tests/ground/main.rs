@@ -18,6 +18,7 @@ mod ladder;
 mod links;
 mod looking_back;
 mod lossy_link;
+mod pad_check;
 mod phases;
 mod pictures;
 mod program;

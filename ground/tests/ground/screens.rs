@@ -160,7 +160,7 @@ fn regress_ascii() {
 /// Every page at every size has only ASCII cells on an ASCII terminal, and none panics.
 #[test]
 fn every_page_at_every_size_and_in_ascii() {
-    let rigs = [on_the_pad(), counting(), descending(), powered()];
+    let rigs = vec![on_the_pad(), counting(), descending(), powered()];
     for mut rig in rigs {
         for digit in '0'..='9' {
             rig.key(Key::Char(digit));

@@ -104,7 +104,7 @@ fn compare(machines: &[String], folders: &[PathBuf]) -> Result<ExitCode> {
                 println!("{}: {} frames instead of {}", path.display(), found.len(), expected.len());
             }
             let differs =
-                |place: &usize| found.get(*place).map(bytes_of) != Some(bytes_of(&expected[*place]));
+                |place: &usize| !found.get(*place).is_some_and(|answer| answer.is_same_as(&expected[*place]));
             let different: Vec<usize> = (0..expected.len()).filter(differs).collect();
             if let Some(first) = different.first() {
                 println!("{}: {} frames differ, first number {first}", path.display(), different.len());
@@ -121,11 +121,6 @@ fn compare(machines: &[String], folders: &[PathBuf]) -> Result<ExitCode> {
     let (flights, machines) = (folders.len(), machines.len());
     println!("{identical} of {frames} frames identical on {machines} machines, in {flights} flights");
     Ok(if identical == frames { ExitCode::SUCCESS } else { ExitCode::from(3) })
-}
-
-/// Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
-fn bytes_of(answer: &Answer) -> Vec<u8> {
-    prost::Message::encode_to_vec(answer)
 }
 
 fn costs(folders: &[PathBuf]) -> Result<()> {

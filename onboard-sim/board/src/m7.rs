@@ -1,19 +1,22 @@
 //! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and `costs` in the folder of
-//! the emulator or debugger.
+//! the emulator or debugger. The files `saved-0` and `saved-1` are its memory that outlasts a reset: where a recorded flight's
+//! computer was dead, this program resets its processor and goes on from them.
 
+use core::ffi::CStr;
 use core::fmt::Write as _;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use board::recorded::{Watch, fly};
 use board::stream::Link;
-use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::{entry, exception};
 use flight::computer::Output;
+use flight::computer::saved::Saved;
 use linked_list_allocator::LockedHeap;
 use semihosting::fs::File;
-use semihosting::io::{self, Read as _, Write as _};
+use semihosting::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use semihosting::{eprintln, println, process};
 
 /// Heap, bytes: what the memory map leaves beside the static data.
@@ -59,9 +62,20 @@ fn main() -> ! {
 }
 
 fn fly_the_files() -> io::Result<()> {
-    let mut files = Files { frames: File::open(c"frames")?, answers: File::create(c"answers")? };
+    let saved = newest();
+    let written = |name: &'static CStr| match &saved {
+        Some(_) => {
+            let mut file = File::options().write(true).append(true).create(true).open(name)?;
+            // QEMU does not append by itself. A pipe has no end to go to, and needs none.
+            let _ = file.seek(SeekFrom::End(0));
+            Ok(file)
+        }
+        None => File::create(name),
+    };
+    let mut files = Files { frames: File::open(c"frames")?, answers: written(c"answers")? };
+    let file = written(c"costs")?;
     let mut costs =
-        Costs { file: File::create(c"costs")?, begun: 0, set_up_bytes: 0, most_bytes: 0, failed: None };
+        Costs { file, begun: 0, set_up_bytes: 0, most_bytes: 0, saved, save: Cost::default(), failed: None };
     let flown = fly(&mut files, &mut costs);
     if let Some(error) = costs.failed {
         return Err(error);
@@ -72,6 +86,10 @@ fn fly_the_files() -> io::Result<()> {
         costs.set_up_bytes,
         costs.most_bytes,
         stack_bytes - cortex_m_stack::stack_painted(),
+    );
+    println!(
+        "saved record at most {} bytes, made with at most {} instructions",
+        costs.save.bytes, costs.save.instructions
     );
     match flown {
         Ok(frames) => println!("{frames} frames"),
@@ -106,7 +124,31 @@ struct Costs {
     begun: u64,
     set_up_bytes: usize,
     most_bytes: usize,
+    /// From before the reset.
+    saved: Option<Saved>,
+    /// What making a record for the next reset costs, without writing it.
+    save: Cost,
     failed: Option<io::Error>,
+}
+
+/// Instructions and bytes, at most.
+#[derive(Default)]
+struct Cost {
+    instructions: u64,
+    bytes: usize,
+}
+
+/// The two records that are written in turn, so that a reset while one is written leaves the other.
+const SLOTS: [&CStr; 2] = [c"saved-0", c"saved-1"];
+
+/// The newer whole record, if this is not the first start.
+fn newest() -> Option<Saved> {
+    let read = |slot: &CStr| {
+        let mut bytes = [0; Saved::MOST_BYTES];
+        let read = File::open(slot).ok()?.read(&mut bytes).ok()?;
+        Saved::read(&bytes[..read]).ok()
+    };
+    SLOTS.into_iter().filter_map(read).max_by_key(Saved::frame)
 }
 
 impl Watch for Costs {
@@ -119,7 +161,7 @@ impl Watch for Costs {
     }
 
     fn ended(&mut self, frame: u64, output: &Output) {
-        let instructions = (counted() - self.begun) * INSTRUCTIONS_PER_COUNT;
+        let instructions = counted().saturating_sub(self.begun) * INSTRUCTIONS_PER_COUNT;
         let bytes = HEAP.lock().used();
         self.most_bytes = self.most_bytes.max(bytes);
         let mut line = Line { text: [0; 80], length: 0 };
@@ -129,9 +171,37 @@ impl Watch for Costs {
             self.failed.get_or_insert(error);
         }
     }
+
+    fn saved(&mut self) -> Option<Saved> {
+        let saved = self.saved.take()?;
+        println!("goes on after frame {}", saved.frame());
+        Some(saved)
+    }
+
+    fn save(&mut self, saved: &Saved) {
+        let mut room = [0; Saved::MOST_BYTES];
+        let begun = counted();
+        let written = saved.write(&mut room);
+        let instructions = counted().saturating_sub(begun) * INSTRUCTIONS_PER_COUNT;
+        let Ok(bytes) = written else {
+            self.failed.get_or_insert(io::ErrorKind::OutOfMemory.into());
+            return;
+        };
+        self.save.instructions = self.save.instructions.max(instructions);
+        self.save.bytes = self.save.bytes.max(bytes.len());
+        let slot = SLOTS[(saved.frame() % 2) as usize];
+        if let Err(error) = File::create(slot).and_then(|mut file| file.write_all(bytes)) {
+            self.failed.get_or_insert(error);
+        }
+    }
+
+    fn reset(&mut self, before: u64) {
+        println!("reset: the computer was dead before frame {before}");
+        SCB::sys_reset();
+    }
 }
 
-/// Counts since the counter was started.
+/// Counts since the counter was started. Only with `-icount` is the interrupt of a wrap never late.
 fn counted() -> u64 {
     loop {
         let wraps = WRAPS.load(Ordering::Relaxed);

@@ -28,6 +28,8 @@ pub struct Readings {
     pub igniter_continuity: bool,
     /// The wire between booster and vehicle is whole.
     pub booster_attached: bool,
+    /// Voltage of the battery, V; `None` on a board that does not measure it.
+    pub battery_v: Option<f64>,
     /// The safety pin is out.
     pub pin_out: bool,
     pub log: LogState,
@@ -85,6 +87,7 @@ pub fn fly<B: Board>(computer: &mut Computer, board: &mut B) -> Result<(), B::Er
             igniter_continuity: readings.igniter_continuity,
             booster_attached: readings.booster_attached,
             pin_out: readings.pin_out,
+            battery_v: readings.battery_v,
             log: readings.log,
             uplink: readings.uplink,
             commander: readings.commander,

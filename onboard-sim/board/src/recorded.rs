@@ -4,6 +4,7 @@ use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
 use flight::computer::Output;
+use flight::computer::saved::Saved;
 use flight::guidance::baseline::Controller;
 use log_records::computer_v1::ComputerStart;
 use tick_log::again::{FrameError, RecordedComputer, mission_flown};
@@ -21,6 +22,15 @@ pub trait Watch {
     fn begins(&mut self) {}
     /// The frame of this number was flown.
     fn ended(&mut self, _frame: u64, _output: &Output) {}
+    /// What was saved before the machine was reset; `None` at power-up.
+    fn saved(&mut self) -> Option<Saved> {
+        None
+    }
+    /// Saves what is kept through a reset, after each frame.
+    fn save(&mut self, _saved: &Saved) {}
+    /// The computer was dead in the frames before this one: the machine is reset. Where this returns, the computer is
+    /// restarted in place.
+    fn reset(&mut self, _before: u64) {}
 }
 
 impl Watch for () {}
@@ -52,7 +62,17 @@ pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyErro
     drop(begin);
     watch.is_set_up();
     let mut frames = 0;
+    let mut saved = watch.saved();
     while let Some(frame) = receive::<Frame, _>(link, &mut buffer)? {
+        if let Some(number) = frame.number() {
+            match saved.take_if(|saved| saved.frame() < number) {
+                Some(saved) => computer = computer.resumed(&saved, number),
+                // Flown before the reset.
+                None if saved.is_some() => continue,
+                None if computer.was_reset_before(number) => watch.reset(number),
+                None => {}
+            }
+        }
         let answer = match (&frame.from_power_up, &frame.in_the_air) {
             (Some(input), None) => {
                 let read = computer.read(input)?;
@@ -81,6 +101,9 @@ pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyErro
             _ => return Err(FlyError::TwoInputs { after: frames }),
         };
         send(link, &answer, &mut buffer)?;
+        if let Some(saved) = computer.computer().saved() {
+            watch.save(&saved);
+        }
         frames += 1;
     }
     Ok(frames)

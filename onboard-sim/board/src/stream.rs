@@ -43,6 +43,14 @@ pub struct Frame {
     pub in_the_air: Option<PilotInput>,
 }
 
+impl Frame {
+    /// The frame's number, counted from power-up or from the release.
+    pub fn number(&self) -> Option<u64> {
+        let number = self.from_power_up.as_ref().map(|input| input.frame);
+        number.or_else(|| self.in_the_air.as_ref().map(|input| input.frame))
+    }
+}
+
 /// What a frame decided, as its record in the log has it.
 #[derive(Clone, PartialEq, Message)]
 pub struct Answer {
@@ -53,6 +61,13 @@ pub struct Answer {
     /// The digest of the memory after the frame: the computer's, or that of its pilot in the air.
     #[prost(fixed64, required, tag = "3")]
     pub state_digest: u64,
+}
+
+impl Answer {
+    /// Whether both are the same in every bit. Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
+    pub fn is_same_as(&self, other: &Self) -> bool {
+        self.encode_to_vec() == other.encode_to_vec()
+    }
 }
 
 /// Bytes in and out: a file, a serial line, a debugger's channel.

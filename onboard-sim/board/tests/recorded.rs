@@ -119,6 +119,7 @@ impl Board for Recorded<'_> {
                 igniter_continuity: flown.igniter_continuity,
                 booster_attached: flown.booster_attached,
                 pin_out: flown.pin_out,
+                battery_v: flown.battery_v,
                 log: flown.log,
                 uplink: flown.uplink,
                 commander: flown.commander,

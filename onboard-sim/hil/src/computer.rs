@@ -12,6 +12,7 @@
 //! | one of another flight | ignored | ignored |
 
 use flight::computer::pilot::Sensed;
+use flight::computer::saved::Saved;
 use flight::computer::{Computer, Feeling, Input, LogState, Output, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
@@ -63,6 +64,8 @@ pub struct RemoteComputer {
     start: Start,
     computer: Computer,
     last: Option<Readings>,
+    /// What was saved before a reset, until the first frame after it.
+    saved: Option<Saved>,
     answer: Answer,
     counts: Counts,
 }
@@ -80,7 +83,22 @@ impl RemoteComputer {
             held: 0,
         };
         let counts = Counts::default();
-        Self { wire: Wire::new(mission), start: *start, computer, last: None, answer, counts }
+        Self { wire: Wire::new(mission), start: *start, computer, last: None, saved: None, answer, counts }
+    }
+
+    /// The computer of a flight that was under way when this machine was reset: it goes on from what was saved. In lockstep the
+    /// world waits, and the next frame is flown as if nothing were lost but the estimator; in real time the frames until then
+    /// are gone.
+    pub fn resumed(mission: &Mission, law: Law, start: &Start, saved: &Saved) -> Self {
+        let mut resumed = Self::new(mission, law, start);
+        resumed.saved = Some(saved.clone());
+        resumed.answer.frame = saved.frame();
+        resumed
+    }
+
+    /// What is kept through a reset, after each frame.
+    pub fn saved(&self) -> Option<Saved> {
+        self.computer.saved()
     }
 
     /// The start has come again: it is answered as long as no frame is flown.
@@ -97,6 +115,11 @@ impl RemoteComputer {
     pub fn take(&mut self, flight_id: u32, frame: u64, carried: &CarriedReadings) -> Option<Answer> {
         if flight_id != self.start.flight_id {
             self.counts.foreign += 1;
+            return None;
+        }
+        self.wake(frame);
+        if self.saved.is_some() {
+            self.counts.ahead += 1;
             return None;
         }
         let flown = self.answer.frame;
@@ -119,6 +142,23 @@ impl RemoteComputer {
         self.fly(frame, &readings);
         self.last = Some(readings);
         Some(self.answer)
+    }
+
+    /// Takes up what was saved before a reset, at the first frame after it. The answer to the last frame before it is
+    /// lost with the memory: a world that asks for it again is answered with the saved commands.
+    fn wake(&mut self, frame: u64) {
+        let in_reach =
+            |saved: &mut Saved| (saved.frame()..=saved.frame().saturating_add(MOST_HELD)).contains(&frame);
+        let Some(saved) = self.saved.take_if(in_reach) else { return };
+        let before = frame.saturating_sub(1).max(saved.frame());
+        self.computer = self.computer.clone().resumed(&saved, flight_time_s(before));
+        self.answer = Answer {
+            frame: before,
+            commands: CarriedCommands::narrow(self.computer.commands()),
+            phase: self.computer.mode().phase,
+            digest: self.computer.digest(),
+            ..self.answer
+        };
     }
 
     /// Flies lost frames: the vehicle is taken to turn and to accelerate as it did last.
@@ -156,6 +196,7 @@ impl RemoteComputer {
             igniter_continuity: switches.igniter_continuity,
             booster_attached: switches.booster_attached,
             pin_out: switches.pin_out,
+            battery_v: None,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
             commander: None,
@@ -164,6 +205,11 @@ impl RemoteComputer {
             rehearsed: None,
             late: false,
         })
+    }
+
+    /// The flight that it flies.
+    pub fn start(&self) -> &Start {
+        &self.start
     }
 
     /// The answer to the last frame that was flown.
@@ -270,6 +316,35 @@ mod tests {
         assert_eq!(computer.take(7, u64::MAX, &frame(9)), None);
         assert_eq!((computer.answer().frame, computer.counts().ahead), (1, 2));
         assert!(computer.take(7, MOST_HELD + 2, &frame(9)).is_some());
+    }
+
+    #[test]
+    fn a_computer_that_was_reset_goes_on_from_what_it_saved() {
+        for pace in [Pace::Lockstep, Pace::RealTime] {
+            let before = after(pace, &(1..=40).collect::<Vec<_>>());
+            let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+            let saved = before.saved().unwrap();
+            let woken = || RemoteComputer::resumed(&mission, Law::Nmpc, before.start(), &saved);
+            // The answer to the last frame was lost on the way.
+            let again = woken().take(7, 40, &frame(40)).unwrap();
+            assert_eq!(
+                (again.frame, again.commands, again.phase),
+                (40, before.answer().commands, before.answer().phase)
+            );
+            let mut computer = woken();
+            assert_eq!(computer.take(7, 39, &frame(39)), None);
+            assert_eq!(computer.take(7, 41 + MOST_HELD, &frame(9)), None, "too late");
+            assert_eq!(computer.take(8, 41, &frame(41)), None, "of another flight");
+            let answer = computer.take(7, 41, &frame(41)).unwrap();
+            assert_eq!((answer.frame, answer.phase), (41, before.answer().phase));
+            assert_ne!(
+                answer.digest,
+                before.clone().take(7, 41, &frame(41)).unwrap().digest,
+                "the estimator is new"
+            );
+            // 0.1 s of frames were sent to a dead computer.
+            assert_eq!(woken().take(7, 61, &frame(61)).map(|answer| answer.held), Some(0));
+        }
     }
 
     #[test]

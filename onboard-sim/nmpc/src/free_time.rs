@@ -88,6 +88,18 @@ pub struct FreeTimeWorkspace {
     trial: FreeTimeSolution,
 }
 
+impl FreeTimeWorkspace {
+    /// Allows the coming searches so many passes together: [`stages::Workspace::allow`].
+    pub fn allow(&mut self, passes: Option<usize>) {
+        self.inner.allow(passes);
+    }
+
+    /// Whether nothing is left of what was allowed.
+    pub fn is_spent(&self) -> bool {
+        self.inner.is_spent()
+    }
+}
+
 /// Solves for path and final time.
 ///
 /// The search is warm if there is an earlier solution, which began `elapsed_s` ago; otherwise it is cold.
@@ -201,7 +213,7 @@ struct Search<'a, M> {
 
 impl<M: Motor> Search<'_, M> {
     fn left(&self) -> bool {
-        self.solves < self.problem.max_solves.max(1)
+        self.solves < self.problem.max_solves.max(1) && !self.workspace.is_spent()
     }
 
     /// The best final time of a coarse grid; each is solved cold.

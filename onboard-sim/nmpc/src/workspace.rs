@@ -62,6 +62,15 @@ impl StartBuffers {
 }
 
 impl Workspace {
+    /// Allows the coming solves so many passes together: [`stages::Workspace::allow`].
+    pub(crate) fn allow(&mut self, passes: Option<usize>) {
+        self.solver.allow(passes);
+    }
+
+    pub(crate) fn is_spent(&self) -> bool {
+        self.solver.is_spent()
+    }
+
     /// Solves a problem with at least one interval into `solution`, except its bound of the touchdown speed.
     pub fn solve(&mut self, problem: &Problem, warm: Option<&WarmStart>, solution: &mut Solution) {
         let start = warm.map(|warm| self.start.of_warm(problem, warm));

@@ -1,14 +1,14 @@
 //! Everything of a flight but its flight computer: the world, the sensors that look at it, and the actuators that move it.
 
 use flight::computer::pilot::Sensed;
-use flight::computer::{Commands, FRAME_MS};
+use flight::computer::{Commands, FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use hil::readings::{Feedback, Switches};
 use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
-use world::{Actuators, World};
+use world::{Actuators, Battery, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;
@@ -22,6 +22,7 @@ pub(crate) struct Surroundings {
     sensors: Option<Sensors>,
     pub(crate) faults: SensorFaults,
     actuators: Actuators,
+    pub(crate) battery: Battery,
     /// The sensor samples of the last frame.
     measured: Option<Measurements>,
     /// State and commands have been numbers throughout.
@@ -45,7 +46,8 @@ impl Surroundings {
         };
         let actuators = start::at_rest(mission);
         let faults = SensorFaults::default();
-        Ok((Self { world, sensors, faults, actuators, measured: None, finite: true }, believed))
+        let battery = Battery::new(1.0, surfaces_rad(&world));
+        Ok((Self { world, sensors, faults, actuators, battery, measured: None, finite: true }, believed))
     }
 
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
@@ -69,6 +71,9 @@ impl Surroundings {
                 measured = sensors.observe(&SensorTruth::of(&self.world), &self.faults).or(measured);
             }
         }
+        let lit =
+            [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
+        self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
         self.measured = measured;
         measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured)
     }
@@ -120,4 +125,10 @@ impl Surroundings {
     pub(crate) fn measured(&self) -> Option<&Measurements> {
         self.measured.as_ref()
     }
+}
+
+/// Where gimbal and fins are, rad.
+pub(crate) fn surfaces_rad(world: &World) -> [f64; 6] {
+    let ([pitch, yaw], [one, two, three, four]) = (world.gimbal_feedback_rad(), world.fins_feedback_rad());
+    [pitch, yaw, one, two, three, four]
 }

@@ -1,9 +1,11 @@
 //! `onboard-sim computer`: a flight computer whose world is another process.
 
 use std::io::Write as _;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use hil::computer::Counts;
@@ -28,6 +30,41 @@ pub(crate) struct ComputerArguments {
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
+    /// Keep what a computer needs after a reset in FILE-0 and FILE-1, written in turn after every frame, and go on from
+    /// them: a computer that is started again in flight flies on.
+    #[arg(long, value_name = "FILE")]
+    saved: Option<PathBuf>,
+}
+
+/// The two files that are written in turn, so that a reset while one is written leaves the other.
+struct Slots([PathBuf; 2]);
+
+impl Slots {
+    fn of(file: &Path) -> Self {
+        Self(["-0", "-1"].map(|end| {
+            let mut name = file.as_os_str().to_owned();
+            name.push(end);
+            name.into()
+        }))
+    }
+
+    /// What is there; at the first start nothing.
+    fn read(&self) -> anyhow::Result<Vec<Vec<u8>>> {
+        let mut found = Vec::new();
+        for slot in &self.0 {
+            match std::fs::read(slot) {
+                Ok(bytes) => found.push(bytes),
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error).with_context(|| slot.display().to_string()),
+            }
+        }
+        Ok(found)
+    }
+
+    fn write(&self, frame: u64, record: &[u8]) -> anyhow::Result<()> {
+        let slot = &self.0[(frame % 2) as usize];
+        std::fs::write(slot, record).with_context(|| slot.display().to_string())
+    }
 }
 
 pub(crate) fn run(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
@@ -38,7 +75,13 @@ pub(crate) fn run(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
 async fn answer(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
     let mission_toml = mission_text(&arguments.profile, arguments.start)?;
     let mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
-    let mut end = ComputerEnd::new(&mission, &mission_toml);
+    let slots = arguments.saved.as_deref().map(Slots::of);
+    let kept = slots.as_ref().map_or(Ok(Vec::new()), Slots::read)?;
+    let (mut end, resumed_after) =
+        ComputerEnd::new(&mission, &mission_toml).resumed(kept.iter().map(Vec::as_slice));
+    if let Some(frame) = resumed_after {
+        say(&format!("goes on behind frame {frame}"));
+    }
     let mut link = HilLink::open(arguments.link, VEHICLE).await?;
     writeln!(std::io::stdout(), "computer at {}", link.address())?;
     let mut stopped = std::pin::pin!(interrupted());
@@ -71,6 +114,10 @@ async fn answer(arguments: ComputerArguments) -> anyhow::Result<ExitCode> {
                 say(&words(&event));
             }
             if !out.is_empty() {
+                // First: a command that was sent is never newer than what is known of it after a reset.
+                if let (Some(slots), Some((frame, record))) = (&slots, end.kept()) {
+                    slots.write(frame, &record)?;
+                }
                 link.send(&out);
             }
         }

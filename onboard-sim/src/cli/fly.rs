@@ -89,6 +89,10 @@ pub(crate) struct FlyArguments {
     /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
     #[arg(long)]
     stay: bool,
+    /// Missions: the flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
+    /// folder (onboard-sim/board/emulate). A frame that it decides otherwise ends the flight.
+    #[arg(long, value_name = "FOLDER")]
+    board: Option<PathBuf>,
     /// Drop a controller output that took longer than one sample period, as hardware would.
     #[arg(long)]
     enforce_deadline: bool,
@@ -176,6 +180,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         } else {
             DeadlinePolicy::Observe
         },
+        board: arguments.board,
         log_clock: None,
     };
     let (stop, stopped) = watch::channel(false);

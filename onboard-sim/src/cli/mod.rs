@@ -7,6 +7,7 @@ pub(crate) mod computer;
 mod cost;
 pub(crate) mod fly;
 pub(crate) mod landability;
+pub(crate) mod manual;
 pub(crate) mod motors;
 pub(crate) mod output;
 pub(crate) mod paper;

@@ -8,6 +8,7 @@ mod files;
 mod lane;
 mod lists;
 mod mission;
+mod pad_check;
 mod questions;
 mod refusals;
 mod requests;
@@ -36,6 +37,7 @@ use protocol::text;
 use self::files::FileService;
 pub(crate) use self::files::gives_out_its_log;
 use self::lane::{Answer, Lane};
+use self::pad_check::CheckTeller;
 use self::refusals::{Refusals, Warnings};
 use self::requests::Waiting;
 use crate::commands::{self, Command};
@@ -77,6 +79,7 @@ pub struct VehicleEndpoint {
     told_crew: Option<(TwoPerson, Option<Operator>, Option<Address>)>,
     aborted_at_s: Option<f64>,
     files: FileService,
+    check_teller: CheckTeller,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -157,6 +160,7 @@ impl VehicleEndpoint {
             told_crew: None,
             aborted_at_s: None,
             files: FileService::default(),
+            check_teller: CheckTeller::default(),
         }
     }
 
@@ -289,6 +293,12 @@ impl VehicleEndpoint {
         for message in self.stations.due(self.now_s) {
             for lane in &mut self.lanes {
                 lane.tell_of_uplink(message.clone());
+            }
+        }
+        if let Some(message) = self.check_teller.due(vehicle, self.now_s) {
+            for lane in &mut self.lanes {
+                // A lane without room loses this one: every value comes again.
+                lane.request(vec![message.clone()]);
             }
         }
         self.serve_files(vehicle);

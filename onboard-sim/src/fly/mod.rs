@@ -1,5 +1,6 @@
 //! The run loop: a vehicle, its clock, its links and its log.
 
+mod board;
 mod boot;
 mod crew;
 mod links;
@@ -10,7 +11,7 @@ mod pace;
 mod radio;
 mod recording;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -24,6 +25,8 @@ use sim::recipe::RecipeError;
 use tokio::sync::watch;
 use vehicles::file_error::FileError;
 
+pub use self::board::BoardError;
+use self::board::OnBoard;
 pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
 pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_flight, load_planar, log_header};
@@ -92,6 +95,8 @@ pub struct FlyOptions {
     pub exit_when_safed: bool,
     /// What happens to a late controller output.
     pub deadline_policy: DeadlinePolicy,
+    /// Folder with the pipes of a board whose flight computer decides every frame, too.
+    pub board: Option<PathBuf>,
     /// Receives the vehicle's time every frame, for other writers of the same log.
     pub log_clock: Option<LogClock>,
 }
@@ -176,6 +181,15 @@ pub enum FlyError {
     /// Two people cannot be replaced by a program.
     #[error("a two-person crew arms and starts by hand: without --auto-start, and with --mavlink")]
     CrewWithoutHands,
+    /// The board, or what it has decided.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The board's image flies missions.
+    #[error("{name} starts at ignition; a board flies missions (mk2, mk3) with this program")]
+    NotOnABoard {
+        /// The profile's name.
+        name: String,
+    },
     /// A link cannot be opened.
     #[error("cannot open the link {link}")]
     Link {
@@ -262,6 +276,26 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
     Ok(vehicle)
 }
 
+fn on_board(folder: &Path, profile: &LoadedFlight) -> Result<OnBoard, FlyError> {
+    let LoadedFlight::InSpace(flight) = profile else {
+        return Err(FlyError::NotOnABoard { name: profile.name().to_owned() });
+    };
+    Ok(OnBoard::open(folder, &flight.recipe.mission_toml, flight.recipe.controller.name())?)
+}
+
+/// How a flight has ended.
+fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
+    match (vehicle.judged().map(|judged| judged.landed), refused) {
+        // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
+        _ if vehicle.aborted() => FlightEnd::Aborted,
+        (Some(true), _) => FlightEnd::Landed,
+        (None, Some(reason)) => FlightEnd::Refused(reason),
+        (None, None) if stopped => FlightEnd::Stopped,
+        // The verdict is outside a limit, or the vehicle never came down.
+        (Some(false) | None, _) => FlightEnd::OutsideLimits,
+    }
+}
+
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
 /// The outcome depends only on the profile, the seed and the frames that arrive on the links, not on the speed, the
@@ -283,10 +317,12 @@ pub async fn fly_observed(
     )
     .await?;
     let mut endpoint = endpoint_of(&options, vehicle.standard());
+    let mut on_board =
+        options.board.as_deref().map(|folder| on_board(folder, &options.profile)).transpose()?;
     let crewed = !options.links.is_empty() && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
-    let mut own_start = OwnStart { wanted: options.auto_start, refused: None };
+    let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false };
     let mut pace = Pace::new(options.speed, vehicle.frame_s());
     let mut log_state_due_s = 0.0;
     let (mut dropped, mut offer) = (0, Offer::default());
@@ -306,6 +342,9 @@ pub async fn fly_observed(
         let own = own_start.requests(&vehicle);
         let stopwatch = pace.clock();
         let (events, answers) = endpoint.step(&mut vehicle, &own, &mut || stopwatch.elapsed());
+        if let Some(on_board) = &mut on_board {
+            on_board.decide(&vehicle)?;
+        }
         own_start.on_answers(&answers);
         let time_s = vehicle.time_s();
         if let Some(clock) = &options.log_clock {
@@ -357,15 +396,7 @@ pub async fn fly_observed(
     if let Some(reason) = &own_start.refused {
         note(options.recorder.as_ref(), vehicle.time_s(), &format!("REFUSED: {reason}"));
     }
-    let outcome = match (vehicle.judged().map(|judged| judged.landed), own_start.refused) {
-        // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
-        _ if vehicle.aborted() => FlightEnd::Aborted,
-        (Some(true), _) => FlightEnd::Landed,
-        (None, Some(reason)) => FlightEnd::Refused(reason),
-        (None, None) if stopped => FlightEnd::Stopped,
-        // The verdict is outside a limit, or the vehicle never came down.
-        (Some(false) | None, _) => FlightEnd::OutsideLimits,
-    };
+    let outcome = outcome_of(&vehicle, own_start.refused, stopped);
     Ok(FlightSummary {
         outcome,
         judged: vehicle.judged(),

@@ -10,11 +10,18 @@ use crate::vehicle::Vehicle;
 pub(super) struct OwnStart {
     pub(super) wanted: bool,
     pub(super) refused: Option<String>,
+    /// It has asked for arming and start.
+    pub(super) asked: bool,
 }
 
 impl OwnStart {
     /// The request for this frame.
     pub(super) fn requests(&mut self, vehicle: &Vehicle) -> Vec<Request> {
+        let mode = vehicle.mode();
+        if self.asked && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
+            // A reset has disarmed it. Only a person arms it again.
+            self.refused.get_or_insert_with(|| "disarmed on the pad after it was started".to_owned());
+        }
         if !self.wanted || self.refused.is_some() || vehicle.phase() != Phase::PadIdle {
             return Vec::new();
         }
@@ -22,7 +29,7 @@ impl OwnStart {
             Some(reason) if vehicle.time_s() > vehicle.ready_within_s() => self.refused = Some(reason),
             Some(_) => {}
             None => {
-                self.wanted = false;
+                (self.wanted, self.asked) = (false, true);
                 return [Asked::Arm, Asked::Start].map(Request::of_the_programme).to_vec();
             }
         }

@@ -1,7 +1,9 @@
 //! The flight computer's process: it answers frames until it is stopped.
 
+use flight::computer::saved::Saved;
 use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
 use hil::computer::{Counts, RemoteComputer};
 use hil::start::{Pace, Start};
 use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType};
@@ -21,6 +23,15 @@ pub struct ComputerEnd {
     flown: Option<u32>,
 }
 
+/// The flight and the record in bytes that were kept. The estimate is in the record, not in the start.
+fn read_kept(bytes: &[u8]) -> Option<(Start, Saved)> {
+    let (flight_id, rest) = bytes.split_first_chunk()?;
+    let (pace, record) = rest.split_first()?;
+    let pace = if *pace == 0 { Pace::Lockstep } else { Pace::RealTime };
+    let start = Start { flight_id: u32::from_le_bytes(*flight_id), believed: RigidState::upright(0.0), pace };
+    Some((start, Saved::read(record).ok()?))
+}
+
 /// What is told to whoever watches the process.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
@@ -37,6 +48,27 @@ impl ComputerEnd {
     pub fn new(mission: &Mission, mission_toml: &str) -> Self {
         let hash = MissionHash::of(mission_toml);
         Self { mission: mission.clone(), hash, assembly: FrameAssembly::default(), flying: None, flown: None }
+    }
+
+    /// The same computer after a reset, with the records that were kept through it: it goes on with the flight of the
+    /// newest that is whole. Returns also the number of the frame behind which it goes on.
+    #[must_use]
+    pub fn resumed<'a>(mut self, kept: impl IntoIterator<Item = &'a [u8]>) -> (Self, Option<u64>) {
+        let newest = kept.into_iter().filter_map(read_kept).max_by_key(|(_, saved)| saved.frame());
+        let frame = newest.as_ref().map(|(_, saved)| saved.frame());
+        self.flying = newest
+            .map(|(start, saved)| (start, RemoteComputer::resumed(&self.mission, Law::Nmpc, &start, &saved)));
+        (self, frame)
+    }
+
+    /// The record to keep through a reset, and the number of its frame; `None` without a flight.
+    pub fn kept(&self) -> Option<(u64, Vec<u8>)> {
+        let (start, computer) = self.flying.as_ref()?;
+        let saved = computer.saved()?;
+        let mut record = start.flight_id.to_le_bytes().to_vec();
+        record.push(u8::from(start.pace == Pace::RealTime));
+        record.extend(saved.write(&mut [0; Saved::MOST_BYTES]).ok()?);
+        Some((saved.frame(), record))
     }
 
     /// Takes a message. Adds what is to be sent to `out`; returns what is to be told.

@@ -3,13 +3,15 @@
 //! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are narrowed to the
 //! fields' types here and only here; what does not fit saturates.
 //!
-//! What is not modelled is sent as MAVLink's "unknown" and never invented: no vehicle has a battery.
+//! What is not modelled is sent as MAVLink's "unknown" and never invented: the planar vehicle has no battery.
 //!
 //! [`Motion`]: crate::vehicle::Motion
 
 mod crew;
 mod global;
 mod ours;
+mod pad_check;
+mod power;
 mod space;
 
 use flight::rules::phase::Phase;
@@ -27,6 +29,7 @@ use protocol::dialect::{
 };
 
 pub(crate) use self::ours::td_phase;
+pub(crate) use self::pad_check::pad_check;
 use crate::vehicle::Snapshot;
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
@@ -55,6 +58,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
         _ => crew::message(message_id, snapshot)
             .or_else(|| space::message(message_id, snapshot))
+            .or_else(|| power::message(message_id, snapshot))
             .or_else(|| global::message(message_id, snapshot)),
     }
 }
@@ -102,17 +106,18 @@ fn sys_status(snapshot: &Snapshot) -> MavMessage {
     let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-        | sensors;
-    let mut healthy = present - silent;
+        | sensors
+        | power::present(snapshot);
+    let mut healthy = present - silent - power::failing(snapshot);
     healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
         onboard_control_sensors_health: healthy,
         load: (1000.0 * snapshot.solve_time_s / snapshot.deadline_s).clamp(0.0, 1000.0) as u16,
-        voltage_battery: u16::MAX,
-        current_battery: -1,
-        battery_remaining: -1,
+        voltage_battery: power::millivolts(snapshot),
+        current_battery: power::centiamperes(snapshot),
+        battery_remaining: power::percent(snapshot),
         // Explicitly empty: the generated default of a set of flags is its first flag.
         onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
         onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),

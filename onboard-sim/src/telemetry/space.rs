@@ -1,12 +1,11 @@
-//! Messages of the rocket in space only: descent, estimator, sensors; and the battery status, always unknown.
+//! Messages of the rocket in space only: descent, estimator, sensors.
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
 use mavlink::MessageData as _;
 use protocol::dialect::{
-    BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA,
-    HighresImuUpdatedFlags, MavBatteryFault, MavMessage, MavSysStatusSensor, TD_DESCENT_DATA, TdBooster,
-    TdChute,
+    ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA, HighresImuUpdatedFlags, MavMessage,
+    MavSysStatusSensor, TD_DESCENT_DATA, TdBooster, TdChute,
 };
 
 use super::boot_ms;
@@ -18,7 +17,6 @@ pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage
         TD_DESCENT_DATA::ID => descent(snapshot),
         ESTIMATOR_STATUS_DATA::ID => estimator(snapshot),
         HIGHRES_IMU_DATA::ID => imu(snapshot),
-        BATTERY_STATUS_DATA::ID => Some(battery()),
         _ => None,
     }
 }
@@ -148,19 +146,4 @@ fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
         fields_updated,
         ..HIGHRES_IMU_DATA::default()
     }))
-}
-
-/// No battery is modelled: every value is MAVLink's "unknown".
-fn battery() -> MavMessage {
-    MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
-        temperature: i16::MAX,
-        voltages: [u16::MAX; 10],
-        current_battery: -1,
-        current_consumed: -1,
-        energy_consumed: -1,
-        battery_remaining: -1,
-        // The generated default is the first flag.
-        fault_bitmask: MavBatteryFault::empty(),
-        ..BATTERY_STATUS_DATA::default()
-    })
 }

@@ -34,8 +34,8 @@ pub use self::events::{Tick, VehicleEvent};
 use self::ground::Ground;
 use self::sensed::SensorWatch;
 pub use self::snapshot::{
-    AscentFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts, Judged, Motion,
-    PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
+    AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
+    Judged, Motion, PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
 };
 use crate::streams::{FROM_APOGEE, STANDARD, Standard};
 
@@ -219,7 +219,8 @@ impl Vehicle {
         };
         self.computer_frame = watcher.frame;
         self.frames_decided += u64::from(self.computer_frame.is_some());
-        self.rehearsed |= self.computer().rehearsed().is_some();
+        // A computer that has restarted on the pad takes it again.
+        self.rehearsed = self.computer().rehearsed().is_some();
         let mut events = Vec::new();
         let (mut released, mut answers) = (false, Vec::new());
         if let Some(output) = output {

@@ -77,7 +77,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let mut softened = false;
         let mut sweeps = 0;
         for steps in 0..=MOST_STEPS.min(cap) {
-            self.current.evaluate(model, !likely_last);
+            if likely_last {
+                self.current.evaluate(model, false);
+            } else {
+                self.differentiate(model);
+            }
             let (settled, residual) = self.look(model);
             if !residual.is_finite() || steps >= STRAY_STEPS && residual > STRAY {
                 return Err((steps, sweeps));
@@ -97,6 +101,9 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                     Err((steps, sweeps))
                 };
             }
+            if self.allowance.is_spent() {
+                return Err((steps, sweeps));
+            }
             if let Some(before) = tangent_step.filter(|_| settled) {
                 self.assemble_sides(model, stiffness);
                 self.newton.sweep.backward_again(&self.current);
@@ -109,7 +116,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 }
             }
             if likely_last {
-                self.current.evaluate(model, true);
+                self.differentiate(model);
             }
             if !settled {
                 stiffness = stiffness.min(CHANGED);
@@ -147,6 +154,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         self.assemble_sides(model, stiffness);
         let share = CURVATURE_SHARES.into_iter().position(|share| {
             *sweeps += 1;
+            self.allowance.spend(model.intervals());
             self.newton.sweep.backward(&self.current, share)
         })?;
         self.newton.sweep.forward(&self.current);

@@ -60,6 +60,7 @@
 
 extern crate alloc;
 
+mod allowance;
 mod barrier;
 mod bend;
 mod clamped;

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::allowance::Allowance;
 use crate::barrier::LAST_BARRIER;
 use crate::condition::Condition;
 use crate::filter::{Filter, Measures};
@@ -50,7 +51,8 @@ const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 /// than its possible decrease.
 const TINY_STEP: f64 = 1e-7;
 
-/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on them.
+/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on them, except on what
+/// is left of the [allowance](Self::allow).
 #[derive(Debug, Clone)]
 pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) conditions: Vec<Condition>,
@@ -61,6 +63,7 @@ pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) sides: Sides<NU>,
     filter: Filter,
     pub(crate) scratch: Vec<[f64; NX]>,
+    pub(crate) allowance: Allowance,
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Workspace<M, NX, NU> {
@@ -74,6 +77,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Workspace<M
             sides: Sides::default(),
             filter: Filter::default(),
             scratch: Vec::new(),
+            allowance: Allowance::default(),
         }
     }
 }
@@ -111,7 +115,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let barrier = settings.first_barrier;
         for index in 0..settings.guesses + settings.spare_guesses {
             let met = best.is_some_and(|(outcome, _)| outcome.meets(settings.acceptable_miss));
-            if index == settings.guesses && met {
+            if index == settings.guesses && met || best.is_some() && self.allowance.is_spent() {
                 break;
             }
             start::cold(model, &self.conditions, index, barrier, &mut self.current);
@@ -132,7 +136,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             core::mem::swap(&mut self.current, &mut self.other);
             return SolveEnd { iterations, sweeps, ..SolveEnd::BAD };
         };
-        if best.status != Status::Converged && best.miss <= settings.acceptable_miss {
+        if best.status != Status::Converged
+            && best.miss <= settings.acceptable_miss
+            && !self.allowance.is_spent()
+        {
             // It creeps along a saddle. From where it ended, with the slacks opened again, it gets time to find the way down.
             self.current.move_to(&self.other);
             start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
@@ -153,7 +160,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let tolerance = model.settings().tolerance;
         let mut barrier = first_barrier;
         let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
-        self.current.evaluate(model, true);
+        self.differentiate(model);
         let mut residual = self.residual(model);
         self.filter = Filter::starting_at(residual.infeasibility);
         let status = loop {
@@ -163,7 +170,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             if residual.largest(0.0) <= tolerance {
                 break Status::Converged;
             }
-            if iterations >= cap {
+            if iterations >= cap || self.allowance.is_spent() {
                 break Status::IterationLimit;
             }
             iterations += 1;
@@ -177,6 +184,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let first = share.saturating_sub(1);
             let right = (first..CURVATURE_SHARES.len()).find(|tried| {
                 sweeps += 1;
+                self.allowance.spend(model.intervals());
                 self.newton.sweep.backward(&self.current, CURVATURE_SHARES[*tried])
             });
             let Some(right) = right else {
@@ -196,7 +204,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 raises += 1;
                 barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
                 start::raise(model, &self.conditions, barrier, &mut self.current);
-                self.current.evaluate(model, true);
+                self.differentiate(model);
                 residual = self.residual(model);
                 self.filter = Filter::starting_at(residual.infeasibility);
             } else {
@@ -216,6 +224,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         while share >= SHORTEST_STEP {
             let tried = Fractions { primal: share * fractions.primal, dual: fractions.dual };
             self.newton.take(&self.conditions, &self.current, tried, &mut self.trial);
+            self.allowance.spend(model.intervals());
             self.trial.evaluate(model, true);
             let trial = Measures {
                 infeasibility: self.trial.infeasibility(),
@@ -228,6 +237,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             share *= 0.5;
         }
         false
+    }
+
+    /// Evaluates `current` with its derivatives.
+    pub(crate) fn differentiate(&mut self, model: &M) {
+        self.allowance.spend(model.intervals());
+        self.current.evaluate(model, true);
     }
 
     pub(crate) fn residual(&mut self, model: &M) -> Residual {

@@ -39,7 +39,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let mut outcome = self.descend(model, LAST_BARRIER, cap - iterations);
         iterations += outcome.iterations;
         sweeps += outcome.sweeps;
-        if matches!(outcome.status, Status::Stalled | Status::SubproblemFailed) && iterations < cap {
+        let failed = matches!(outcome.status, Status::Stalled | Status::SubproblemFailed);
+        if failed && iterations < cap && !self.allowance.is_spent() {
             outcome = self.cold(model, cap - iterations);
             iterations += outcome.iterations;
             sweeps += outcome.sweeps;

@@ -3,6 +3,7 @@
 
 use flight::computer::pilot::PilotInput;
 use flight::computer::plane::PlaneError;
+use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Input, Output, flight_time_s};
 use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::mission::Mission;
@@ -27,6 +28,15 @@ pub enum FrameError {
         frame: u64,
         /// The frame before it in the log.
         after: u64,
+    },
+    /// So many frames before it are missing that a computer would not fly on.
+    #[error(
+        "{missing} frames are missing before frame {frame}: no computer flies on after more than {LONGEST_RESET_S} s"
+    )]
+    Gap {
+        /// Its number.
+        frame: u64,
+        missing: u64,
     },
 }
 
@@ -118,6 +128,7 @@ impl RecordedComputer {
             if number > next {
                 // It was dead in the missing frames and restarted at the end of the frame before this one.
                 self.computer.restart(flight_time_s(number - 1));
+                self.rehearsed = self.computer.rehearsed().is_some();
             }
         }
         self.next = Some(number.saturating_add(1));
@@ -130,6 +141,18 @@ impl RecordedComputer {
         let frame = frame_to_log(&input, output, &self.computer, self.rehearsed);
         self.rehearsed |= input.rehearsed.is_some();
         frame
+    }
+
+    /// This computer at power-up, after a reset behind which frame `number` is next: it goes on from what was saved.
+    #[must_use]
+    pub fn resumed(self, saved: &Saved, number: u64) -> Self {
+        let computer = self.computer.resumed(saved, flight_time_s(number.saturating_sub(1)));
+        Self { computer, next: Some(number), rehearsed: false }
+    }
+
+    /// Whether frames are missing before this one, so that the computer was reset there.
+    pub fn was_reset_before(&self, number: u64) -> bool {
+        self.next.is_some_and(|next| number > next)
     }
 
     pub fn computer(&self) -> &Computer {

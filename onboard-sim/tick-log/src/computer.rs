@@ -17,8 +17,18 @@ use crate::pilot::{
 use crate::{state_from_log, state_to_log};
 
 /// Requests, by their number in the log.
-const ASKED: [Asked; 7] =
-    [Asked::Arm, Asked::Disarm, Asked::Start, Asked::Hold, Asked::Abort, Asked::Tap, Asked::TakeCommand];
+const ASKED: [Asked; 10] = [
+    Asked::Arm,
+    Asked::Disarm,
+    Asked::Start,
+    Asked::Hold,
+    Asked::Abort,
+    Asked::Tap,
+    Asked::TakeCommand,
+    Asked::Check,
+    Asked::CheckStill,
+    Asked::EndCheck,
+];
 
 /// A frame's input, read from a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,6 +101,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         late: input.late,
         booster_attached: input.booster_attached.then_some(true),
         people: input.people.map(people_to_log),
+        battery_v: input.battery_v,
     }
 }
 
@@ -123,6 +134,7 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
         contact: input.contact,
         igniter_continuity: input.igniter_continuity,
         pin_out: input.pin_out,
+        battery_v: input.battery_v,
         log: LogState { running: input.log_running, space_bytes: input.log_space_bytes },
         uplink: uplink_from_log(input.uplink.as_ref()),
         commander: commander.transpose()?,
@@ -373,6 +385,7 @@ mod tests {
                 contact: flags[1],
                 igniter_continuity: flags[2],
                 pin_out: flags[3],
+                battery_v: flags[7].then_some(number(17)),
                 log: LogState { running: flags[4], space_bytes },
                 uplink,
                 commander: commander.map(|(station, by)| Commander { station, age_s: number(16), by }),
@@ -403,11 +416,11 @@ mod tests {
             in_plane: Some(sensed),
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
-            requests: vec![v1::Request { asked: 7, ..v1::Request::default() }],
+            requests: vec![v1::Request { asked: 10, ..v1::Request::default() }],
             ..v1::ComputerInput::default()
         };
         let error = input_from_log(&input).unwrap_err().to_string();
-        assert_eq!(error, "frame 7: request 7 is unknown; this build knows 0 to 6");
+        assert_eq!(error, "frame 7: request 10 is unknown; this build knows 0 to 9");
         let error =
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");

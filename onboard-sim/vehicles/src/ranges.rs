@@ -136,7 +136,8 @@ pub(super) fn touchdown_limits(touchdown: &TouchdownBox) -> Check {
 pub(super) fn arming(arming: &ArmingLimits) -> Check {
     positive("arming.tilt_max_deg", arming.tilt_max_deg)?;
     positive("arming.rotation_max_deg_s", arming.rotation_max_deg_s)?;
-    positive("arming.speed_max_m_s", arming.speed_max_m_s)
+    positive("arming.speed_max_m_s", arming.speed_max_m_s)?;
+    not_negative("arming.battery_min_v", arming.battery_min_v)
 }
 
 pub(super) fn gate(gate: &GateLimits) -> Check {

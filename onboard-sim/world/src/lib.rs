@@ -6,6 +6,7 @@
 //!
 //! * [`world`]: all parts together, one millisecond at a time.
 //! * `body`, `aero`, `motor`, `servo`, `linkage`, `parachute`, [`ground`]: the parts, one model each.
+//! * `battery`: its voltage under what the vehicle draws.
 //! * `stack`: the vehicle on its booster, on the way up; [`hanging`]: below a drone.
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
@@ -16,6 +17,7 @@
 
 mod aero;
 pub mod balance;
+mod battery;
 mod body;
 pub mod fault;
 pub mod ground;
@@ -31,6 +33,7 @@ pub mod vertical;
 pub mod wind;
 pub mod world;
 
+pub use battery::Battery;
 pub use fault::Fault;
 pub use ground::{Rest, RestOutcome, Touchdown};
 pub use hanging::Hanging;

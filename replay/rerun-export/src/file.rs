@@ -1,7 +1,7 @@
 //! Exports a log file into a recording file without losing existing files.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::{BufReader, BufWriter, Read};
 use std::path::Path;
 
 use replay::log::{FlightLog, LogError};
@@ -60,10 +60,20 @@ pub fn export_file_with(
 pub fn send_file(log_path: &Path, address: &str) -> Result<Exported, ExportError> {
     let mut log = FlightLog::open(log_path)?;
     let survey = survey_file(log_path)?;
-    let viewer = Viewer::connect(identity::builder(log.name(), &survey), address, Batches::Prompt)?;
-    Shown::expected(&survey).send(viewer.recording())?;
+    show(&mut log, &survey, address, Pace::Afterwards)
+}
+
+/// Shows a log in a viewer: at first what its head promises, so that the viewer is laid out, then the flight.
+pub(crate) fn show<R: Read>(
+    log: &mut FlightLog<R>,
+    survey: &Survey,
+    address: &str,
+    pace: Pace,
+) -> Result<Exported, ExportError> {
+    let viewer = Viewer::connect(identity::builder(log.name(), survey), address, Batches::Prompt)?;
+    Shown::expected(survey).send(viewer.recording())?;
     viewer.arrived()?;
-    let exported = fill(viewer.recording(), &mut log, &survey, Pace::Afterwards)?;
+    let exported = fill(viewer.recording(), log, survey, pace)?;
     viewer.arrived()?;
     Ok(exported)
 }

@@ -8,11 +8,10 @@ use replay::log::{FlightLog, LogError};
 
 use crate::ExportError;
 use crate::export::{Exported, Pace, Shown, fill};
-use crate::file::{Overwrite, cannot_write, create_in_place, refuse_loss};
+use crate::file::{Overwrite, cannot_write, create_in_place, refuse_loss, show};
 use crate::identity;
 use crate::rrd::{Batches, RrdWriter};
 use crate::survey::Survey;
-use crate::viewer::Viewer;
 
 /// A log that grows, as the whole records that it has so far. It ends when `wait` says that nothing more is expected: what
 /// is left then is given out as it is, so that its reader says that it is cut.
@@ -106,25 +105,17 @@ pub fn follow_file(
     let growing = Growing::new(File::open(log_path).map_err(cannot_read)?, wait);
     let mut log =
         FlightLog::read(log_path.display().to_string(), BufReader::with_capacity(1 << 20, growing))?;
-    let builder = identity::builder(log.name(), &survey);
     match towards {
         Towards::File(path, overwrite) => {
             // Without a buffer, so that whoever reads the file sees what is written.
             let output = create_in_place(path, overwrite)?;
-            let writer = RrdWriter::new(builder, output, Batches::Prompt)?;
+            let writer = RrdWriter::new(identity::builder(log.name(), &survey), output, Batches::Prompt)?;
             Shown::expected(&survey).send(writer.recording())?;
             let exported = fill(writer.recording(), &mut log, &survey, Pace::Live)?;
             writer.finish()?.sync_data().map_err(|source| cannot_write(path, source))?;
             Ok(exported)
         }
-        Towards::Viewer(address) => {
-            let viewer = Viewer::connect(builder, address, Batches::Prompt)?;
-            Shown::expected(&survey).send(viewer.recording())?;
-            viewer.arrived()?;
-            let exported = fill(viewer.recording(), &mut log, &survey, Pace::Live)?;
-            viewer.arrived()?;
-            Ok(exported)
-        }
+        Towards::Viewer(address) => show(&mut log, &survey, address, Pace::Live),
     }
 }
 

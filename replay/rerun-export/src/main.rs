@@ -25,7 +25,7 @@ use replay_rerun::{
 /// Exit codes: 0 written, also from the readable part of a damaged log; 2 not written: wrong usage, no flight log,
 /// or the recording cannot be written.
 #[derive(Debug, Parser)]
-#[command(name = "replay-rerun", version, about, long_about)]
+#[command(name = "replay-rerun", version, about, long_about, after_help = EXAMPLES)]
 struct Cli {
     /// The log, an MCAP file.
     log: PathBuf,
@@ -54,6 +54,11 @@ struct Cli {
     #[arg(long)]
     force: bool,
 }
+
+const EXAMPLES: &str = "Examples:
+  replay-rerun flight.mcap
+  replay-rerun flight.mcap --with other.mcap
+  replay-rerun flight.mcap --follow --connect";
 
 /// How often a followed log is looked at again at its end.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);

@@ -11,6 +11,7 @@ mod gate;
 mod import;
 mod info;
 mod learn;
+mod manual;
 mod recover;
 mod refly;
 mod report;
@@ -163,6 +164,15 @@ enum Question {
     /// Solves one recorded tick again: cost, residuals, active constraints, warm against cold start, predicted path.
     #[command(after_help = "Example: replay tick flight.mcap 2040")]
     Tick(tick::Ask),
+    /// Prints a shell's completions.
+    #[command(after_help = "Example: replay completions bash")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Prints the manual page (roff).
+    #[command(after_help = "Example: replay man")]
+    Man,
 }
 
 pub(crate) enum Answer {
@@ -216,6 +226,8 @@ impl Cli {
             Question::Frames(ask) => ask.run(),
             Question::Import(ask) => ask.run(),
             Question::Recover(ask) => ask.run(),
+            Question::Completions { shell } => manual::completions(shell),
+            Question::Man => manual::page(),
         }
     }
 }

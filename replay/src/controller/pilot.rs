@@ -154,6 +154,9 @@ impl LoggedPilot {
         if frame > self.next {
             // It was dead in the missing frames and restarted at the end of the frame before this one.
             self.computer.restart(flight_time_s(frame - 1));
+            if self.computer.released_at_s().is_none() {
+                return Err(FrameError::Gap { frame, missing: frame - self.next });
+            }
         }
         self.next = frame.saturating_add(1);
         if let Some(mission) = self.schedule.due(input.time_s) {

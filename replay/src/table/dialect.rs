@@ -148,7 +148,13 @@ fn parse(xml: &str, dialect: &mut Dialect) {
                     field.meaning.words += &text;
                 }
             }
-            Ok(Event::End(end)) if end.name().as_ref() == b"field" => in_field = false,
+            Ok(Event::End(end)) if end.name().as_ref() == b"field" => {
+                in_field = false;
+                // A meaning is one line, however the file breaks it.
+                if let Some(Field { meaning, .. }) = message.fields.last_mut() {
+                    meaning.words = meaning.words.split_whitespace().collect::<Vec<_>>().join(" ");
+                }
+            }
             Ok(Event::End(end)) if end.name().as_ref() == b"message" => {
                 if let Some(id) = id.take() {
                     place(&mut message.fields);
@@ -231,5 +237,7 @@ mod tests {
         assert_eq!(field("time_boot_ms").meaning.words, "Time since boot.");
         let words = words_of(field("phase").meaning.values_of.as_deref().unwrap());
         assert!(words.contains(&(9, "TD_PHASE_POWERED".to_owned())), "{words:?}");
+        let meanings = DIALECT.messages.values().flat_map(|message| &message.fields);
+        assert!(meanings.into_iter().all(|field| !field.meaning.words.contains('\n')), "one line each");
     }
 }

@@ -68,6 +68,7 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simul
         auto_start: true,
         exit_when_safed: true,
         deadline_policy: DeadlinePolicy::Observe,
+        board: None,
         log_clock: None,
         key_file: None,
         crew: None,

@@ -33,9 +33,8 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
     let KeyRing { key, .. } = KeyRing::open(cli)?;
     let clock = Clock::start();
     let mut wire = Wire::open(cli.us(), cli.connect.clone(), key, clock, None, LogTime::Run(clock)).await?;
-    let first_sequence = (clock.start_unix_ns() >> 20) as u16;
     let mut downloading =
-        Downloading::begin(name, folder.to_owned(), (cli.us(), cli.vehicle()), first_sequence);
+        Downloading::begin(name, folder.to_owned(), (cli.us(), cli.vehicle()), clock.start_unix_ns());
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);

@@ -48,13 +48,16 @@ pub(super) enum Word {
 }
 
 impl Downloading {
-    /// Begins with the file of this name, or with the newest. `first_sequence` should be another one each time.
+    /// Begins with the file of this name, or with the newest. The time makes its requests differ from those of an earlier
+    /// download.
     pub(super) fn begin(
         name: Option<&str>,
         folder: PathBuf,
         (us, vehicle): (Address, Address),
-        first_sequence: u16,
+        unix_ns: u64,
     ) -> Self {
+        // Another number every millisecond.
+        let first_sequence = (unix_ns >> 20) as u16;
         Self {
             download: Download::new(name, None, first_sequence),
             us,

@@ -74,6 +74,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::Requested { kind, by } => {
             out.kind(9).u8(number_of(*kind)).u32(by.screen).text(&by.operator);
         }
+        Msg::RangeTest(by) => drop(out.kind(25).u32(by.screen).text(&by.operator)),
         Msg::SimulatorEnded(why) => {
             out.kind(10).u8(u8::from(why.is_some())).text(why.as_deref().unwrap_or_default());
         }
@@ -185,6 +186,7 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
             let (goes_on, text) = (rest.u8()? != 0, rest.text()?);
             ToScreen::Msg(Msg::Download(if goes_on { Ok(text) } else { Err(text) }))
         }
+        25 => ToScreen::Msg(Msg::RangeTest(seat(&mut rest)?)),
         22 => {
             let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
             ToScreen::Msg(Msg::Place(Box::new(place)))
@@ -254,6 +256,7 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Sign { step, void }) => out.kind(7).u8(*step).u8(u8::from(*void)),
         ToStation::Request(Request::Report) => out.kind(8),
         ToStation::Request(Request::Download) => out.kind(9),
+        ToStation::Request(Request::RangeTest) => out.kind(10),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -282,6 +285,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         6 => ToStation::Stop { force: rest.u8()? != 0, operator: words(&mut rest, OPERATOR_MAX)? },
         8 => ToStation::Request(Request::Report),
         9 => ToStation::Request(Request::Download),
+        10 => ToStation::Request(Request::RangeTest),
         7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };
@@ -325,6 +329,9 @@ fn number_of(kind: CommandKind) -> u8 {
         CommandKind::Hold => 7,
         CommandKind::Tap => 8,
         CommandKind::TakeCommand => 9,
+        CommandKind::Check => 10,
+        CommandKind::CheckStill => 11,
+        CommandKind::EndCheck => 12,
     }
 }
 

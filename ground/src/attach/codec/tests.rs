@@ -108,6 +108,7 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Parameters),
         ToStation::Request(Request::Report),
         ToStation::Request(Request::Download),
+        ToStation::Request(Request::RangeTest),
         ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];
@@ -191,6 +192,7 @@ fn msg() -> impl Strategy<Value = Msg> {
         (any::<u64>(), any::<bool>()).prop_map(|(dropped, failed)| Msg::Log(LogHealth { dropped, failed })),
         (kind, seat()).prop_map(|(kind, by)| Msg::Requested { kind, by }),
         vec(seat(), 0..4).prop_map(Msg::Crew),
+        seat().prop_map(Msg::RangeTest),
         Just(Msg::ScreenQuit),
         option::of(any::<String>()).prop_map(Msg::SimulatorEnded),
     ]

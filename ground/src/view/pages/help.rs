@@ -12,6 +12,9 @@ use crate::view::theme::{TextRole, Theme};
 /// Columns of a key.
 const KEY_COLUMNS: usize = 13;
 
+/// Columns for the names of pages, on the smallest whole screen.
+const PAGES_COLUMNS: usize = 80 - KEY_COLUMNS - 1;
+
 const REPLAY: [(&str, &str); 4] = [
     ("Space", "pause, or go on"),
     ("Left Right", "5 s back or forward"),
@@ -43,18 +46,24 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     }
     let keys = &model.settings.keys;
     let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
-    // The smallest screen has no room for every key after a landing; the palette lists this one, too.
-    for definition in works.filter(|definition| !matches!(definition.act, Act::Show(_) | Act::Redraw)) {
+    // The smallest screen has no room for every key. The palette lists these, too, and the page of the checks its own.
+    let elsewhere =
+        |act: Act| matches!(act, Act::Show(_) | Act::Redraw | Act::Check | Act::CheckStill | Act::RangeTest);
+    for definition in works.filter(|definition| !elsewhere(definition.act)) {
         lines.push(line(keys.name(definition.act), definition.words));
     }
     let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
         Act::Show(page) => Some(format!("{} {}", keys.name(definition.act), page.name())),
         _ => None,
     });
-    let pages: Vec<String> = pages.collect();
-    for part in pages.chunks(7) {
-        lines.push(line("pages".to_owned(), &part.join("  ")));
+    let mut rows: Vec<String> = Vec::new();
+    for page in pages {
+        match rows.last_mut().filter(|row| row.len() + 2 + page.len() <= PAGES_COLUMNS) {
+            Some(row) => *row = format!("{row}  {page}"),
+            None => rows.push(page),
+        }
     }
+    lines.extend(rows.iter().map(|row| line("pages".to_owned(), row)));
     lines.extend(MARKS.map(|mark| Line::styled(format!(" {mark}"), theme.style(TextRole::Label))));
     lines
 }

@@ -20,7 +20,9 @@ use crate::view::{
 /// Rows of the panels, with their title.
 const PANEL_ROWS: u16 = 9;
 /// Columns left of the side view at 80 columns.
-const LEFT_COLUMNS: u16 = 54;
+const LEFT_COLUMNS: u16 = 61;
+/// Of those, columns of the touchdown: its widest row has 26 or 27, and then a bar of each limit.
+const TOUCHDOWN_COLUMNS: u16 = 33;
 /// Rows of the events on a larger screen, with their title, if fewer than the second number are left.
 const EVENT_ROWS: u16 = 8;
 const TALL_ROWS: u16 = 24;
@@ -50,7 +52,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         let [panels, events] =
             left.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS), Constraint::Fill(1)]));
         let [landing, flight] =
-            panels.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+            panels.layout(&Layout::horizontal([Constraint::Length(TOUCHDOWN_COLUMNS), Constraint::Fill(1)]));
         draw_touchdown(model, theme, now, frame, landing);
         draw_essentials(model, theme, now, frame, flight);
         (events, right)
@@ -64,10 +66,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows = if lost_position::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
     for (from, title, area) in side_view::pictures(model, area) {
-        let title = match from {
-            side_view::Viewpoint::East => format!("{title}: {shows}"),
-            side_view::Viewpoint::South => format!("{title}: flown"),
-        };
+        let shows = if from == side_view::Viewpoint::South { "flown" } else { shows };
+        let whole = format!("{title}: {shows}");
+        // With a blank on either side, one column and some rule.
+        let title = if whole.len() + 4 > usize::from(area.width) { title.to_owned() } else { whole };
         let inside = titled(&title, theme, frame, area);
         side_view::draw(model, (side_view::FlightPart::Burn, from), theme, now, frame, inside);
     }

@@ -2,6 +2,7 @@
 
 pub mod alarms;
 pub mod ascent;
+pub mod checks;
 pub mod descent;
 pub mod find;
 pub mod flying;
@@ -63,6 +64,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Alarms => alarms::lines(model, theme, now, columns, rows),
         Page::Path => path::lines(model, theme, now),
         Page::Find => find::lines(model, theme, now),
+        Page::Checks => checks::lines(model, theme, now, columns),
         Page::Values => values::lines(model, theme, now),
         Page::Plot => plot::lines(model, theme, now),
         Page::Help => help::lines(model, theme, now),

@@ -23,7 +23,7 @@ use crate::view::{
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
 /// Rows of the checks, with their title.
-const CHECK_ROWS: u16 = 15;
+const CHECK_ROWS: u16 = 16;
 /// Rows of GO or NO-GO at 80 columns, with a title.
 const GO_ROWS: u16 = 5;
 /// Columns of the ladder on a larger screen.
@@ -210,6 +210,8 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => vehicle.prediction.map_or_else(String::new, |prediction| {
             prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
         }),
+        TdCheck::TD_CHECK_BATTERY => number(vehicle.battery.map(|battery| battery.value.volts), 2, "V"),
+        TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib.map(|space| space.value), 0, "MiB"),
         _ => String::new(),
     }
 }
@@ -223,6 +225,7 @@ fn passing_word(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_LOG => "running",
         TdCheck::TD_CHECK_LOG_SPACE => "enough",
         TdCheck::TD_CHECK_UPLINK => "heard",
+        TdCheck::TD_CHECK_BATTERY => "not told",
         _ => "",
     }
 }
@@ -244,6 +247,7 @@ fn failure(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
         TdCheck::TD_CHECK_UPLINK => "not heard",
+        TdCheck::TD_CHECK_BATTERY => "too low",
         _ => "",
     }
 }

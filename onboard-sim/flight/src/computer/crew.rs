@@ -25,6 +25,12 @@ pub enum Asked {
     Tap,
     /// Take the command from a station that is silent.
     TakeCommand,
+    /// Check the vehicle on its pad: surfaces, sensors, switches, battery and storage.
+    Check,
+    /// The same, but nothing moves.
+    CheckStill,
+    /// End the running check.
+    EndCheck,
 }
 
 impl Asked {
@@ -38,6 +44,8 @@ impl Asked {
             Self::Abort => "abort",
             Self::Tap => "tap",
             Self::TakeCommand => "take-over",
+            Self::Check | Self::CheckStill => "check",
+            Self::EndCheck => "end of the check",
         }
     }
 }
@@ -113,7 +121,12 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
         Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
         Asked::Hold => mode.hold.is_some(),
         // A second abort may do more than the first: the phase table decides.
-        Asked::Abort | Asked::Tap | Asked::TakeCommand => false,
+        Asked::Abort
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck => false,
     }
 }
 
@@ -126,7 +139,7 @@ pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: 
         Asked::Start => Event::StartRequested { countdown_s },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded },
         Asked::Abort => abort,
-        Asked::Tap | Asked::TakeCommand => return None,
+        Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill | Asked::EndCheck => return None,
     })
 }
 

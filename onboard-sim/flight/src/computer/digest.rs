@@ -1,5 +1,6 @@
 //! Digests of the flight computer's memory: of all of it, and of the part that decides in the air.
 
+use super::pad_check::PadCheck;
 use super::self_test::SelfTest;
 use super::{Commands, Computer, CrewMemory, LogState, Release, Vehicle};
 use crate::computer::memory::{Memory, Remembers, remembers};
@@ -126,7 +127,7 @@ impl Remembers for Vehicle {
     }
 }
 
-/// The whole memory. Time, frame and uplink come with each input; limits and the length of the countdown never change.
+/// The whole memory. Time, frame, uplink, battery and booster wire come with each input; limits and the length of the countdown never change.
 struct Whole<'a>(&'a Computer);
 
 impl Remembers for Whole<'_> {
@@ -149,6 +150,9 @@ impl Remembers for Whole<'_> {
             crew,
             fins_answering,
             igniter_continuity,
+            booster_attached: _,
+            battery_v: _,
+            pad_check,
             release,
             level,
         } = self.0;
@@ -167,6 +171,10 @@ impl Remembers for Whole<'_> {
         // A crew without operators leaves nothing behind, and logs from before there were any have the same digest.
         if *crew != CrewMemory::default() {
             crew.remember(memory);
+        }
+        // The same for a check that nobody has asked for.
+        if *pad_check != PadCheck::default() {
+            pad_check.remember(memory);
         }
     }
 }

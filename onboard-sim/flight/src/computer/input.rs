@@ -70,6 +70,8 @@ pub struct Input<'a> {
     /// The wire between booster and vehicle is whole.
     pub booster_attached: bool,
     pub pin_out: bool,
+    /// Voltage of the battery, V; `None` if it is not measured.
+    pub battery_v: Option<f64>,
     pub log: LogState,
     /// The uplink of the station that is heard best.
     pub uplink: Uplink,
@@ -106,6 +108,7 @@ impl Input<'_> {
             igniter_continuity: input.igniter_continuity,
             booster_attached: input.booster_attached,
             pin_out: true,
+            battery_v: None,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
             commander: None,

@@ -60,6 +60,11 @@ impl Memory {
     }
 }
 
+/// The checksum of what is kept through a reset: XXH64.
+pub(crate) fn checksum(bytes: &[u8]) -> u64 {
+    XxHash64::oneshot(0, bytes)
+}
+
 /// A type with memory that decides the future.
 pub(crate) trait Remembers {
     /// Adds all of the memory to the hash.

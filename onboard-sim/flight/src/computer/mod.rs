@@ -7,14 +7,17 @@
 //! * [`table`]: the phase table as the computer uses it: each event goes through it once.
 //! * [`crew`], `requests`: the crew's requests, and the decision about each.
 //! * [`news`], `motor_watch`: the computer's messages to the crew.
+//! * [`pad_check`], `checking`: the check that the crew asks for on the pad.
 //! * [`pad`], `self_test`, `readiness`, `on_the_pad`: from power-up to the release.
 //! * [`pilot`]: flies a rocket in space from its release.
 //! * [`plane`]: the landing paper's planar vehicle.
-//! * `start`: power-up, and starting from a recorded moment or after a restart.
+//! * `start`: power-up, and starting from a recorded moment.
+//! * [`saved`]: what is kept through a reset, and going on from it.
 //! * `abort_effect`: what an abort would do now.
 //! * `memory`, `digest`: one number for the whole memory, to compare a replay with a log.
 
 mod abort_effect;
+mod checking;
 pub mod crew;
 mod digest;
 mod input;
@@ -24,10 +27,12 @@ pub mod news;
 mod on_the_pad;
 mod output;
 pub mod pad;
+pub mod pad_check;
 pub mod pilot;
 pub mod plane;
 mod readiness;
 mod requests;
+pub mod saved;
 mod self_test;
 mod space;
 mod start;
@@ -36,6 +41,7 @@ pub mod table;
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
 
 pub use self::abort_effect::AbortEffect;
 use self::crew::{Answer, People};
@@ -43,6 +49,7 @@ pub use self::input::{Commander, Feeling, Input, LogState, Rehearsed};
 use self::motor_watch::MotorWatch;
 use self::news::{Readiness, Severity};
 pub use self::output::{Commands, Output};
+use self::pad_check::PadCheck;
 use self::plane::{PlanarTick, Plane};
 pub use self::requests::CrewMemory;
 use self::self_test::{ANSWERING_RAD, SelfTest};
@@ -63,7 +70,7 @@ pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 pub const AT_REST_S: f64 = 1.0;
 
 /// When the vehicle was released.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Release {
     frame: u64,
     time_s: f64,
@@ -96,6 +103,9 @@ pub struct Computer {
     crew: CrewMemory,
     fins_answering: [bool; 4],
     igniter_continuity: bool,
+    booster_attached: bool,
+    battery_v: Option<f64>,
+    pad_check: PadCheck,
     release: Option<Release>,
     level: ControlLevel,
 }
@@ -148,7 +158,8 @@ impl Computer {
         self.log = input.log;
         self.uplink = input.uplink;
         (self.people, self.commander) = (input.people, input.commander);
-        self.igniter_continuity = input.igniter_continuity;
+        (self.igniter_continuity, self.booster_attached) = (input.igniter_continuity, input.booster_attached);
+        self.battery_v = input.battery_v;
         let told = self.commands.fins_rad;
         self.fins_answering =
             core::array::from_fn(|fin| (told[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);

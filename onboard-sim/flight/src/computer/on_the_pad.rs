@@ -24,6 +24,7 @@ impl Computer {
             StartPoint::Pad => self.wait_on_the_rail(input),
             StartPoint::Apogee | StartPoint::Ignition => {}
         }
+        self.check_itself(input);
     }
 
     /// A motor may light that nobody lit.
@@ -67,7 +68,9 @@ impl Computer {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
             && self.fins_answering == [true; 4];
-        match self.self_test.step(answering, input.time_s) {
+        // A computer that restarts begins its test late on the vehicle's clock.
+        let since_s = input.time_s - self.table.mode().entered_at_s;
+        match self.self_test.step(answering, since_s) {
             TestStep::Command(angle_rad) => {
                 let closed_rad = self.closed_rad();
                 let yaw_rad = if matches!(self.vehicle, Vehicle::Space(_)) { angle_rad } else { 0.0 };

@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::crew::Answer;
 use super::news::News;
@@ -9,7 +10,7 @@ use super::pilot::BoosterCommands;
 use super::plane::PlanarTick;
 
 /// Commands to the actuators.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Commands {
     /// Gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],

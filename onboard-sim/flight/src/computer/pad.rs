@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::computer::memory::remembers;
 use crate::computer::pilot::Sensed;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
-use crate::estimation::estimator::{Estimate, GnssFix, ImuSample, Measurements};
+use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use crate::vehicle::rigid::{RigidState, upright};
 
 /// The stance is evaluated every so many frames: once a second.
@@ -89,10 +89,7 @@ remembers!(PadWatch {
 impl PadWatch {
     /// Adds a frame.
     pub(super) fn feel(&mut self, sensed: &Sensed) {
-        let measurements = match sensed {
-            Sensed::Measured(measurements) => *measurements,
-            Sensed::Known(estimate) => as_measured(estimate),
-        };
+        let measurements = as_measured(sensed);
         self.alignment.take(&measurements.imu);
         let felt_m_s2 = measurements.imu.specific_force_m_s2;
         self.force_sum_m_s2 += felt_m_s2;
@@ -170,8 +167,12 @@ impl PadWatch {
     }
 }
 
-/// The measurements of perfect sensors in a known state.
-fn as_measured(estimate: &Estimate) -> Measurements {
+/// The measurements; of perfect sensors if the state is known.
+pub(super) fn as_measured(sensed: &Sensed) -> Measurements {
+    let estimate = match sensed {
+        Sensed::Measured(measurements) => return *measurements,
+        Sensed::Known(estimate) => estimate,
+    };
     let state = &estimate.state;
     Measurements {
         imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: estimate.specific_force_m_s2 },

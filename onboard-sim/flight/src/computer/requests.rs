@@ -29,9 +29,17 @@ impl Computer {
         if let Some(reason) = self.why_not_of(request) {
             return Some(self.deny(asked, reason));
         }
+        // Whatever else the crew wants, the check is over first.
+        let check_ended = !matches!(asked, Asked::Check | Asked::CheckStill) && self.end_check(asked.name());
+        if check_ended && matches!(asked, Asked::Arm | Asked::Start) {
+            let reason = "a check of the vehicle ran, and has ended now; ask again";
+            return Some(Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) });
+        }
         match asked {
             Asked::Tap => return Some(self.tap(by)),
             Asked::TakeCommand => return Some(self.take_command(request)),
+            Asked::Check | Asked::CheckStill => return Some(self.begin_check(asked, by)),
+            Asked::EndCheck => return Some(Answer::ACCEPTED),
             _ if is_so_already(&mode, asked) => return Some(Answer::ACCEPTED),
             _ => {}
         }
@@ -123,7 +131,7 @@ impl Computer {
         }
     }
 
-    fn deny(&mut self, asked: Asked, reason: String) -> Answer {
+    pub(super) fn deny(&mut self, asked: Asked, reason: String) -> Answer {
         self.table.say(Severity::Warning, format!("{} refused: {reason}", asked.name()));
         Answer { ending: Ending::Denied, reason: Some(reason) }
     }
@@ -215,7 +223,14 @@ fn act_of(asked: Asked) -> Option<Act> {
     match asked {
         Asked::Arm => Some(Act::Arm),
         Asked::Start => Some(Act::Start),
-        Asked::Disarm | Asked::Hold | Asked::Abort | Asked::Tap | Asked::TakeCommand => None,
+        Asked::Disarm
+        | Asked::Hold
+        | Asked::Abort
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck => None,
     }
 }
 

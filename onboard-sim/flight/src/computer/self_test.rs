@@ -4,7 +4,7 @@
 const MOVED_RAD: f64 = 0.05;
 /// An actuator farther than this from its command counts as not answering, rad.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
-/// The self-test has failed if it has not passed by then, s.
+/// The self-test has failed if it has not passed this long after power-up, s.
 const LIMIT_S: f64 = 3.0;
 
 /// Progress of the self-test.
@@ -30,8 +30,8 @@ pub(super) enum TestStep {
 }
 
 impl SelfTest {
-    /// Called until the test has passed. `answering`: every actuator has reached its commanded angle.
-    pub(super) fn step(&mut self, answering: bool, time_s: f64) -> TestStep {
+    /// Called until the test has passed, with the time since power-up. `answering`: every actuator has reached its commanded angle.
+    pub(super) fn step(&mut self, answering: bool, since_s: f64) -> TestStep {
         match self {
             Self::NotBegun => {
                 *self = Self::Moved;
@@ -42,7 +42,7 @@ impl SelfTest {
                 TestStep::Command(0.0)
             }
             Self::BroughtBack if answering => TestStep::Passed,
-            Self::Moved | Self::BroughtBack if time_s > LIMIT_S => {
+            Self::Moved | Self::BroughtBack if since_s > LIMIT_S => {
                 *self = Self::Failed;
                 TestStep::Failed
             }

@@ -17,21 +17,25 @@ use crate::vehicle::rigid::RigidState;
 pub(super) struct Space {
     pub(super) pad: PadWatch,
     pub(super) pilot: Pilot,
+    /// The law and the state at power-up, to power up again.
+    pub(super) law: Law,
+    pub(super) believed: RigidState,
     /// The last frame in the air.
     pub(super) last: Option<(PilotInput, PilotOutput)>,
     /// The gate check that the crew was last told of.
     gate_refusal: Option<&'static str>,
 }
 
-// The last frame in the air came with its input, and its decisions are compared as output.
-remembers!(Space { pad, pilot, gate_refusal } but { last });
+// Law and first state are constants of the flight. The last frame in the air came with its input, and its decisions are compared as output.
+remembers!(Space { pad, pilot, gate_refusal } but { law, believed, last });
 
 impl Space {
     pub(super) fn new(mission: &Mission, law: Law, believed: &RigidState) -> Self {
         let uncertainty = StartUncertainty::at_start(mission.start.at);
         let mut pilot = Pilot::starting(mission, 0.0, believed, &uncertainty);
-        pilot.set_law(law);
-        Self { pad: PadWatch::default(), pilot, last: None, gate_refusal: None }
+        pilot.set_law(law.clone());
+        let pad = PadWatch::default();
+        Self { pad, pilot, law, believed: *believed, last: None, gate_refusal: None }
     }
 
     pub(super) fn start_point(&self) -> StartPoint {

@@ -1,5 +1,5 @@
-//! Starts of a flight computer: at power-up, at its release, at a moment of a recorded landing, and after a restart in
-//! the air; and changes of its settings.
+//! Starts of a flight computer: at power-up, at its release, and at a moment of a recorded landing; and changes of its
+//! settings.
 
 use alloc::boxed::Box;
 
@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::motor_watch::MotorWatch;
 use super::news::Readiness;
+use super::pad_check::PadCheck;
 use super::pilot::BoosterCommands;
 use super::plane::{Moment, PlanarLaw, Plane, PlaneError};
 use super::self_test::SelfTest;
@@ -113,6 +114,9 @@ impl Computer {
             crew: CrewMemory::default(),
             fins_answering: [false; 4],
             igniter_continuity: false,
+            booster_attached: false,
+            battery_v: None,
+            pad_check: PadCheck::default(),
             release: None,
             level: ControlLevel::Idle,
         }
@@ -137,13 +141,6 @@ impl Computer {
         self
     }
 
-    /// Restarts the computer in the air: only memory that survives a power loss is kept.
-    pub fn restart(&mut self, time_s: f64) {
-        if let (Vehicle::Space(space), Some(release)) = (&mut self.vehicle, self.release) {
-            space.pilot = space.pilot.restarted(time_s - release.time_s);
-        }
-    }
-
     /// Changes the mission from now on; the memory stays.
     pub fn reconfigure(&mut self, mission: &Mission) {
         if let Vehicle::Space(space) = &mut self.vehicle {
@@ -161,6 +158,7 @@ impl Computer {
     /// Changes the law for the landing burn from now on.
     pub fn set_law(&mut self, law: Law) {
         if let Vehicle::Space(space) = &mut self.vehicle {
+            space.law = law.clone();
             space.pilot.set_law(law);
         }
     }

@@ -23,6 +23,11 @@ impl PhaseTable {
         Self { mode: Mode::power_up(time_s), time_s, news: Vec::new() }
     }
 
+    /// Takes up a mode after a reset. Nothing happens: its effects were carried out before.
+    pub(super) fn go_on(&mut self, mode: Mode) {
+        self.mode = mode;
+    }
+
     /// Begins a frame.
     pub(super) fn begin(&mut self, time_s: f64) {
         self.time_s = time_s;

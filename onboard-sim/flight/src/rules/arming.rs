@@ -51,6 +51,8 @@ pub struct ArmingInput {
     pub rotation_rad_s: f64,
     pub speed_m_s: f64,
     pub self_test_passed: bool,
+    /// A check of the vehicle moves its surfaces, or watches its sensors.
+    pub is_checking: bool,
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,
     /// The estimator has settled.
@@ -63,6 +65,8 @@ pub struct ArmingInput {
     pub log_running: bool,
     /// Free space for the log, bytes.
     pub log_space_bytes: u64,
+    /// Voltage of the battery, V; `None` if it is not measured.
+    pub battery_v: Option<f64>,
     /// The rehearsal of the landing converged
     /// ([`SolverReport::converged`](crate::guidance::controller::SolverReport::converged)).
     pub controller_warm: bool,
@@ -82,7 +86,12 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     let mut checks = vec![
         Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
         Check::condition("pin", input.pin_out, "out", "in"),
-        Check::condition("self-test", input.self_test_passed, "passed", "not passed"),
+        Check::condition(
+            "self-test",
+            input.self_test_passed && !input.is_checking,
+            "passed",
+            if input.is_checking { "a check of the vehicle runs" } else { "not passed" },
+        ),
         Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
         Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
@@ -109,6 +118,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         },
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),
+        battery(limits, input.battery_v),
     ];
     if let Some(height_m) = input.hanging_m {
         checks.push(Check {
@@ -138,6 +148,15 @@ fn uplink(uplink: Uplink) -> Check {
     }
 }
 
+fn battery(limits: &ArmingLimits, battery_v: Option<f64>) -> Check {
+    let required = format!("at least {:.1} V", limits.battery_min_v);
+    let (passed, found) = match battery_v {
+        None => (true, "not measured".to_owned()),
+        Some(volts) => (volts >= limits.battery_min_v, format!("{volts:.2} V")),
+    };
+    Check { name: "battery", passed, found, required }
+}
+
 fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
     Check {
         name: "predicted touchdown",
@@ -163,12 +182,14 @@ mod tests {
             rotation_rad_s: 0.0,
             speed_m_s: 0.0,
             self_test_passed: true,
+            is_checking: false,
             hanging_m: None,
             estimator_converged: true,
             fins_answering: [true; 4],
             igniter_continuity: true,
             log_running: true,
             log_space_bytes: 1 << 30,
+            battery_v: Some(ArmingLimits::default().battery_min_v),
             controller_warm: true,
             controller_found: "converged".to_owned(),
             predicted_landing: Some(PredictedLanding::from(&LandingVerdict::judge(
@@ -194,7 +215,7 @@ mod tests {
 
     #[test]
     fn each_check_alone_refuses_and_reports_its_name_and_value() {
-        let spoilings: [Spoiling; 17] = [
+        let spoilings: [Spoiling; 20] = [
             ("abort latch: found latched", |input| {
                 input.abort_latched = true;
             }),
@@ -203,6 +224,9 @@ mod tests {
             }),
             ("self-test: found not passed", |input| {
                 input.self_test_passed = false;
+            }),
+            ("self-test: found a check of the vehicle runs", |input| {
+                input.is_checking = true;
             }),
             ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
                 input.tilt_rad = 6.0_f64.to_radians();
@@ -230,6 +254,12 @@ mod tests {
             }),
             ("log space: found 1 MiB", |input| {
                 input.log_space_bytes = 1 << 20;
+            }),
+            ("battery: found 7.39 V, required at least 7.4 V", |input| {
+                input.battery_v = Some(7.39);
+            }),
+            ("battery: found NaN V", |input| {
+                input.battery_v = Some(f64::NAN);
             }),
             ("controller warm: found", |input| {
                 input.controller_warm = false;

@@ -11,11 +11,12 @@
 //! `q' = -T sin p (X_CG - X_THR) / I` and `r' = -T sin y (X_CG - X_THR) / I`.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::vehicle::dynamics::PlanarState;
 
 /// Position, velocity, attitude and rotation of a rigid rocket.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigidState {
     /// Centre of gravity in the world, m.
     pub position_m: Vector3<f64>,

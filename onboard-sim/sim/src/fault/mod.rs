@@ -135,6 +135,8 @@ const PHASES: &[(&str, Phase)] = &[
     ("armed", Phase::LandArmed),
     ("ignition", Phase::Ignition),
     ("powered", Phase::Powered),
+    ("chute", Phase::Chute),
+    ("touchdown", Phase::Touchdown),
 ];
 
 fn known() -> String {

@@ -104,6 +104,7 @@ impl PlanarFlight {
             igniter_continuity: !self.lit,
             booster_attached: false,
             pin_out: outside.pin_out,
+            battery_v: None,
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,

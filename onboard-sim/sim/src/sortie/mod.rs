@@ -25,9 +25,9 @@ use flight::vehicle::rigid::RigidState;
 use hil::carried::{CarriedCommands, Wire};
 use hil::readings::{Feedback, Readings};
 use nalgebra::Vector3;
-use world::World;
 use world::sensors::SensorParamError;
 use world::world::WorldError;
+use world::{Battery, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw};
@@ -223,6 +223,7 @@ impl Sortie {
             igniter_continuity: switches.igniter_continuity,
             booster_attached: switches.booster_attached,
             pin_out: switches.pin_out,
+            battery_v: Some(self.surroundings.battery.volts()),
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
@@ -340,6 +341,16 @@ impl Sortie {
     /// The truth.
     pub fn world(&self) -> &World {
         &self.surroundings.world
+    }
+
+    /// The battery.
+    pub fn battery(&self) -> &Battery {
+        &self.surroundings.battery
+    }
+
+    /// Exchanges the battery for one with this charge, 0 to 1.
+    pub fn set_battery(&mut self, charge: f64) {
+        self.surroundings.battery = Battery::new(charge, crate::surroundings::surfaces_rad(self.world()));
     }
 
     /// The truth, for a caller that replaces it.

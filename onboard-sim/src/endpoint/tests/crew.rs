@@ -20,6 +20,7 @@ const PAUSE: u16 = 193;
 const ABORT: u16 = 185;
 const TAP: u16 = 54_000;
 const TAKE_COMMAND: u16 = 54_001;
+const CHECK: u16 = 54_002;
 
 /// The places of the stations.
 const RANGE: usize = 0;
@@ -354,6 +355,19 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
     assert_eq!(frames_to_latch(None), 1);
 }
 
+/// Whoever may command may check, alone; nobody else may. (The planar vehicle of these tests has no check to run.)
+#[test]
+fn a_check_takes_one_operator_with_a_key() {
+    let mut launch = Launch::two();
+    for (station, expected) in [
+        (OBSERVER, "only an operator with a key of their own commands"),
+        (PAD, "only a rocket in space checks itself"),
+    ] {
+        let (_, words) = launch.says(station, CHECK, 1.0, 0.0);
+        assert!(words.contains(expected), "{words}");
+    }
+}
+
 #[test]
 fn one_person_mode_needs_one_key() {
     let mut launch = Launch::new(People::One);
@@ -470,7 +484,7 @@ fn the_log_is_for_operators() {
     use protocol::identity::VEHICLE;
 
     let mut launch = Launch::two();
-    launch.endpoint.offer(super::files::InMemory::boxed(1000));
+    launch.endpoint.offer(Box::new(super::files::log(1000)));
     let fetches = |launch: &mut Launch, station: usize, packet: &Packet| {
         let frame = launch.signed(station, &packet.message(VEHICLE));
         launch.sent.clear();

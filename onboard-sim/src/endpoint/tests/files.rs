@@ -2,32 +2,19 @@
 
 use protocol::ftp::download::{Download, Failure, News};
 use protocol::ftp::packet::Refusal;
-use protocol::ftp::server::{FileEntry, Files};
+use protocol::ftp::server::InMemory;
 use protocol::ftp::{Opcode, Packet};
 use protocol::identity::VEHICLE;
 
 use super::*;
 
-pub(super) struct InMemory([FileEntry; 1], Vec<u8>);
-
-impl InMemory {
-    pub(super) fn boxed(len: usize) -> Box<Self> {
-        let entry = FileEntry { name: "flight.mcap".to_owned(), len: len as u32 };
-        Box::new(Self([entry], (0..len).map(|n| (n % 251) as u8).collect()))
-    }
+/// A log of this length, as the recorder would offer it.
+pub(super) fn log(len: usize) -> InMemory {
+    InMemory::new([("flight.mcap", content(len))])
 }
 
-impl Files for InMemory {
-    fn entries(&self) -> &[FileEntry] {
-        &self.0
-    }
-
-    fn read(&mut self, _place: usize, offset: u32, into: &mut [u8]) -> Option<usize> {
-        let from = self.1.get(offset as usize..)?;
-        let read = from.len().min(into.len());
-        into[..read].copy_from_slice(&from[..read]);
-        Some(read)
-    }
+fn content(len: usize) -> Vec<u8> {
+    (0..len).map(|n| (n % 251) as u8).collect()
 }
 
 impl Wire {
@@ -79,12 +66,12 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
             _ => VehicleEndpoint::sending_signed(&STANDARD),
         };
         let mut wire = Wire { endpoint: endpoint.over_links(&[capacity_bytes_s]), ..Wire::new() };
-        wire.endpoint.offer(InMemory::boxed(200_000));
+        wire.endpoint.offer(Box::new(log(200_000)));
         let mut download = Download::new(None, None, 0);
         let began_s = wire.vehicle.time_s();
         let (file, sent) = wire.fetch(&mut download, 1000.0);
         assert_eq!(download.ended(), Some(Ok(())));
-        assert_eq!(file, InMemory::boxed(200_000).1);
+        assert_eq!(file, content(200_000));
         let took_s = wire.vehicle.time_s() - began_s;
         let bytes_s = 200_000.0 / took_s;
         let share = bytes_s / f64::from(capacity_bytes_s) * (266 + signature_len) as f64 / 239.0;
@@ -110,10 +97,10 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
 #[test]
 fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
     let mut wire = Wire::new();
-    wire.endpoint.offer(InMemory::boxed(1000));
+    wire.endpoint.offer(Box::new(log(1000)));
     assert_eq!(wire.asked_file(Opcode::OpenFileRo, "/log/flight.mcap").0, None);
     let mut download = Download::new(None, None, 0);
-    wire.endpoint.offer(InMemory::boxed(100_000));
+    wire.endpoint.offer(Box::new(log(100_000)));
     wire.fetch(&mut download, 10.0);
     assert_eq!(download.ended(), None, "under way");
     assert_eq!(wire.ask(400, 1.0, 0.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);
@@ -147,7 +134,7 @@ fn a_client_that_looks_for_parameters_in_files_is_answered_at_once_also_in_fligh
 #[test]
 fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
     let mut wire = Wire { endpoint: VehicleEndpoint::new().over_links(&[2000, 2000]), ..Wire::new() };
-    wire.endpoint.offer(InMemory::boxed(50_000));
+    wire.endpoint.offer(Box::new(log(50_000)));
     wire.run(1.0);
     wire.ask_file(&Packet::request(1, 0, Opcode::OpenFileRo, 0, "/log/flight.mcap"));
     wire.run(0.5);

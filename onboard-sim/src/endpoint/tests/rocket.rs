@@ -4,7 +4,8 @@ use flight::rules::arming::{Check, UPLINK_CHECK};
 use protocol::dialect::{
     BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA,
     GPS_RAW_INT_DATA, GpsFixType, HIGHRES_IMU_DATA, LOCAL_POSITION_NED_DATA, MavSysStatusSensor,
-    SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_PREDICTED_PATH_DATA, TdChute,
+    STORAGE_INFORMATION_DATA, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_PAD_CHECK_DATA,
+    TD_PREDICTED_PATH_DATA, TdChute, TdPadCheckState,
 };
 use sim::dispersion::Dispersion;
 
@@ -193,7 +194,7 @@ fn the_landing_burn_tells_its_plan() {
 }
 
 #[test]
-fn messages_that_are_off_can_be_requested_and_unmodelled_values_are_unknown() {
+fn messages_that_are_off_can_be_requested_and_unknown_values_are_marked() {
     let mut airborne = Airborne::on_the_pad("field");
     let MavMessage::HIGHRES_IMU(imu) = airborne.request(HIGHRES_IMU_DATA::ID) else { panic!("not the IMU") };
     assert!((imu.xacc - 9.81).abs() < 0.3 && imu.ygyro.abs() < 0.1, "{imu:?}");
@@ -201,7 +202,53 @@ fn messages_that_are_off_can_be_requested_and_unmodelled_values_are_unknown() {
         panic!("not the battery")
     };
     assert!(battery.fault_bitmask.is_empty());
-    assert_eq!((battery.voltages[0], battery.current_battery, battery.battery_remaining), (u16::MAX, -1, -1));
+    // Two cells, just charged.
+    assert!((8_200..8_400).contains(&battery.voltages[0]), "{battery:?}");
+    assert_eq!(
+        (battery.battery_remaining, battery.current_consumed, battery.temperature),
+        (100, -1, i16::MAX)
+    );
+}
+
+#[test]
+fn the_storage_is_told_while_there_is_one() {
+    let mut airborne = Airborne::on_the_pad("none");
+    airborne.rocket.set_log_state(LogState { running: true, space_bytes: 3 << 30 });
+    let MavMessage::STORAGE_INFORMATION(storage) = airborne.request(STORAGE_INFORMATION_DATA::ID) else {
+        panic!("not the storage")
+    };
+    assert_eq!((storage.available_capacity, storage.storage_count), (3072.0, 1));
+    airborne.rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+    let sent = airborne.run(12.0);
+    assert_eq!(count(&sent, STORAGE_INFORMATION_DATA::ID), 0, "the operator flies without a log");
+}
+
+/// Every value of a check arrives over a radio, within its budget, and again for a station that comes late.
+#[test]
+fn a_check_is_told_value_by_value() {
+    let mut airborne = Airborne::on_the_pad("field");
+    assert_eq!(count(&airborne.run(3.0), TD_PAD_CHECK_DATA::ID), 0, "there was none");
+    frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Check]);
+    let mut places = std::collections::BTreeSet::new();
+    let mut last = None;
+    let sent = airborne.run(24.0);
+    for frame in &sent {
+        let Ok(MavMessage::TD_PAD_CHECK(told)) = frame.decode() else { continue };
+        if told.found > 0 {
+            places.insert(told.place);
+        }
+        last = Some(told);
+    }
+    let last = last.unwrap();
+    assert_eq!(last.state, TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
+    assert_eq!((usize::from(last.found), last.progress, last.run), (places.len(), 100, 1));
+    assert_eq!(places.len(), 31);
+    airborne.run(40.0);
+    let late = airborne.run(10.0);
+    assert!((9..=11).contains(&count(&late, TD_PAD_CHECK_DATA::ID)), "once a second");
+    frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Arm]);
+    airborne.run(0.5);
+    assert_eq!(count(&airborne.run(5.0), TD_PAD_CHECK_DATA::ID), 0, "not while armed");
 }
 
 fn abort() -> Frame {

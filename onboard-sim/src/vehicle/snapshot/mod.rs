@@ -4,8 +4,8 @@ mod crew;
 mod plane;
 mod space;
 
-use flight::computer::AbortEffect;
 use flight::computer::pilot::ApogeeAhead;
+use flight::computer::{AbortEffect, LogState};
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
@@ -86,6 +86,19 @@ pub struct Snapshot {
     pub crew: Option<CrewFacts>,
     /// Which mission or profile it flies.
     pub mission: MissionName,
+    /// `None` where no battery is modelled.
+    pub battery: Option<BatteryFacts>,
+    /// Where the log is written.
+    pub log: LogState,
+}
+
+/// The battery.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatteryFacts {
+    pub volts: f64,
+    pub current_a: f64,
+    /// What is left of its charge, 0 to 1.
+    pub left: f64,
 }
 
 /// Position, velocity, attitude and rotation, north-east-down. Body axes: x towards the nose.
@@ -337,6 +350,8 @@ impl Vehicle {
             pad_altitude_m: 0.0,
             crew: self.crew_facts(),
             mission: self.mission.clone(),
+            battery: None,
+            log: self.log,
         }
     }
 }

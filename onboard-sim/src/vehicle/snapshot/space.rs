@@ -14,8 +14,8 @@ use nalgebra::{Vector2, Vector3};
 use sim::limits::Limits;
 
 use super::{
-    AscentFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path, Prediction,
-    Snapshot, violations,
+    AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path,
+    Prediction, Snapshot, violations,
 };
 use crate::vehicle::{InSpace, Vehicle};
 
@@ -47,6 +47,11 @@ impl Vehicle {
             sensors: space.sensors.facts(sortie.frame()),
             site: mission.site,
             pad_altitude_m: mission.pad_altitude_m,
+            battery: Some(BatteryFacts {
+                volts: sortie.battery().volts(),
+                current_a: sortie.battery().current_a(),
+                left: sortie.battery().charge(),
+            }),
             ..self.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
         };
         let computer = sortie.computer();

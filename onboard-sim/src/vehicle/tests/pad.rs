@@ -293,3 +293,45 @@ fn a_hold_while_it_hangs_keeps_it_hanging() {
     assert_eq!(rocket.phase(), Phase::PadArmed);
     assert!(sortie(&rocket).world().hangs());
 }
+
+/// A reset of 0.1 s on the pad disarms, ends the countdown and is said; the crew may arm and start again.
+#[test]
+fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
+    let mut rocket = from(StartPoint::Pad, "field", &["reboot:0.1@pad-armed+1"]).run_to(Phase::PadArmed);
+    rocket.request(Asked::Start);
+    let events = rocket.run_until(|rocket| rocket.phase() == Phase::Safe);
+    assert!(!said(&events, "LIFT-OFF"));
+    let events = rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
+    assert!(said(&events, "the flight computer has restarted: DISARMED"), "{events:?}");
+    let snapshot = rocket.snapshot();
+    assert!(!snapshot.interlocks.armed && snapshot.countdown_s.is_none(), "{snapshot:?}");
+    rocket.run_until(|rocket| rocket.arming_checks().iter().all(|check| check.passed));
+    rocket.request(Asked::Arm);
+    rocket.request(Asked::Start);
+    rocket.run_until(Vehicle::is_over);
+    assert!(rocket.judged().is_some_and(|judged| judged.landed));
+}
+
+/// In the air it flies on. Under power it holds the nose upright until its next plan, which is one plan period away.
+#[test]
+fn a_reset_in_every_phase_of_the_flight_is_flown_through() {
+    for phase in ["boost+0.3", "coast+2", "descent+2", "armed", "ignition", "powered+1", "touchdown+0.2"] {
+        let (rocket, events) = flown(from(StartPoint::Pad, "field", &[&format!("reboot:0.1@{phase}")]));
+        let seen = phases(&events);
+        assert_eq!(
+            seen[seen.len() - 7..],
+            [
+                Phase::Coast,
+                Phase::Deploy,
+                Phase::AeroDescent,
+                Phase::LandArmed,
+                Phase::Ignition,
+                Phase::Powered,
+                Phase::Touchdown
+            ],
+            "{phase}"
+        );
+        assert!(rocket.judged().is_some_and(|judged| judged.landed), "{phase}");
+        assert!(!said(&events, "DISARMED"), "{phase}");
+    }
+}

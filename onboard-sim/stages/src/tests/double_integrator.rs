@@ -4,11 +4,11 @@ use super::optimality::Optimality;
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
 use super::solved;
 
-const INTERVALS: usize = 40;
+pub(super) const INTERVALS: usize = 40;
 const STEP_S: f64 = 0.1;
 
 /// From rest to rest one unit further, with the least sum of squared forces.
-fn problem(limit: f64) -> Polynomial<2, 1> {
+pub(super) fn problem(limit: f64) -> Polynomial<2, 1> {
     let one = Polynomial::<2, 1>::ONE;
     Polynomial {
         intervals: INTERVALS,

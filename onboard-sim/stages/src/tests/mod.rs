@@ -1,5 +1,6 @@
 //! The solver on problems of several sizes: 2 states and 1 input, 4 and 2, 5 and 3, 13 and 3.
 
+mod allowance;
 mod double_integrator;
 mod linear_quadratic;
 mod optimality;

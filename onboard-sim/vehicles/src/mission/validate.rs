@@ -136,6 +136,12 @@ fn powered(settings: &PoweredSettings) -> Check {
         settings.max_solves,
         "from 1 to 100",
     )?;
+    require(
+        settings.max_passes.is_none_or(|passes| passes >= 1),
+        "powered.max_passes",
+        settings.max_passes.unwrap_or_default(),
+        "1 or more",
+    )?;
     positive("powered.landing_miss", settings.landing_miss)?;
     not_negative("powered.across_decay_per_s", settings.across_decay_per_s)?;
     not_negative("powered.across_homing_per_s2", settings.across_homing_per_s2)?;

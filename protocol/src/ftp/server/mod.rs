@@ -62,6 +62,37 @@ impl Files for NoFiles {
     }
 }
 
+/// Files that are in memory whole.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InMemory {
+    entries: Vec<FileEntry>,
+    contents: Vec<Vec<u8>>,
+}
+
+impl InMemory {
+    /// Files of these names and contents, the oldest first.
+    pub fn new<'a>(files: impl IntoIterator<Item = (&'a str, Vec<u8>)>) -> Self {
+        let entry = |(name, content): (&str, Vec<u8>)| {
+            (FileEntry { name: name.to_owned(), len: content.len() as u32 }, content)
+        };
+        let (entries, contents) = files.into_iter().map(entry).unzip();
+        Self { entries, contents }
+    }
+}
+
+impl Files for InMemory {
+    fn entries(&self) -> &[FileEntry] {
+        &self.entries
+    }
+
+    fn read(&mut self, place: usize, offset: u32, into: &mut [u8]) -> Option<usize> {
+        let from = self.contents.get(place)?.get(offset as usize..)?;
+        let read = from.len().min(into.len());
+        into[..read].copy_from_slice(&from[..read]);
+        Some(read)
+    }
+}
+
 /// What became of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taken {

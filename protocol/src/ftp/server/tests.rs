@@ -5,35 +5,12 @@ use proptest::prelude::*;
 
 const NOW: Duration = Duration::from_secs(10);
 
-struct InMemory(Vec<(FileEntry, Vec<u8>)>, Vec<FileEntry>);
-
-impl InMemory {
-    fn new(files: &[(&str, Vec<u8>)]) -> Self {
-        let entry =
-            |(name, bytes): &(&str, Vec<u8>)| FileEntry { name: (*name).to_owned(), len: bytes.len() as u32 };
-        let entries: Vec<_> = files.iter().map(entry).collect();
-        Self(entries.iter().cloned().zip(files.iter().map(|(_, bytes)| bytes.clone())).collect(), entries)
-    }
-}
-
-impl Files for InMemory {
-    fn entries(&self) -> &[FileEntry] {
-        &self.1
-    }
-
-    fn read(&mut self, place: usize, offset: u32, into: &mut [u8]) -> Option<usize> {
-        let from = self.0[place].1.get(offset as usize..)?;
-        let read = from.len().min(into.len());
-        into[..read].copy_from_slice(&from[..read]);
-        Some(read)
-    }
-}
-
 fn log(len: usize) -> InMemory {
-    InMemory::new(&[
-        ("old.mcap", vec![1, 2, 3]),
-        ("flight.mcap", (0..len).map(|n| (n % 251) as u8).collect()),
-    ])
+    InMemory::new([("old.mcap", vec![1, 2, 3]), ("flight.mcap", content(len))])
+}
+
+fn content(len: usize) -> Vec<u8> {
+    (0..len).map(|n| (n % 251) as u8).collect()
 }
 
 fn asked(packet: Packet) -> FileRequest {
@@ -92,7 +69,7 @@ fn everything_that_writes_is_refused_as_protected_and_the_unknown_as_unknown() {
             _ => {}
         }
     }
-    assert_eq!(files.0[1].1, log(1000).0[1].1);
+    assert_eq!(files, log(1000));
 }
 
 #[test]
@@ -113,7 +90,7 @@ fn a_file_comes_in_bursts_and_single_pieces_with_its_checksum() {
         }
         assert!(burst.len() <= 256);
     }
-    assert_eq!(file, files.0[1].1);
+    assert_eq!(file, content(100_000));
     let one = answer(&mut server, &mut files, reading(9, opened.session, Opcode::ReadFile, 99_990, 239));
     assert_eq!((one.sequence, one.offset, &one.data[..]), (10, 99_990, &file[99_990..]));
     let end = answer(&mut server, &mut files, reading(9, opened.session, Opcode::ReadFile, 100_000, 239));
@@ -184,8 +161,8 @@ fn nothing_is_read_while_it_is_not_allowed_and_other_paths_are_not_found() {
 #[test]
 fn sessions_are_bounded_and_end_when_nobody_reads() {
     let names: Vec<String> = (0..20).map(|n| format!("{n}.mcap")).collect();
-    let many: Vec<(&str, Vec<u8>)> = names.iter().map(|name| (name.as_str(), vec![0; 10])).collect();
-    let (mut server, mut files) = (Server::default(), InMemory::new(&many));
+    let many = names.iter().map(|name| (name.as_str(), vec![0; 10]));
+    let (mut server, mut files) = (Server::default(), InMemory::new(many));
     for system_id in 1..=5 {
         for name in &names {
             let packet = Packet::request(1, 0, Opcode::OpenFileRo, 0, &format!("/log/{name}"));

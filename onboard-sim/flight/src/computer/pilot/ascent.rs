@@ -2,6 +2,7 @@
 
 use alloc::format;
 use alloc::string::String;
+use serde::{Deserialize, Serialize};
 
 use super::Sensed;
 use crate::computer::memory::remembers;
@@ -58,7 +59,7 @@ pub(super) struct AscentSeen {
 }
 
 /// The watch's memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct AscentWatch {
     gained_m_s: f64,
     lifted_off: bool,

@@ -4,6 +4,7 @@
 //! stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
 use crate::computer::memory::remembers;
+use serde::{Deserialize, Serialize};
 
 /// A fin that has moved by this much is working, rad.
 const MOVED_RAD: f64 = 0.015;
@@ -13,7 +14,7 @@ const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
 const STUCK_AFTER_S: f64 = 0.25;
 
 /// State of the watch over one fin.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Watched {
     /// Angle after its last movement, rad.
     rests_at_rad: f64,
@@ -22,7 +23,7 @@ struct Watched {
 }
 
 /// The watch over all fins.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct FinWatch {
     fins: [Watched; 4],
 }

@@ -14,13 +14,15 @@ mod known;
 mod outlook;
 mod restart;
 #[cfg(test)]
-mod sample;
+pub(super) mod sample;
 mod step;
 
 use ascent::{AscentWatch, axial_m_s2};
 use fin_watch::FinWatch;
 use known::Known;
 pub use outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
+pub use restart::SavedPilot;
+use serde::{Deserialize, Serialize};
 
 use nalgebra::Vector3;
 
@@ -71,7 +73,7 @@ pub struct PilotInput {
 }
 
 /// The commands to the booster.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct BoosterCommands {
     /// Current through the ascent motor's igniter.
     pub ignite: bool,

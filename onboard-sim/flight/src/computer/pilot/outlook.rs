@@ -118,7 +118,7 @@ mod tests {
     fn an_abort_in_the_first_frame_knows_the_height() {
         let pilot = falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
-        assert!(abort_releases(&mut pilot.restarted(0.1), 21));
+        assert!(abort_releases(&mut falling().resumed(&pilot.saved(), 0.1), 21));
     }
 
     #[test]

@@ -1,21 +1,51 @@
-//! The pilot after a restart in the air.
+//! What a pilot saves for a restart in the air, and how it goes on.
 
-use super::{Outlook, Pilot};
-use crate::control::aim::AimLoop;
-use crate::estimation::estimator::{Estimator, StartUncertainty};
-use crate::guidance::powered::PoweredGuidance;
+use serde::{Deserialize, Serialize};
+
+use super::Pilot;
+use super::ascent::AscentWatch;
+use super::fin_watch::FinWatch;
+use crate::estimation::estimator::{Estimate, Estimator, StartUncertainty};
+use crate::estimation::motor_estimate::MotorEstimate;
+
+/// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has
+/// seen of its ascent and of its fins. Covariances of the estimator, outlook, plan and gimbal loop are not kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SavedPilot {
+    motor: MotorEstimate,
+    estimate: Option<Estimate>,
+    ascent: AscentWatch,
+    apogee_m: f64,
+    ignited_at_s: Option<f64>,
+    fin_share: f64,
+    fins_rad: [f64; 4],
+    fin_watch: FinWatch,
+    gimbal_rad: [f64; 2],
+}
 
 impl Pilot {
-    /// This pilot after a restart at `time_s`.
-    ///
-    /// Kept, as if in memory that survives a power loss: the knowledge of motor and drag, the last commands, and the
-    /// last estimate. The estimate is extrapolated over the lost time with the last measured rates and forces, and gets
-    /// the same uncertainty as at apogee. Estimator, outlook, plan and gimbal loop start afresh.
+    pub(in crate::computer) fn saved(&self) -> SavedPilot {
+        SavedPilot {
+            motor: self.known.motor,
+            estimate: self.estimate,
+            ascent: self.ascent,
+            apogee_m: self.apogee_m,
+            ignited_at_s: self.ignited_at_s,
+            fin_share: self.fin_share,
+            fins_rad: self.fins_rad,
+            fin_watch: self.fin_watch,
+            gimbal_rad: self.gimbal_rad,
+        }
+    }
+
+    /// This pilot, which was just powered up, from what was saved before a reset that ended at `time_s`. The saved estimate
+    /// is extrapolated over the lost time with the last measured rates and forces, and gets the same uncertainty as
+    /// at apogee.
     #[must_use]
-    pub fn restarted(&self, time_s: f64) -> Self {
+    pub(in crate::computer) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
         let mission = &self.known.mission;
         let uncertainty = StartUncertainty::at_apogee();
-        let estimator = self.estimate.map_or_else(
+        let estimator = saved.estimate.map_or_else(
             || self.estimator.clone(),
             |estimate| {
                 let lost_s = (time_s - estimate.time_s).max(0.0);
@@ -33,15 +63,31 @@ impl Pilot {
                     .with_gyro_bias(estimate.gyro_bias_rad_s)
             },
         );
-        Self {
+        let SavedPilot {
+            motor,
+            estimate,
+            ascent,
+            apogee_m,
+            ignited_at_s,
+            fin_share,
+            fins_rad,
+            fin_watch,
+            gimbal_rad,
+        } = *saved;
+        let mut resumed = Self {
             estimator,
-            outlook: Outlook::default(),
-            powered: PoweredGuidance::new(mission.powered),
-            aim_loop: AimLoop::new(mission.aim, mission.estimator.frame_s),
-            gate_refusal: None,
-            gate_shut_since_s: None,
+            estimate,
+            ascent,
+            apogee_m,
+            ignited_at_s,
+            fin_share,
+            fins_rad,
+            fin_watch,
+            gimbal_rad,
             ..self.clone()
-        }
+        };
+        resumed.known.motor = motor;
+        resumed
     }
 }
 
@@ -58,7 +104,12 @@ mod tests {
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);
-        let found = pilot.restarted(estimate.time_s + 0.2).estimator.estimate().state.world_from_body;
+        let found = falling()
+            .resumed(&pilot.saved(), estimate.time_s + 0.2)
+            .estimator
+            .estimate()
+            .state
+            .world_from_body;
         let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
         let expected = estimate.state.world_from_body * turned;
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));

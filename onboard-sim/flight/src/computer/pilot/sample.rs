@@ -23,7 +23,7 @@ pub(super) fn falling() -> Pilot {
 }
 
 /// The input of a frame with almost no specific force, turning at a rate.
-pub(super) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
+pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
     let imu = ImuSample {
         gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
         specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),

@@ -9,7 +9,9 @@ use crate::vehicle::rigid::upright;
 /// Fewest samples for an alignment: one second at 200 Hz.
 const FEWEST: u32 = 200;
 /// Largest mean rate of a vehicle at rest, rad/s: the turn-on bias of a hobby gyro with some margin.
-const STILL_RAD_S: f64 = 0.017;
+pub(crate) const STILL_RAD_S: f64 = 0.017;
+/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 5 % for scale, bias and place.
+pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.3..=10.3;
 
 /// Running means over the samples taken at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -78,7 +80,7 @@ impl PadAlignment {
             return Err(AlignmentError::Turning { found_deg_s: rate.to_degrees() });
         }
         let felt = self.specific_force_m_s2.norm();
-        if !(9.3..=10.3).contains(&felt) {
+        if !FELT_AT_REST_M_S2.contains(&felt) {
             return Err(AlignmentError::NotAtRest { found_m_s2: felt });
         }
         let headed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad) * upright();

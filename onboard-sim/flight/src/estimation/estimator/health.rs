@@ -1,6 +1,7 @@
 //! Whether the estimate is good enough to light a motor, and if not, why.
 
 use core::fmt;
+use serde::{Deserialize, Serialize};
 
 use super::{EstimatorConfig, Gates, Sigmas};
 
@@ -10,7 +11,7 @@ const BRIDGED_FRAMES: u32 = 4;
 pub(super) const DOUBT_AFTER_RESTART_S: f64 = 1.0;
 
 /// The estimator's own verdict.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Health {
     /// Every standard deviation is inside its limit and the sensors agree with it.
     Good,
@@ -19,7 +20,7 @@ pub enum Health {
 }
 
 /// Why an estimate must not be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Doubt {
     /// The state was not a number, and the filter restarted.
     Restarted,

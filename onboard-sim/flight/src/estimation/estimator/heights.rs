@@ -5,6 +5,7 @@
 
 use super::EstimatorConfig;
 use crate::computer::memory::remembers;
+use serde::{Deserialize, Serialize};
 
 /// An older barometer sample is not used, s.
 const BAROMETER_KEEPS_S: f64 = 0.25;
@@ -15,7 +16,7 @@ const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 const DOUBT_FACTOR: f64 = 1.1;
 
 /// Heights of the centre of gravity above the pad, from two sources.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeightSources {
     /// Inertial, satellite and lidar, m.
     pub inertial_m: f64,

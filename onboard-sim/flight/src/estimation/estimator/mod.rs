@@ -31,6 +31,7 @@ mod vehicle;
 mod wind;
 
 use nalgebra::{Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
@@ -52,7 +53,7 @@ use self::wind::Sideways;
 use crate::vehicle::rigid::RigidState;
 
 /// Standard deviations of an estimate, from the diagonal of the covariance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sigmas {
     pub position_m: Vector3<f64>,
     pub velocity_m_s: Vector3<f64>,
@@ -67,7 +68,7 @@ pub struct Sigmas {
 }
 
 /// The output of the estimator after a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// End of the frame, s.
     pub time_s: f64,

@@ -2,6 +2,7 @@
 
 use super::NominalThrust;
 use crate::computer::memory::remembers;
+use serde::{Deserialize, Serialize};
 
 /// The motor burns when the thrust is above this fraction of the peak in two frames in a row.
 const CAUGHT_SHARE: f64 = 0.1;
@@ -11,7 +12,7 @@ pub(super) const SIGMA_S: f64 = 0.004;
 const RISE_S: f64 = 0.3;
 const RISE_STEP_S: f64 = 0.0005;
 
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Detector {
     /// Middle of the last frame, s, and its thrust, N.
     last: Option<(f64, f64)>,

@@ -15,7 +15,7 @@ mod ignition;
 mod tests;
 
 use nalgebra::{Matrix5, Vector2, Vector5};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use self::ignition::Detector;
 use crate::vehicle::airframe::BadValue;
@@ -57,7 +57,7 @@ pub struct MotorSample {
 }
 
 /// The prior of the motor before ignition, and the noise, as standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotorPrior {
     /// Length of a frame, s.
@@ -127,7 +127,7 @@ impl MotorPrior {
 }
 
 /// State of the motor, as far as the accelerometer shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotorStage {
     /// Not lit.
     Waiting,
@@ -147,7 +147,7 @@ pub struct PredictedThrust {
 }
 
 /// The filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotorEstimate {
     prior: MotorPrior,
     detector: Detector,

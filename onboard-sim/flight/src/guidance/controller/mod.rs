@@ -16,6 +16,7 @@ mod step;
 use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
+use serde::{Deserialize, Serialize};
 
 pub use plan::Plan;
 pub use step::step;
@@ -161,7 +162,7 @@ pub struct ControllerInput {
 }
 
 /// The source of the gimbal command; the levels in flight are ordered from best to worst.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum ControlLevel {
     /// Nothing to control; the gimbal is centred.

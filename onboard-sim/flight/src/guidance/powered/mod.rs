@@ -149,11 +149,12 @@ impl PoweredGuidance {
         preferred: &'s PoweredSituation<'a>,
         fallback: Option<&'s PoweredSituation<'a>>,
     ) -> Option<(FreeTimeProblem, &'s PoweredSituation<'a>)> {
+        self.workspace.allow(self.settings.max_passes);
         let mut problem = self.pose(plane, state, preferred)?;
         self.solve(time_s, &mut problem, preferred);
         let ended_m_s = ended_m_s(&self.trial);
         let posed = fallback
-            .filter(|_| ended_m_s < SOFT_M_S)
+            .filter(|_| ended_m_s < SOFT_M_S && !self.workspace.is_spent())
             .and_then(|fallback| Some((self.pose(plane, state, fallback)?, fallback)));
         let Some((mut other, fallback)) = posed else { return Some((problem, preferred)) };
         core::mem::swap(&mut self.trial, &mut self.set_aside);
@@ -174,7 +175,8 @@ impl PoweredGuidance {
     fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
         solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
-        if largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians() {
+        let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
+        if tilts && !self.workspace.is_spent() {
             // A loop satisfies the equations, but no vehicle can fly it in air. Solve again with a higher cost of tilt.
             problem.landing.state_weights[2] *= UPRIGHT_DEARER;
             solve_free_time_into(problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);

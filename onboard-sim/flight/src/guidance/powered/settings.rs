@@ -36,6 +36,11 @@ pub struct PoweredSettings {
     pub quiet_s: f64,
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
+    /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times
+    /// ([`stages::Workspace::allow`](nmpc::free_time::FreeTimeWorkspace::allow)): the best plan until then stands, and the next
+    /// tick goes on from it. Without it there is no bound.
+    #[serde(default)]
+    pub max_passes: Option<usize>,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
     pub landing_miss: f64,
     /// Decay rate of the velocity across the plane, 1/s.

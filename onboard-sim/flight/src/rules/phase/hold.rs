@@ -1,6 +1,7 @@
 //! The hold of a countdown.
 
 use super::{Mode, Phase};
+use serde::{Deserialize, Serialize};
 
 /// The station that armed the vehicle counts as silent when no frame of it was accepted for this long, s.
 pub const UPLINK_SILENT_S: f64 = 2.0;
@@ -9,7 +10,7 @@ pub const UPLINK_SILENT_S: f64 = 2.0;
 pub const HOLD_LIMIT_S: f64 = 60.0;
 
 /// Why a countdown was held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum HoldCause {
     /// No frame of the station that armed the vehicle was accepted for [`UPLINK_SILENT_S`].
@@ -21,7 +22,7 @@ pub enum HoldCause {
 }
 
 /// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     pub cause: HoldCause,
     /// When the countdown was held, vehicle time, s.

@@ -14,6 +14,7 @@ pub use crate::vehicle::profile::StartPoint;
 pub use event::{Effect, Effects, Event, Refusal};
 pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, UPLINK_SILENT_S};
 pub use motor::{MISFIRE_WAIT_S, MOTOR_HOT_S, Motor, MotorStatus};
+use serde::{Deserialize, Serialize};
 pub use transition::{Transition, transition};
 
 /// How long nobody may approach the pad after an abort there, s.
@@ -23,7 +24,7 @@ pub const PAD_ABORT_WAIT_S: f64 = 60.0;
 pub const NO_THRUST_TIMEOUT_S: f64 = 0.5;
 
 /// The phase of the flight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Phase {
     /// Powered up, self-test not passed.
@@ -129,7 +130,7 @@ impl Phase {
 }
 
 /// The latches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Interlocks {
     /// The physical pin has been pulled.
     pub pin_out: bool,
@@ -146,7 +147,7 @@ pub struct Interlocks {
 }
 
 /// Phase, latches, countdown and motor: the whole state of the table.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// The phase of the flight.
     pub phase: Phase,

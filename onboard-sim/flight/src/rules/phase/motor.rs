@@ -4,6 +4,7 @@
 //! command it may light late. A burnt motor is hot. The vehicle is not SAFED in either case.
 
 use super::{Mode, Phase, Refusal};
+use serde::{Deserialize, Serialize};
 
 /// How long nobody may approach a motor that was not lit or did not light on command, s. The safety codes of the
 /// National Association of Rocketry ask for 60 s after the last launch attempt. Here the time counts from the
@@ -15,7 +16,7 @@ pub const MISFIRE_WAIT_S: f64 = 60.0;
 pub const MOTOR_HOT_S: f64 = 60.0;
 
 /// The state of the landing motor.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Motor {
     /// Never commanded to light.
     #[default]

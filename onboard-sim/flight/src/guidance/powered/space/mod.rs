@@ -139,12 +139,16 @@ impl SpaceGuidance {
             .as_ref()
             .is_some_and(|flown| self.warm.take_last(flown, intervals, problem.end.settled_nodes));
         let warm = is_warm.then(|| self.warm.start());
+        self.workspace.allow(settings.max_passes);
         let mut best = self.workspace.solve(&problem, warm.as_ref());
         self.found.read(&self.workspace, &problem, time_s);
 
         let mut iterations = best.iterations;
         let mut step_s = FIRST_STEP_S;
         for _ in 1..settings.max_solves {
+            if self.workspace.is_spent() {
+                break;
+            }
             let mut lagrangian = |at_s: f64| {
                 stretch(&mut problem, at_s);
                 self.workspace.lagrangian(&problem, &self.found.start())

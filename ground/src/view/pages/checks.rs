@@ -1,0 +1,202 @@
+//! The page of the checks on the pad: every value with its limits, the radio range test, battery and storage.
+
+use std::time::Duration;
+
+use protocol::dialect::{TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
+use ratatui::text::{Line, Span};
+
+use crate::model::Model;
+use crate::model::act::Act;
+use crate::model::pad_check::{CheckedValue, PadCheck};
+use crate::model::range_test::{LOSS_MOST, MARGIN_LEAST_DB, RangeFound, RangeTest};
+use crate::view::number::{fixed, seconds};
+use crate::view::theme::{TextRole, Theme};
+
+/// The surfaces, by the number of their first item.
+const SURFACES: [(&str, u32); 6] =
+    [("gimbal pitch", 0), ("gimbal yaw", 3), ("fin 1", 6), ("fin 2", 9), ("fin 3", 12), ("fin 4", 15)];
+/// Columns of one value beside others.
+const VALUE_COLUMNS: usize = 39;
+
+/// How the check stands, its values, the radio.
+pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let check = model.vehicle.pad_check.as_ref();
+    let mut lines = vec![headline(model, check, theme, now), supply(model, theme)];
+    lines.push(Line::styled(
+        format!(" {:<14}{:>24}{:>20}{:>20}", "surface", "range, least", "error, most", "lag, most"),
+        theme.style(TextRole::Label),
+    ));
+    lines.extend(SURFACES.map(|(name, first)| surface(check, name, first, theme)));
+    let others: Vec<&CheckedValue> =
+        check.into_iter().flat_map(PadCheck::values).filter(|value| value.item as u32 >= 18).collect();
+    let beside = (columns / VALUE_COLUMNS).max(1);
+    // Down the first column first, as they were found.
+    let rows = others.len().div_ceil(beside);
+    for row in 0..rows {
+        let cells = (0..beside).filter_map(|column| others.get(row + column * rows));
+        lines.push(Line::from(cells.flat_map(|value| cell(value, theme)).collect::<Vec<_>>()));
+    }
+    lines.extend(radio(model, theme, now));
+    lines
+}
+
+/// What runs, or what came of it, and the keys.
+fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration) -> Line<'static> {
+    use TdPadCheckState as S;
+    let keys = &model.settings.keys;
+    let [all, still] = [Act::Check, Act::CheckStill].map(|act| keys.name(act));
+    let begin = format!("  {all} checks (MOVES), {still} without motion");
+    let Some(check) = check.filter(|check| check.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
+        return Line::from(vec![
+            Span::styled(" no check yet".to_owned(), theme.style(TextRole::Plain)),
+            Span::styled(begin, theme.style(TextRole::Label)),
+        ]);
+    };
+    let failing = check.failing().count();
+    let (words, role, then) = match check.state {
+        S::TD_PAD_CHECK_STATE_RUNNING => (
+            format!(" CHECK {} RUNS {} %: hands off", check.run, check.progress),
+            TextRole::Caution,
+            format!("  {all} ends it"),
+        ),
+        S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.run), TextRole::Good, begin),
+        S::TD_PAD_CHECK_STATE_FAILED => {
+            (format!(" CHECK {} FAILED: {failing} outside", check.run), TextRole::Alarm, begin)
+        }
+        _ => (format!(" CHECK {} STOPPED early", check.run), TextRole::Caution, begin),
+    };
+    let told = seconds(now.saturating_sub(check.told_at));
+    let by = if check.asked_by > 0 { format!(", {}", model.operator(check.asked_by)) } else { String::new() };
+    Line::from(vec![
+        Span::styled(words, theme.style(role)),
+        Span::styled(format!(" (told {told} ago{by})"), theme.style(TextRole::Label)),
+        Span::styled(then, theme.style(TextRole::Label)),
+    ])
+}
+
+/// Battery and storage, outside of a check too.
+fn supply(model: &Model, theme: Theme) -> Line<'static> {
+    let battery = model.vehicle.battery.map_or_else(
+        || "not told".to_owned(),
+        |battery| {
+            let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
+            format!("{} V{left}", fixed(battery.value.volts, 2))
+        },
+    );
+    let space = model
+        .vehicle
+        .log_space_mib
+        .map_or_else(|| "not told".to_owned(), |space| format!("{} MiB free", fixed(space.value, 0)));
+    let (label, plain) = (theme.style(TextRole::Label), theme.style(TextRole::Plain));
+    Line::from(vec![
+        Span::styled(" battery ", label),
+        Span::styled(battery, plain),
+        Span::styled("   vehicle's log ", label),
+        Span::styled(space, plain),
+    ])
+}
+
+fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
+    match verdict {
+        TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_OK => ("ok ", TextRole::Good),
+        TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_OK => ("NO ", TextRole::Alarm),
+        TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED => ("   ", TextRole::Plain),
+    }
+}
+
+/// One surface: range, error and lag, each with its limit.
+fn surface(check: Option<&PadCheck>, name: &str, first: u32, theme: Theme) -> Line<'static> {
+    let values: Vec<Option<&CheckedValue>> = (first..first + 3)
+        .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
+        .collect();
+    let mut spans = vec![Span::styled(format!(" {name:<14}"), theme.style(TextRole::Plain))];
+    for (value, columns) in values.into_iter().zip([24, 20, 20]) {
+        let Some(value) = value else {
+            spans.push(Span::styled(format!("{:>columns$}", "--"), theme.style(TextRole::Label)));
+            continue;
+        };
+        let (mark, role) = role_of(value.verdict);
+        let (_, unit, factor, decimals) = value.shown();
+        let limit = if value.least.is_finite() { value.least } else { value.most };
+        let (found, limit) = (fixed(factor * value.value, decimals), fixed(factor * limit, decimals));
+        let text = format!("{mark}{found}, {limit} {unit}");
+        spans.push(Span::styled(format!("{text:>columns$}"), theme.style(role)));
+    }
+    Line::from(spans)
+}
+
+/// A value with its limits, in a column.
+fn cell(value: &CheckedValue, theme: Theme) -> Vec<Span<'static>> {
+    let (mark, role) = role_of(value.verdict);
+    let (name, unit, factor, decimals) = value.shown();
+    let number = |number: f64| fixed(factor * number, decimals);
+    let found = match value.item {
+        item if is_switch(item) => if value.value > 0.5 { "yes" } else { "no" }.to_owned(),
+        _ => format!("{} {unit}", number(value.value)),
+    };
+    let limits = match (value.least.is_finite(), value.most.is_finite()) {
+        _ if is_switch(value.item) => String::new(),
+        (true, true) => format!("{}..{}", number(value.least), number(value.most)),
+        (true, false) => format!("least {}", number(value.least)),
+        (false, true) => format!("most {}", number(value.most)),
+        (false, false) => String::new(),
+    };
+    vec![
+        Span::styled(format!(" {mark}"), theme.style(role)),
+        Span::styled(format!("{name:<13.13}"), theme.style(TextRole::Plain)),
+        Span::styled(format!("{found:>10.10}"), theme.style(role)),
+        Span::styled(format!(" {limits:<11.11}"), theme.style(TextRole::Label)),
+    ]
+}
+
+fn is_switch(item: TdPadCheckItem) -> bool {
+    use TdPadCheckItem as I;
+    matches!(
+        item,
+        I::TD_PAD_CHECK_ITEM_IGNITER_CONTINUITY
+            | I::TD_PAD_CHECK_ITEM_BOOSTER_WIRE
+            | I::TD_PAD_CHECK_ITEM_PIN_OUT
+            | I::TD_PAD_CHECK_ITEM_LOG_RUNNING
+    )
+}
+
+/// The radio range test: what was found with its limits.
+fn radio(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let label = theme.style(TextRole::Label);
+    let key = model.settings.keys.name(Act::RangeTest);
+    let Some(test) = model.range_test.as_ref() else {
+        return vec![Line::from(vec![
+            Span::styled(" radio: no range test yet", theme.style(TextRole::Plain)),
+            Span::styled(format!("  {key} begins one: 30 s, antennas as in flight"), label),
+        ])];
+    };
+    let found = test.found.unwrap_or_else(|| test.so_far(None));
+    vec![result(test, &found, theme, now)]
+}
+
+/// In one line: the smallest whole screen has no more.
+fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> Line<'static> {
+    let (words, role) = match (test.is_running(), found.stopped, found.passed()) {
+        (true, ..) => (format!("RUNS {:.0} s", test.left(now).as_secs_f64()), TextRole::Caution),
+        (false, Some(_), _) => ("STOPPED".to_owned(), TextRole::Caution),
+        (false, None, true) => ("PASSED".to_owned(), TextRole::Good),
+        (false, None, false) => ("FAILED".to_owned(), TextRole::Alarm),
+    };
+    let mut spans = vec![Span::styled(format!(" RADIO {words}"), theme.style(role))];
+    let judged = |ok: bool| if ok { ("ok ", TextRole::Good) } else { ("NO ", TextRole::Alarm) };
+    for (name, loss) in [("lost down", found.loss_down), ("up", found.loss_up)] {
+        let (mark, role) = judged(loss <= LOSS_MOST);
+        spans.push(Span::styled(format!(" {mark}{name} {} %", fixed(100.0 * loss, 1)), theme.style(role)));
+    }
+    spans.push(Span::styled(format!(" most {:.0}", 100.0 * LOSS_MOST), theme.style(TextRole::Label)));
+    match found.margin_db {
+        Some(margin_db) => {
+            let (mark, role) = judged(margin_db >= MARGIN_LEAST_DB);
+            spans.push(Span::styled(format!(" {mark}margin {} dB", fixed(margin_db, 1)), theme.style(role)));
+            let least = format!(" least {MARGIN_LEAST_DB:.0}");
+            spans.push(Span::styled(least, theme.style(TextRole::Label)));
+        }
+        None => spans.push(Span::styled(" no margin told", theme.style(TextRole::Label))),
+    }
+    Line::from(spans)
+}

@@ -1,0 +1,188 @@
+//! One surface after the other is told to go to both ends of its range, and its feedback is watched.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::Told;
+use super::finding::{Finding, Item, SURFACES, larger};
+use crate::computer::memory::remembers;
+use crate::computer::self_test::ANSWERING_RAD;
+use crate::computer::{FRAME_MS, FRAME_S};
+use crate::vehicle::airframe::{Airframe, Servo};
+
+/// A surface stays at an end for this long after it should have arrived, s: a servo at half its rate arrives late, and
+/// yet is seen to arrive. mk2's longest way takes 0.3 s.
+const STAYS_S: f64 = 0.4;
+/// The feedback counts as that of a surface at its end in the last part of the stay, s.
+const SETTLED_S: f64 = 0.1;
+/// A surface may arrive this much later than its airframe says, s: one more of the delays of 20 ms that the missions
+/// were flown with, in simulation.
+const LATER_S: f64 = 0.020;
+/// A command leaves at the end of its frame, and the feedback is from the end of another one.
+const FRAMES_LATER: f64 = 2.0;
+
+/// How far one surface goes, and how it is moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Reach {
+    low_rad: f64,
+    high_rad: f64,
+    rest_rad: f64,
+    servo: Servo,
+}
+
+impl Reach {
+    /// Of gimbal pitch and yaw, and of fins 1 to 4.
+    fn of_each(airframe: &Airframe) -> [Self; SURFACES] {
+        let (gimbal, fins) = (&airframe.gimbal, &airframe.fins);
+        let limit_rad = gimbal.limit_rad();
+        let of_gimbal = Self { low_rad: -limit_rad, high_rad: limit_rad, rest_rad: 0.0, servo: gimbal.servo };
+        let of_fin = Self {
+            low_rad: fins.closed_rad(),
+            high_rad: fins.open_rad(),
+            rest_rad: fins.closed_rad(),
+            servo: fins.servo,
+        };
+        [of_gimbal, of_gimbal, of_fin, of_fin, of_fin, of_fin]
+    }
+
+    /// Where it is told to go, in order; back to its rest at last.
+    fn targets_rad(&self) -> Vec<f64> {
+        if self.low_rad < self.rest_rad {
+            vec![self.high_rad, self.low_rad, self.rest_rad]
+        } else {
+            vec![self.high_rad, self.rest_rad]
+        }
+    }
+
+    /// Time of a servo that turns at once at its rate until the surface counts as arrived, s.
+    fn ideal_s(&self, way_rad: f64) -> f64 {
+        (way_rad - ANSWERING_RAD).max(0.0) / self.servo.rate_rad_s()
+    }
+
+    fn stay_frames(&self, way_rad: f64) -> u32 {
+        libm::ceil((self.servo.delay_s + way_rad / self.servo.rate_rad_s() + STAYS_S) / FRAME_S) as u32
+    }
+
+    /// The latest arrival after the ideal one, s: its delay, its play, the frames, and a margin.
+    fn lag_most_s(&self) -> f64 {
+        self.servo.delay_s
+            + self.servo.slop_rad() / self.servo.rate_rad_s()
+            + FRAMES_LATER * FRAME_S
+            + LATER_S
+    }
+}
+
+/// What one surface has shown so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shown {
+    least_rad: f64,
+    most_rad: f64,
+    error_rad: f64,
+    /// NaN once it has not arrived anywhere.
+    lag_s: f64,
+}
+
+const NOTHING_SHOWN: Shown =
+    Shown { least_rad: f64::INFINITY, most_rad: f64::NEG_INFINITY, error_rad: 0.0, lag_s: 0.0 };
+
+/// The sweep of all surfaces.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sweep {
+    reaches: [Reach; SURFACES],
+    surface: usize,
+    /// The place of the present target among the surface's.
+    target: usize,
+    /// Frames since the surface was told to go there.
+    frames: u32,
+    frames_before: u64,
+    arrived_s: Option<f64>,
+    shown: Shown,
+}
+
+remembers!(Shown { least_rad, most_rad, error_rad, lag_s });
+remembers!(Sweep { surface, target, frames, frames_before, arrived_s, shown } but { reaches });
+
+impl Sweep {
+    pub(super) fn new(airframe: &Airframe) -> Self {
+        Self {
+            reaches: Reach::of_each(airframe),
+            surface: 0,
+            target: 0,
+            frames: 0,
+            frames_before: 0,
+            arrived_s: None,
+            shown: NOTHING_SHOWN,
+        }
+    }
+
+    /// Frames done, and all of them.
+    pub(super) fn frames(&self) -> (u64, u64) {
+        let all = self.reaches.iter().map(|reach| {
+            let targets = reach.targets_rad();
+            let ways = (0..targets.len()).map(|place| way_rad(reach, &targets, place));
+            ways.map(|way_rad| u64::from(reach.stay_frames(way_rad))).sum::<u64>()
+        });
+        (self.frames_before + u64::from(self.frames), all.sum())
+    }
+
+    /// One frame: what to command, `None` at the end; and what was found of a surface that is done.
+    pub(super) fn step(&mut self, surfaces_rad: &[f64; SURFACES]) -> (Option<Told>, Option<[Finding; 3]>) {
+        let Some(reach) = self.reaches.get(self.surface).copied() else { return (None, None) };
+        let targets = reach.targets_rad();
+        let (target_rad, way_rad) = (targets[self.target], way_rad(&reach, &targets, self.target));
+        let stay_frames = reach.stay_frames(way_rad);
+        if self.frames > 0 {
+            self.watch(surfaces_rad[self.surface], target_rad, reach.ideal_s(way_rad), stay_frames);
+        }
+        if self.frames < stay_frames {
+            self.frames += 1;
+            return (Some((self.surface, target_rad)), None);
+        }
+        self.shown.lag_s = larger(self.shown.lag_s, self.arrived_s.take().unwrap_or(f64::NAN));
+        self.frames_before += u64::from(self.frames);
+        (self.frames, self.target) = (0, self.target + 1);
+        let mut found = None;
+        if self.target == targets.len() {
+            found = Some(self.findings(&reach));
+            (self.surface, self.target, self.shown) = (self.surface + 1, 0, NOTHING_SHOWN);
+        }
+        let (told, _) = self.step(surfaces_rad);
+        (told, found)
+    }
+
+    /// Takes one feedback of the moving surface.
+    fn watch(&mut self, found_rad: f64, target_rad: f64, ideal_s: f64, stay_frames: u32) {
+        let off_rad = (found_rad - target_rad).abs();
+        let since_s = f64::from(self.frames) * FRAME_S;
+        if self.arrived_s.is_none() && off_rad <= ANSWERING_RAD {
+            self.arrived_s = Some((since_s - ideal_s).max(0.0));
+        }
+        let settled_frames = libm::round(SETTLED_S * 1e3) as u32 / FRAME_MS;
+        if self.frames + settled_frames >= stay_frames {
+            let shown = &mut self.shown;
+            shown.least_rad = shown.least_rad.min(found_rad);
+            shown.most_rad = shown.most_rad.max(found_rad);
+            shown.error_rad = larger(shown.error_rad, off_rad);
+        }
+    }
+
+    fn findings(&self, reach: &Reach) -> [Finding; 3] {
+        let Shown { least_rad, most_rad, error_rad, lag_s } = self.shown;
+        let whole_rad = reach.high_rad - reach.low_rad;
+        [
+            // The same tolerance as at power-up and before arming, at both ends.
+            Finding::at_least(
+                Item::Range(self.surface),
+                most_rad - least_rad,
+                whole_rad - 2.0 * ANSWERING_RAD,
+            ),
+            Finding::at_most(Item::Error(self.surface), error_rad, ANSWERING_RAD),
+            Finding::at_most(Item::Lag(self.surface), lag_s, reach.lag_most_s()),
+        ]
+    }
+}
+
+fn way_rad(reach: &Reach, targets_rad: &[f64], place: usize) -> f64 {
+    let from_rad = place.checked_sub(1).map_or(reach.rest_rad, |before| targets_rad[before]);
+    (targets_rad[place] - from_rad).abs()
+}

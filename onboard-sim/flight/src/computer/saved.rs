@@ -1,0 +1,276 @@
+//! What a computer saves in every frame, in a memory that keeps it through a reset, and how it goes on from that.
+//!
+//! A reset (a watchdog, a dip of the voltage) takes everything else. A computer that comes back
+//!
+//! * on the pad, not released, is as after power-up, and says so: not armed, no countdown. Only an abort stays latched;
+//! * in the air flies on: phase, latches, motor and the last commands are as they were, the last estimate is carried over the lost
+//!   time, and estimator, plan and gimbal loop start afresh. So under power it holds the nose upright until its next plan.
+//!
+//! [`Saved::read`] refuses bytes that are not whole, so a board keeps two records and writes them in turn: a reset while
+//! one is written leaves the other.
+
+use serde::{Deserialize, Serialize};
+
+use super::memory::checksum;
+use super::pilot::SavedPilot;
+use super::{Commands, Computer, Release, Severity, Vehicle};
+use crate::guidance::controller::ControlLevel;
+use crate::rules::phase::{Interlocks, Mode};
+
+/// After a longer time without power, s, nothing is taken up: whoever switches a computer off and on again later has a
+/// computer at power-up. No fall that is lost for so long can be saved.
+pub const LONGEST_RESET_S: f64 = 10.0;
+
+/// Bytes of the checksum before the record.
+const CHECKSUM_BYTES: usize = 8;
+
+/// What a computer keeps through a reset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Saved {
+    frame: u64,
+    /// Vehicle time of the frame, s.
+    time_s: f64,
+    mode: Mode,
+    /// From its release on; it may still stand on its rail under the first current of its ascent motor.
+    in_the_air: Option<InTheAir>,
+}
+
+/// The part of a computer that was released.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct InTheAir {
+    release: Release,
+    commands: Commands,
+    level: ControlLevel,
+    pilot: SavedPilot,
+}
+
+/// Why bytes are no saved record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SavedError {
+    #[error("{found} bytes; a record has at least {CHECKSUM_BYTES} and at most {}", Saved::MOST_BYTES)]
+    Length { found: usize },
+    #[error("the checksum is wrong: the record was not written whole")]
+    Checksum,
+    #[error("the record is of another build")]
+    Layout,
+}
+
+impl Saved {
+    /// Longest record, bytes. A test measures it.
+    pub const MOST_BYTES: usize = 1536;
+
+    /// Number of the frame after which it was saved.
+    pub fn frame(&self) -> u64 {
+        self.frame
+    }
+
+    /// Writes the record, and returns its bytes.
+    ///
+    /// # Errors
+    /// It does not fit, which a test excludes.
+    pub fn write<'a>(&self, into: &'a mut [u8; Self::MOST_BYTES]) -> Result<&'a [u8], SavedError> {
+        let (sum, record) = into.split_at_mut(CHECKSUM_BYTES);
+        let room = record.len();
+        let bytes = match postcard::to_slice(self, record) {
+            Ok(written) => {
+                sum.copy_from_slice(&checksum(written).to_le_bytes());
+                written.len()
+            }
+            Err(_) => return Err(SavedError::Length { found: room }),
+        };
+        Ok(&into[..CHECKSUM_BYTES + bytes])
+    }
+
+    /// Reads a record.
+    ///
+    /// # Errors
+    /// The bytes are not a whole record of this build.
+    pub fn read(bytes: &[u8]) -> Result<Self, SavedError> {
+        let found = bytes.len();
+        let (sum, record) = bytes
+            .split_first_chunk::<CHECKSUM_BYTES>()
+            .filter(|_| found <= Self::MOST_BYTES)
+            .ok_or(SavedError::Length { found })?;
+        if u64::from_le_bytes(*sum) != checksum(record) {
+            return Err(SavedError::Checksum);
+        }
+        postcard::from_bytes(record).map_err(|_layout| SavedError::Layout)
+    }
+}
+
+impl Computer {
+    /// What it keeps through a reset, after a frame; `None` for the planar vehicle, which is not restarted.
+    pub fn saved(&self) -> Option<Saved> {
+        let Vehicle::Space(space) = &self.vehicle else { return None };
+        let mode = *self.table.mode();
+        let in_the_air = self.release.map(|release| InTheAir {
+            release,
+            commands: self.commands,
+            level: self.level,
+            pilot: space.pilot.saved(),
+        });
+        Some(Saved { frame: self.frame, time_s: self.table.time_s(), mode, in_the_air })
+    }
+
+    /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
+    /// which it comes back, so a board needs a clock that runs through the reset.
+    #[must_use]
+    pub fn resumed(mut self, saved: &Saved, time_s: f64) -> Self {
+        let lost_s = time_s - saved.time_s;
+        if !(0.0..=LONGEST_RESET_S).contains(&lost_s) {
+            return self;
+        }
+        self.frame = saved.frame;
+        match (&saved.in_the_air, &mut self.vehicle) {
+            (Some(flown), Vehicle::Space(space)) => {
+                self.table.go_on(saved.mode);
+                // The crew has been told of it.
+                let _ = self.motor_watch.news(&saved.mode, saved.time_s);
+                self.release = Some(flown.release);
+                self.commands = flown.commands;
+                self.level = flown.level;
+                space.pilot = space.pilot.resumed(&flown.pilot, time_s - flown.release.time_s);
+            }
+            _ => self.wake_on_the_pad(&saved.mode, time_s),
+        }
+        self
+    }
+
+    /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to the pad must not be told
+    /// less.
+    fn wake_on_the_pad(&mut self, before: &Mode, time_s: f64) {
+        let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = before.interlocks;
+        let mut mode = Mode::power_up(time_s);
+        mode.interlocks = Interlocks { landing_motor_inhibited, abort_latched, ..mode.interlocks };
+        self.table.go_on(mode);
+        let (severity, words) = if armed {
+            (Severity::Warning, "the flight computer has restarted: DISARMED")
+        } else {
+            (Severity::Notice, "the flight computer has restarted")
+        };
+        self.table.say(severity, words.into());
+    }
+
+    /// Restarts the computer: only what was saved in the last frame is kept.
+    pub fn restart(&mut self, time_s: f64) {
+        let (Some(saved), Vehicle::Space(space)) = (self.saved(), &self.vehicle) else { return };
+        *self =
+            Self::in_space(space.pilot.mission(), space.law.clone(), &space.believed).resumed(&saved, time_s);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::computer::pilot::sample;
+    use crate::guidance::baseline::Law;
+    use crate::rules::phase::{Motor, Phase};
+    use crate::vehicle::rigid::RigidState;
+
+    fn mission() -> crate::vehicle::mission::Mission {
+        crate::vehicles::mission::builtin("mk2").unwrap().unwrap()
+    }
+
+    fn powered_up() -> Computer {
+        Computer::in_space(&mission(), Law::Nmpc, &RigidState::upright(300.0))
+    }
+
+    /// A falling computer after some frames.
+    fn falling() -> Computer {
+        let mut computer = powered_up().released();
+        for frame in 1..=40 {
+            computer.step(&crate::computer::Input::in_the_air(&sample::input(frame, 0.005 * frame as f64)));
+        }
+        computer
+    }
+
+    fn bytes(computer: &Computer) -> Vec<u8> {
+        let mut room = [0; Saved::MOST_BYTES];
+        computer.saved().expect("a rocket saves").write(&mut room).expect("it fits").to_vec()
+    }
+
+    #[test]
+    fn a_record_comes_back_bit_for_bit_and_fits() {
+        let computer = falling();
+        let record = bytes(&computer);
+        assert_eq!(Saved::read(&record), Ok(computer.saved().unwrap()));
+        // Room for the values that are not there yet: ignition, ascent.
+        assert!(record.len() < Saved::MOST_BYTES - 100, "{}", record.len());
+    }
+
+    #[test]
+    fn a_record_that_was_not_written_whole_is_refused() {
+        let record = bytes(&falling());
+        for length in 0..record.len() {
+            assert!(Saved::read(&record[..length]).is_err(), "{length}");
+        }
+        for place in 0..record.len() {
+            let mut broken = record.clone();
+            broken[place] ^= 0x10;
+            assert!(Saved::read(&broken).is_err(), "{place}");
+        }
+        assert_eq!(
+            Saved::read(&[0; Saved::MOST_BYTES + 1]),
+            Err(SavedError::Length { found: Saved::MOST_BYTES + 1 })
+        );
+        let mut other = checksum(b"of another build").to_le_bytes().to_vec();
+        other.extend(b"of another build");
+        assert_eq!(Saved::read(&other), Err(SavedError::Layout));
+    }
+
+    #[test]
+    fn a_computer_from_its_bytes_is_the_one_that_was_restarted_in_place() {
+        let mut here = falling();
+        let saved = Saved::read(&bytes(&here)).unwrap();
+        let mut there = powered_up().resumed(&saved, 0.3);
+        here.restart(0.3);
+        assert_eq!(here.digest(), there.digest());
+        for frame in 61..=100 {
+            let input = sample::input(frame, 0.005 * frame as f64);
+            let input = crate::computer::Input::in_the_air(&input);
+            assert_eq!(here.step(&input), there.step(&input));
+            assert_eq!(here.digest(), there.digest(), "frame {frame}");
+        }
+    }
+
+    #[test]
+    fn a_computer_that_was_off_for_long_is_at_power_up() {
+        let saved = falling().saved().unwrap();
+        for time_s in [0.2 + LONGEST_RESET_S + 0.01, 0.1, f64::NAN] {
+            assert_eq!(powered_up().resumed(&saved, time_s).digest(), powered_up().digest(), "{time_s}");
+        }
+        assert_ne!(powered_up().resumed(&saved, 0.2 + LONGEST_RESET_S).digest(), powered_up().digest());
+    }
+
+    /// In every phase: on the pad nothing but an abort is taken up, in the air everything of the mode.
+    #[test]
+    fn every_phase_comes_back_as_stated() {
+        for phase in Phase::ALL {
+            for released in [false, true] {
+                let mut computer = if released { falling() } else { powered_up() };
+                let interlocks = Interlocks { armed: true, pin_out: true, ..Interlocks::default() };
+                let motor = if phase == Phase::Powered { Motor::Burning } else { Motor::Unlit };
+                let mode = Mode { phase, interlocks, motor, countdown_end_s: Some(7.0), ..*computer.mode() };
+                computer.table.go_on(mode);
+                computer.restart(0.25);
+                if released {
+                    assert_eq!(*computer.mode(), mode);
+                } else {
+                    assert_eq!(*computer.mode(), Mode::power_up(0.25));
+                    let news = computer.table.take_news();
+                    assert!(format!("{news:?}").contains("DISARMED"), "{phase:?}: {news:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_abort_on_the_pad_stays_latched_through_a_reset() {
+        let mut computer = powered_up();
+        let interlocks = Interlocks { abort_latched: true, ..Interlocks::default() };
+        computer.table.go_on(Mode { interlocks, ..*computer.mode() });
+        computer.restart(0.25);
+        assert!(computer.mode().interlocks.abort_latched);
+        assert!(!computer.mode().interlocks.armed);
+    }
+}

@@ -1,0 +1,19 @@
+//! Waits for a file that a program writes.
+
+use std::path::Path;
+use std::time::Duration;
+
+use crate::PATIENCE;
+use crate::time::{left, now};
+
+/// The system does not notify us when a file is made, so we poll at this interval.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+
+/// Waits until there is something in a file.
+pub fn wait_for_content(path: &Path) {
+    let deadline = now() + PATIENCE;
+    while !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
+        assert!(!left(deadline).is_zero(), "{} stays empty", path.display());
+        std::thread::sleep(POLL_INTERVAL);
+    }
+}
