@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use onboard_sim::fly::{builtins, load_flight};
+use simulated_vehicle::fly::{builtins, load_flight};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
 

@@ -31,7 +31,7 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use onboard_sim::fly::load_flight;
+use simulated_vehicle::fly::load_flight;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;

@@ -10,7 +10,7 @@ use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
 use flight::vehicle::profile::StartPoint;
-use onboard_sim::vehicle::{RocketFlight, Vehicle, VehicleEvent};
+use simulated_vehicle::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use proptest::prelude::*;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};

@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
+use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use hil::real_time::RealTime;
 use hil::start::Pace;
-use onboard_sim::hil::assembly::AnswerAssembly;
-use onboard_sim::hil::messages::{of_frame, of_start};
+use simulated_vehicle::hil::assembly::AnswerAssembly;
+use simulated_vehicle::hil::messages::{of_frame, of_start};
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::mission::MissionHash;
 use sim::outcome::Outcome;

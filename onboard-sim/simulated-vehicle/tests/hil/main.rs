@@ -8,7 +8,7 @@ mod messages;
 mod real_time;
 
 use hil::start::{Pace, Start};
-use onboard_sim::hil::computer::ComputerEnd;
+use simulated_vehicle::hil::computer::ComputerEnd;
 use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::remote::RemoteFlight;
