@@ -202,6 +202,11 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
+    if let Some(name) = &model.settings.vehicle_name {
+        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        model.info(clock.now(), text);
+    }
     let mut signatures = None;
     if let Some((list, file, told)) = checklist {
         model.checklist = Some(list);
