@@ -8,11 +8,11 @@ use std::io;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use simulated_vehicle::fly::DeadlinePolicy;
-use simulated_vehicle::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
+use simulated_vehicle::fly::DeadlinePolicy;
+use simulated_vehicle::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
 use tokio::sync::{oneshot, watch};
 
 use crate::cli::Demonstration;

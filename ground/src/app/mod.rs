@@ -31,11 +31,11 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use simulated_vehicle::fly::load_flight;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::transport::LinkAddress;
+use simulated_vehicle::fly::load_flight;
 
 use crate::cli::{Cli, Command, LogChoice, Seconds};
 use crate::config::Config;
