@@ -47,6 +47,19 @@ fn the_same_flight_with_other_functions_of_the_c_library_is_identical_bit_for_bi
 }
 
 #[test]
+fn a_refused_flight_leaves_no_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = "udpin:127.0.0.1:0";
+    for refused in [["--key", "none.key"], ["--crew", "none.toml"], ["--mavlink", "udpin:192.0.2.1:5"]] {
+        let mut command = program(Program::OnboardSim);
+        command.args(["fly", "--mavlink", link, "--log", "flight.mcap"]).args(refused);
+        let ended = Running::to_end(command.current_dir(folder.path()));
+        assert_eq!(ended.code, Some(1), "{}", ended.output);
+        assert!(!folder.path().join("flight.mcap").exists(), "{refused:?}: {}", ended.output);
+    }
+}
+
+#[test]
 fn one_flipped_bit_in_one_output_is_found_at_its_tick() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(fly(folder.path(), "good.mcap", None).code, Some(0));

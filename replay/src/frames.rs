@@ -1,6 +1,5 @@
 //! Writes a recorded flight as the stream that a board reads, and its recorded decisions as the answers to be expected.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use flight::guidance::baseline::Controller;
 
 use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
 use crate::log::{Entry, FlightLog, LogError};
+use crate::output::{Destination, NewFile, Overwrite};
 
 /// Why a flight cannot be given to a board.
 #[derive(Debug, thiserror::Error)]
@@ -17,18 +17,20 @@ pub enum FramesError {
     Log(#[from] LogError),
     #[error("{file}: {reason}")]
     NotWhole { file: String, reason: &'static str },
-    #[error("{path}: {source}")]
+    #[error("{path}: frames and answers need a file each")]
+    OneName { path: String },
+    #[error("{path}: cannot be written")]
     Write { path: String, source: StreamError<io::Error> },
 }
 
-/// A file that is written only.
-struct NewFile<'p> {
+/// A file of records, which gets its name when it is complete.
+struct Records<'p> {
     path: &'p Path,
-    file: BufWriter<File>,
+    file: BufWriter<NewFile>,
     buffer: Vec<u8>,
 }
 
-impl Link for NewFile<'_> {
+impl Link for Records<'_> {
     type Error = io::Error;
 
     fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
@@ -40,9 +42,10 @@ impl Link for NewFile<'_> {
     }
 }
 
-impl<'p> NewFile<'p> {
-    fn create(path: &'p Path) -> Result<Self, FramesError> {
-        let file = File::create_new(path).map_err(|error| failed(path, StreamError::Link(error)))?;
+impl<'p> Records<'p> {
+    fn create(path: &'p Path, overwrite: Overwrite, log: &Path) -> Result<Self, FramesError> {
+        let file = NewFile::create(Destination { path, overwrite }, log)
+            .map_err(|error| failed(path, StreamError::Link(error)))?;
         Ok(Self { path, file: BufWriter::new(file), buffer: Vec::new() })
     }
 
@@ -53,8 +56,9 @@ impl<'p> NewFile<'p> {
         sent
     }
 
-    fn finish(mut self) -> Result<(), FramesError> {
-        self.file.flush().map_err(|error| failed(self.path, StreamError::Link(error)))
+    fn finish(self) -> Result<(), FramesError> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error);
+        file.and_then(NewFile::commit).map_err(|error| failed(self.path, StreamError::Link(error)))
     }
 }
 
@@ -63,13 +67,23 @@ fn failed(path: &Path, source: StreamError<io::Error>) -> FramesError {
 }
 
 /// Writes the frames of the flight in `log` to `frames`, and what it decided in them to `answers`. Returns the number of
-/// frames. No file is overwritten.
+/// frames. A file gets its name when both are complete.
 ///
 /// # Errors
-/// The log cannot be read, is damaged, or does not hold one flight from its start on; or a file cannot be written.
-pub fn write_frames(log: &Path, frames: &Path, answers: &Path) -> Result<u64, FramesError> {
-    let mut log = FlightLog::open(log)?;
-    let (mut inputs, mut expected) = (NewFile::create(frames)?, NewFile::create(answers)?);
+/// Both files have one name, or a file exists and may not be replaced; the log cannot be read, is damaged, or does not hold one flight from its start on; or a file cannot be written.
+pub fn write_frames(
+    log: &Path,
+    frames: &Path,
+    answers: &Path,
+    overwrite: Overwrite,
+) -> Result<u64, FramesError> {
+    if frames == answers {
+        return Err(FramesError::OneName { path: frames.display().to_string() });
+    }
+    let path = log;
+    let mut log = FlightLog::open(path)?;
+    let (mut inputs, mut expected) =
+        (Records::create(frames, overwrite, path)?, Records::create(answers, overwrite, path)?);
     let (mut started, mut from_power_up, mut written) = (false, false, 0);
     let not_whole =
         |log: &FlightLog<_>, reason| FramesError::NotWhole { file: log.name().to_owned(), reason };

@@ -43,6 +43,8 @@ pub enum AlarmKind {
     Battery,
     /// The vehicle does not write its log, or has no room for it.
     VehicleLog,
+    /// The last check on the pad found something outside its limit.
+    CheckFailed,
 }
 
 impl AlarmKind {
@@ -66,6 +68,7 @@ impl AlarmKind {
             Self::Held,
             Self::Battery,
             Self::VehicleLog,
+            Self::CheckFailed,
         ];
         others.into_iter().chain(of_commands)
     }

@@ -5,6 +5,53 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
 
+use super::Model;
+use super::command::{Acknowledgement, CommandKind};
+
+/// A check with motion takes 13 s. If neither answer nor end of one that was asked for is heard, it may run for so long.
+const LONGEST: Duration = Duration::from_secs(20);
+/// What the vehicle told before it knew of a command may arrive so much later than the command was given.
+const LATE: Duration = Duration::from_secs(3);
+/// Whoever presses the key again to end a check that has just ended does not want another one.
+const JUST_ENDED: Duration = Duration::from_secs(3);
+
+/// How a check stands, as far as this station can know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// The vehicle says that it runs.
+    Runs,
+    /// It was asked for; what came of it is not known.
+    MayRun,
+    /// It ended a moment ago.
+    JustEnded,
+    /// None runs.
+    Rests,
+}
+
+/// How the check of a vehicle stands.
+pub fn standing(model: &Model, now: Duration) -> Standing {
+    let told = model.vehicle.pad_check.as_ref();
+    if told.is_some_and(PadCheck::is_running) {
+        return Standing::Runs;
+    }
+    let asked = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
+    let ended_at = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
+    let may_run = asked.into_iter().flatten().any(|asked| {
+        let is_refused = matches!(asked.acknowledged, Acknowledgement::Answered(_)) && !asked.accepted();
+        let is_told = told.is_some_and(|told| told.told_at > asked.commanded_at + LATE);
+        let is_ended = ended_at.is_some_and(|end| end.commanded_at > asked.commanded_at);
+        !is_refused && !is_told && !is_ended && now.saturating_sub(asked.commanded_at) < LONGEST
+    });
+    if may_run {
+        return Standing::MayRun;
+    }
+    let ended_at = told.and_then(|told| told.ended_at);
+    match ended_at {
+        Some(at) if now.saturating_sub(at) < JUST_ENDED => Standing::JustEnded,
+        _ => Standing::Rests,
+    }
+}
+
 /// One value, in the unit of its item; no limit is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckedValue {
@@ -28,6 +75,8 @@ pub struct PadCheck {
     pub asked_by: u8,
     /// When the vehicle last told of it.
     pub told_at: Duration,
+    /// When the vehicle was first heard to say that it is over, after it was heard to run.
+    pub ended_at: Option<Duration>,
     /// Those that have arrived, by their place.
     values: BTreeMap<u8, CheckedValue>,
 }
@@ -35,8 +84,14 @@ pub struct PadCheck {
 impl PadCheck {
     /// This check with what the vehicle tells now. Another number is another check.
     pub(crate) fn with(before: Option<Self>, told: &TD_PAD_CHECK_DATA, now: Duration) -> Self {
-        let mut values =
-            before.filter(|before| before.run == told.run).map_or_else(BTreeMap::new, |before| before.values);
+        let before = before.filter(|before| before.run == told.run);
+        let runs = told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING;
+        let ended_at = match &before {
+            Some(before) if before.is_running() && !runs => Some(now),
+            Some(before) => before.ended_at,
+            None => None,
+        };
+        let mut values = before.map_or_else(BTreeMap::new, |before| before.values);
         if told.place < told.found {
             let value = CheckedValue {
                 item: told.item,
@@ -54,6 +109,7 @@ impl PadCheck {
             found: told.found,
             asked_by: told.asked_by,
             told_at: now,
+            ended_at,
             values,
         }
     }
@@ -81,6 +137,13 @@ impl PadCheck {
     /// The value of an item, if it has arrived.
     pub fn of(&self, item: TdPadCheckItem) -> Option<&CheckedValue> {
         self.values().find(|value| value.item == item)
+    }
+
+    /// That the check has failed, and what is outside, if it has.
+    pub fn failure(&self) -> Option<String> {
+        let names: Vec<String> = self.failing().map(|value| value.shown().0).collect();
+        let outside = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
+        (self.state == TdPadCheckState::TD_PAD_CHECK_STATE_FAILED).then(|| format!("CHECK FAILED{outside}"))
     }
 
     /// The values outside their limits.

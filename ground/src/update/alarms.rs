@@ -11,6 +11,7 @@ use crate::model::alarm::AlarmKind;
 use crate::model::command::{Acknowledgement, CommandKind};
 use crate::model::events::Speaker;
 use crate::model::link_state::{LinkState, RED_AFTER};
+use crate::model::pad_check::PadCheck;
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::{Model, Role};
 
@@ -122,6 +123,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     }
     found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
     found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
+    found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
     if let Some(locks) = vehicle.interlocks() {
         let latched = [
             (TdInterlock::TD_INTERLOCK_ABORT_LATCHED, AlarmKind::Aborted, "ABORT LATCHED on the vehicle"),
@@ -165,6 +167,15 @@ fn battery(model: &Model) -> Option<String> {
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
     let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
+}
+
+/// The arming checks do not see everything that a check on the pad sees.
+fn failed_check(model: &Model) -> Option<String> {
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
+        return None;
+    }
+    model.vehicle.pad_check.as_ref().and_then(PadCheck::failure)
 }
 
 /// Before the self-test is over a log may still be about to begin.

@@ -17,7 +17,7 @@ use crate::model::command::CommandKind;
 use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
-use crate::model::pad_check::PadCheck;
+use crate::model::pad_check::{Standing, standing};
 use crate::model::page::Page;
 use crate::model::permits::{why_not_arm, why_not_check, why_not_confirm, why_not_start, why_not_take};
 use crate::model::recall::{LOOKS_FOR, LookBack};
@@ -242,17 +242,16 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => model.dialog = Dialog::take_command(now),
             Some(why) => model.warn(now, format!("cannot take command: {why}")),
         },
-        Act::Check | Act::CheckStill
-            if model.vehicle.pad_check.as_ref().is_some_and(PadCheck::is_running) =>
-        {
-            ask(model, CommandKind::EndCheck, now);
-        }
-        Act::Check | Act::CheckStill => match why_not_check(model, now) {
-            None => {
-                model.pages.hold(Some(Page::Checks));
-                model.dialog = Dialog::check(act == Act::Check, now);
-            }
-            Some(why) => model.warn(now, format!("cannot check: {why}")),
+        Act::Check | Act::CheckStill => match standing(model, now) {
+            Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
+            Standing::JustEnded => model.info(now, "the check has just ended; press again in 3 s for another one"),
+            Standing::Rests => match why_not_check(model, now) {
+                None => {
+                    model.pages.hold(Some(Page::Checks));
+                    model.dialog = Dialog::check(act == Act::Check, now);
+                }
+                Some(why) => model.warn(now, format!("cannot check: {why}")),
+            },
         },
         Act::RangeTest => {
             model.pages.hold(Some(Page::Checks));

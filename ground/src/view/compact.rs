@@ -45,6 +45,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         return;
     }
     lines.extend(top_lines::keep_away(model, theme, now));
+    lines.extend(top_lines::hands_off(model, theme, now));
     lines.extend(next_event::line(model, theme, now));
     lines.extend(model.playing.as_ref().map(|playing| alarm_line::replay(playing, theme)));
     if model.playing.is_none() {

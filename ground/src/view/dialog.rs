@@ -12,6 +12,7 @@ use super::draw_lines;
 use super::theme::{TextRole, Theme};
 use crate::model::act::Act;
 use crate::model::dialog::{ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD};
+use crate::model::pad_check::PadCheck;
 use crate::model::two_person::role_name;
 use crate::model::words;
 use crate::model::{Model, Role};
@@ -191,7 +192,10 @@ fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     };
     let failing = words::failed_checks(status.value.checks_failed);
     if failing.is_empty() {
-        return vec![Line::styled("Every arming check passes.", theme.style(TextRole::Good))];
+        let mut lines = vec![Line::styled("Every arming check passes.", theme.style(TextRole::Good))];
+        let failure = model.vehicle.pad_check.as_ref().and_then(PadCheck::failure);
+        lines.extend(failure.map(|failure| Line::styled(failure, theme.style(TextRole::Alarm))));
+        return lines;
     }
     let mut lines =
         vec![Line::styled("Failing checks; the vehicle will refuse:", theme.style(TextRole::Alarm))];

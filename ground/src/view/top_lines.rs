@@ -10,6 +10,7 @@ use super::theme::{TextRole, Theme};
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
 use crate::model::link_state::LinkState;
 use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::pad_check::{Standing, standing};
 use crate::model::permits::why_other_mission;
 use crate::model::{Model, Role, abort_too_late, words};
 
@@ -120,8 +121,11 @@ fn abort_effect(model: &Model, now: Duration) -> String {
         return why.to_owned();
     }
     let mark = if status.is_stale(now) { "~" } else { "" };
-    let reach = if let LinkState::Lost(_) = model.link.state(now) { "; MAY NOT ARRIVE" } else { "" };
-    format!("{mark}{}{reach}", words::abort_effect(&status.value))
+    // First, because a narrow screen cuts the end off.
+    let [down, up] = [model.link.state(now), model.link.uplink.state(now)];
+    let lost = [down, up].iter().any(|state| matches!(state, LinkState::Lost(_)));
+    let reach = if lost { "MAY NOT ARRIVE; " } else { "" };
+    format!("{reach}{mark}{}", words::abort_effect(&status.value))
 }
 
 /// The warning that nobody may approach the vehicle, and for how long.
@@ -131,6 +135,19 @@ pub fn keep_away(model: &Model, theme: Theme, now: Duration) -> Option<Line<'sta
     let mark = if stale { STALE_MARK } else { " " };
     let role = if away.danger == Danger::Hot { TextRole::Caution } else { TextRole::Alarm };
     Some(Line::styled(format!("{mark}{}", away.words()), theme.style(role)))
+}
+
+/// The warning that gimbal and fins may move, on every page.
+pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let words = match standing(model, now) {
+        Standing::Runs => {
+            let done = model.vehicle.pad_check.as_ref().map_or(0, |check| check.progress);
+            format!(" HANDS OFF: a check of the vehicle runs, {done} %")
+        }
+        Standing::MayRun => " HANDS OFF: a check of the vehicle may run".to_owned(),
+        Standing::JustEnded | Standing::Rests => return None,
+    };
+    Some(Line::styled(words, theme.style(TextRole::Caution)))
 }
 
 /// The line of a held countdown: why, and what happens next.
@@ -203,13 +220,16 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// The first of these that applies: the warning not to approach; a command (other than an abort) that is not observed
+/// The first of these that applies: the warning not to approach; that a check moves the surfaces; a command (other than an abort) that is not observed
 /// yet; a hold; the next event of the flight; the latest command; whether the vehicle may be armed.
 pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(mut line) = keep_away(model, theme, now) {
         // Under a parachute the next event is added, because the vehicle is still coming down.
         let falls = model.vehicle.in_flight().then(|| next_event::line(model, theme, now)).flatten();
         line.spans.extend(falls.into_iter().flat_map(|next| next.spans));
+        return line;
+    }
+    if let Some(line) = hands_off(model, theme, now) {
         return line;
     }
     if open_command(model, now).is_none()

@@ -9,6 +9,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use protocol::crew_file::CrewFile;
+use protocol::key_file::KeyFile;
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
@@ -150,6 +151,9 @@ impl FlyArguments {
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let mut profile = load_flight(&arguments.profile)?;
     arguments.choose(&mut profile)?;
+    // What can be refused comes before the log: a refusal leaves none behind.
+    let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
+    arguments.key.as_deref().map(KeyFile::read_key).transpose()?;
     let recorder = match &arguments.log {
         None => None,
         Some(path) => {
@@ -170,7 +174,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,
-        crew: arguments.crew.as_deref().map(CrewFile::open).transpose()?,
+        crew,
         recorder: recorder.clone(),
         seed: arguments.seed,
         speed: arguments.speed,
@@ -188,8 +192,17 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         interrupted().await;
         let _ = stop.send(true);
     });
-    let flown = Box::pin(fly_observed(options, stopped, report_event)).await;
+    let mut began = false;
+    let observe = |time_s: f64, event: &VehicleEvent| {
+        began = true;
+        report_event(time_s, event);
+    };
+    let flown = Box::pin(fly_observed(options, stopped, observe)).await;
     let log_path = recorder.as_ref().map(Recorder::finish).transpose();
+    // A link that cannot be opened: the log holds nothing, and its name is free for the next try.
+    if let (Err(_), false, Ok(Some(path))) = (&flown, began, &log_path) {
+        std::fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))?;
+    }
     let summary = flown?;
     print_summary(&summary)?;
     if let Some(path) = log_path.context("the flight is over, but its log is incomplete")? {

@@ -35,9 +35,12 @@ pub(super) struct Ask {
     /// Keep every finished flight in this file, and continue from it if it exists.
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
-    /// Write JUnit XML to this file, beside the table; an earlier one is replaced.
+    /// Write JUnit XML to this file, beside the table.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    /// Replace an existing JUnit file.
+    #[arg(long)]
+    force: bool,
     /// Answer in JSON instead of the table.
     #[arg(long)]
     json: bool,
@@ -57,6 +60,7 @@ impl Ask {
             Err(error) => return Err(error.into()),
         };
         let flights = find(&self.directory)?;
+        let junit = self.junit.as_deref().map(|path| junit_file(path, self.force)).transpose()?;
         let mut state = match &self.state {
             None => GateState::in_memory(),
             Some(path) => {
@@ -76,8 +80,8 @@ impl Ask {
             judged.retain(|judged| judged.change != Change::Missing || known(judged));
         }
         let passed = !interrupted && !judged.iter().any(|judged| judged.fails(self.may_diverge));
-        if let Some(path) = &self.junit {
-            write_junit(path, &gate_cases(&judged, self.may_diverge))?;
+        if let Some(file) = junit {
+            write_junit(file, &gate_cases(&judged, self.may_diverge))?;
         }
         let report = GateReport { passed, interrupted, flights: &judged };
         answer(|output| if self.json { print_json(&report, output) } else { print_gate(&report, output) })?;
@@ -90,12 +94,16 @@ impl Ask {
     }
 }
 
-fn write_junit(path: &Path, cases: &[JunitCase]) -> Result<()> {
-    let written = NewFile::create(Destination { path, overwrite: Overwrite::Always }, Path::new(""))
-        .and_then(|mut file| {
-            print_junit("gate", cases.to_vec(), &mut file)?;
-            file.commit()
-        });
+/// Before the flights, so that nothing is flown for a file that may not be written.
+fn junit_file(path: &Path, force: bool) -> Result<NewFile> {
+    let overwrite = Overwrite::if_forced(force);
+    NewFile::create(Destination { path, overwrite }, Path::new(""))
+        .with_context(|| format!("{}: cannot be written", path.display()))
+}
+
+fn write_junit(mut file: NewFile, cases: &[JunitCase]) -> Result<()> {
+    let path = file.path().to_owned();
+    let written = print_junit("gate", cases.to_vec(), &mut file).and_then(|()| file.commit());
     written.with_context(|| format!("{}: cannot be written", path.display()))
 }
 

@@ -126,6 +126,10 @@ impl Ask {
         };
         // Whatever happened, the log is finished.
         let finished = listener.recorder.as_ref().map(Recorder::finish).transpose();
+        if let (Err(_), 0, Ok(Some(path))) = (&heard, listener.frames, &finished) {
+            // No link: nothing was heard, so nothing stays.
+            std::fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))?;
+        }
         heard?;
         let written = finished?;
         let Listener { shadow, frames, flags, .. } = listener;

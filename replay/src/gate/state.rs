@@ -24,6 +24,9 @@ struct Line {
     outcome: Outcome,
 }
 
+/// How every line begins that is not empty.
+const LINE_BEGINS: &str = "{\"key\":";
+
 impl GateState {
     /// A state in memory only.
     pub fn in_memory() -> Self {
@@ -33,14 +36,18 @@ impl GateState {
     /// A state in a file, continued if the file exists. What another build or another content left there is not used.
     ///
     /// # Errors
-    /// The file cannot be read or written.
+    /// The file cannot be read or written, or holds something else; then it is left as it is.
     pub fn open(path: &Path) -> io::Result<Self> {
         let mut file = File::options().read(true).append(true).create(true).open(path)?;
         let mut known = BTreeMap::new();
         for line in BufReader::new(file.try_clone()?).lines() {
+            let line = line?;
             // The last line of a killed run may be incomplete; its flight is then flown again.
-            if let Ok(Line { key, outcome }) = serde_json::from_str(&line?) {
+            if let Ok(Line { key, outcome }) = serde_json::from_str(&line) {
                 known.insert(key, outcome);
+            } else if !(line.starts_with(LINE_BEGINS) || LINE_BEGINS.starts_with(&line)) {
+                let words = "holds something else than the state of a gate; give another file";
+                return Err(io::Error::new(io::ErrorKind::InvalidData, words));
             }
         }
         // An incomplete line must not be joined with the next one.

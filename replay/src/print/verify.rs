@@ -87,7 +87,7 @@ fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()
         return if nothing { Ok(()) } else { writeln!(output, "{TICKS_ALONE}") };
     };
     let FramesReport { compared, different, until_s, .. } = frames;
-    let until = until_s.map(|until_s| format!(" to T+{until_s:.3} s")).unwrap_or_default();
+    let until = until_s.map(|until_s| format!(" to {until_s:.3} s after it")).unwrap_or_default();
     if *different == 0 {
         writeln!(output, "flight computer from power-up{until}: {compared} of {compared} frames identical")?;
     } else {

@@ -105,6 +105,22 @@ fn an_accepted_season_passes_until_a_flight_gets_worse() {
     assert!(code == 1 && row(&stdout, "week-2/mk2.mcap").contains("MISSING"), "{stdout}");
 }
 
+#[test]
+fn a_gate_overwrites_nothing() {
+    let season = Season::new();
+    let log = season.logs().join("week-2/mk2.mcap");
+    let baseline = season.beside("foreign.json");
+    std::fs::write(&baseline, "{\n  \"flights\": {}\n}\n").unwrap();
+    for (option, file) in [("--junit", &log), ("--junit", &baseline), ("--state", &log), ("--state", &baseline)] {
+        let before = std::fs::read(file).unwrap();
+        let (code, stdout, stderr) = season.gate(&["--accept", option, &file.display().to_string()]);
+        assert!(code == 2 && stderr.contains(&file.display().to_string()), "{option}: {stdout}{stderr}");
+        assert!(!season.baseline().exists() && std::fs::read(file).unwrap() == before, "{option}");
+    }
+    let (code, _, stderr) = season.gate(&["--accept", "--force", "--junit", &baseline.display().to_string()]);
+    assert!(code == 0 && std::fs::read_to_string(&baseline).unwrap().contains("<testsuite"), "{stderr}");
+}
+
 /// Counts the cases and the failures of a JUnit file.
 fn elements(xml: &str) -> [(&'static str, usize); 2] {
     let mut counts = [("testcase", 0), ("failure", 0)];

@@ -57,6 +57,41 @@ fn no_existing_file_is_overwritten_without_force() {
     }
 }
 
+#[test]
+fn what_a_board_gets_is_whole_or_absent() {
+    let (directory, log) = copied(&WITH_FRAMES.log);
+    let asked = |log: &Path, names: [&str; 2], more: &[&str]| {
+        run(replay("frames", log).args(names).args(more).current_dir(directory.path()))
+    };
+    let bytes = std::fs::read(&log).unwrap();
+    std::fs::write(&log, &bytes[..bytes.len() * 3 / 4]).unwrap();
+    for names in [["frames", "answers"], ["same", "same"]] {
+        let (code, stdout, stderr) = asked(&log, names, &[]);
+        assert!(code == 2 && !stderr.is_empty(), "{stdout}{stderr}");
+        assert_eq!(listed(directory.path()), ["flight.mcap"], "{stderr}");
+    }
+    std::fs::write(&log, &bytes).unwrap();
+    std::fs::write(directory.path().join("answers"), OTHERS).unwrap();
+    let (code, _, stderr) = asked(&log, ["frames", "answers"], &[]);
+    assert!(code == 2 && stderr.contains("answers") && stderr.contains("--force"), "{stderr}");
+    assert_eq!(listed(directory.path()), ["answers", "flight.mcap"]);
+    let (code, stdout, stderr) = asked(&log, ["frames", "answers"], &["--force"]);
+    assert!(code == 0 && stdout.ends_with(" frames\n"), "{stdout}{stderr}");
+    assert_eq!(listed(directory.path()), ["answers", "flight.mcap", "frames"]);
+}
+
+#[test]
+fn a_shadow_of_nothing_leaves_no_log() {
+    let directory = tempfile::tempdir().unwrap();
+    for connect in ["no-file.mcap", "udpin:192.0.2.1:5"] {
+        let mut command = replay("shadow", Path::new("--profile"));
+        command.args(["mk2", "--connect", connect]).current_dir(directory.path());
+        let (code, stdout, stderr) = run(&mut command);
+        assert!(code == 2 && stderr.contains(connect), "{stdout}{stderr}");
+        assert_eq!(listed(directory.path()), [String::new(); 0], "{connect}");
+    }
+}
+
 /// Not even with --force or under another name of the same file.
 #[test]
 fn the_log_that_is_read_is_never_written() {

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 
 use crate::model::Model;
 use crate::model::act::Act;
-use crate::model::pad_check::{CheckedValue, PadCheck};
+use crate::model::pad_check::{CheckedValue, PadCheck, Standing, standing};
 use crate::model::range_test::{LOSS_MOST, MARGIN_LEAST_DB, RangeFound, RangeTest};
 use crate::view::number::{fixed, seconds};
 use crate::view::theme::{TextRole, Theme};
@@ -46,6 +46,12 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
     let keys = &model.settings.keys;
     let [all, still] = [Act::Check, Act::CheckStill].map(|act| keys.name(act));
     let begin = format!("  {all} checks (MOVES), {still} without motion");
+    if standing(model, now) == Standing::MayRun {
+        return Line::from(vec![
+            Span::styled(" A CHECK MAY RUN: hands off", theme.style(TextRole::Caution)),
+            Span::styled(format!("  {all} ends it"), theme.style(TextRole::Label)),
+        ]);
+    }
     let Some(check) = check.filter(|check| check.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
         return Line::from(vec![
             Span::styled(" no check yet".to_owned(), theme.style(TextRole::Plain)),
