@@ -20,7 +20,7 @@ from result import MOST_ITERATIONS
 PRICE_CURVATURE = 10.0
 
 # Gauss-Newton steps converge slowly, where they do.
-MOST_GAUSS_NEWTON_ITERATIONS = 400
+MOST_GAUSS_NEWTON_ITERATIONS = 200
 
 # Blocks that partial condensing leaves.
 BLOCKS = 5

@@ -6,19 +6,21 @@ import sys
 
 import compiled
 import landing
-import measure
 import space_landing
 import space_measure
+
+# After these the kicks come.
+KICKS = range(1, 49, 6)
 
 
 def jobs(solvers, folder):
     """(solver, which problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold
     and the kicked solves are compiled with more effort, and first."""
     for problem in (landing.HARD, landing.PRICED):
-        for samples in (0, *measure.KICK_SAMPLES):
+        for samples in (0, *KICKS):
             yield from (_plane(solver, problem, landing.HORIZON - samples, folder) for solver in solvers)
     for intervals in range(landing.HORIZON - 1, 0, -1):
-        if landing.HORIZON - intervals not in measure.KICK_SAMPLES:
+        if landing.HORIZON - intervals not in KICKS:
             for problem in (landing.HARD, landing.PRICED):
                 yield from (_plane(solver, problem, intervals, folder) for solver in solvers)
     for intervals in space_measure.HORIZONS:
@@ -28,7 +30,7 @@ def jobs(solvers, folder):
 
 def _plane(solver, problem, intervals, folder):
     samples = landing.HORIZON - intervals
-    effort = compiled.FULLY if samples == 0 or samples in measure.KICK_SAMPLES else compiled.QUICKLY
+    effort = compiled.FULLY if samples == 0 or samples in KICKS else compiled.QUICKLY
     return solver, problem, intervals, landing.library_path(solver, intervals, problem, folder), effort
 
 

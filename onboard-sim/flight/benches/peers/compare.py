@@ -4,6 +4,7 @@ import argparse
 import os
 import platform
 import subprocess
+import sys
 
 import floor
 import landing
@@ -14,6 +15,10 @@ import space_measure
 import tables
 import worker
 from ours import Ours
+
+
+# Who gets the landing in space, too.
+IN_SPACE = ("fatrop", "ipopt")
 
 
 def said(*command):
@@ -34,7 +39,7 @@ def machine():
 
 def limit(ours):
     """One iteration beside the floating-point limit of its sweep."""
-    start = next(measure.starts())
+    start = measure.STARTS[0]
     inputs = ours.cold_both(start).inputs
     floor.report(rollout.states(start, inputs), inputs, ours.peak(), ours.layers(start))
 
@@ -52,6 +57,7 @@ def asked():
 
 
 def main():
+    sys.stdout.reconfigure(line_buffering=True)
     words = asked()
     functions = words.functions
     workers = {
@@ -71,10 +77,17 @@ def main():
     records = [measure.Record(entrant) for entrant in entrants]
     measure.cold(records)
     planned_rad = measure.warm(records)
+    fields = [tables.Field(records, problem) for problem in (landing.HARD, landing.PRICED)]
+    for field in fields:
+        tables.solves(field)
+    for field in fields:
+        tables.steps(field, planned_rad)
     measure.disturbed(records)
-    tables.show(records, planned_rad)
+    for field in fields:
+        tables.loops(field)
+    tables.checks(fields)
     scattered.run(records)
-    in_space = [worker.start("space_interior", peer, functions)[1][0] for peer in words.peers if peer in ("fatrop", "ipopt")]
+    in_space = [worker.start("space_interior", peer, words.functions)[1][0] for peer in words.peers if peer in IN_SPACE]
     space_measure.run(own[0], in_space)
     limit(own[1])
 

@@ -96,7 +96,7 @@ class Nlp:
 class Interior:
     """fatrop or IPOPT on one of the two problems, cold and warm, over every length of horizon."""
 
-    makes = ("cold", "warm", "step")
+    makes, loops = ("cold", "warm", "step"), True
 
     def __init__(self, solver, problem, folder):
         self.name, self.solver, self.problem, self.folder = solver, solver, problem, folder

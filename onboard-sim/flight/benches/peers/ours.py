@@ -8,7 +8,7 @@ import landing
 from result import BENDS_RAD, Result
 
 # With this price a condition whose multiplier is smaller holds exactly, so it is a hard one; per metre.
-HARD_PRICE_PER_M = 1e5
+HARD_PRICE_PER_M = landing.PRICE_PER_M
 
 # Iterations of a solve that is not to be stopped, as in the profile.
 MOST_ITERATIONS = 60
@@ -20,7 +20,7 @@ HARD_MISS_M = 1e-6
 class Ours:
     """Our solver on one of the two problems."""
 
-    name, makes = "ours", ("cold", "warm", "step")
+    name, makes, loops = "ours", ("cold", "warm", "step"), True
 
     def __init__(self, program, problem):
         self.problem, self.status = problem, None

@@ -144,7 +144,7 @@ class Solver:
 class Ripopt:
     """ripopt on one of the two problems, cold and warm, over every length of horizon."""
 
-    name, makes = "ripopt", ("cold", "warm", "step")
+    name, makes, loops = "ripopt", ("cold", "warm", "step"), True
 
     def __init__(self, ripopt, bridge, problem, folder):
         self.ripopt, self.bridge, self.problem, self.folder = ripopt, bridge, problem, folder

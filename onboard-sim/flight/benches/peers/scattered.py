@@ -5,12 +5,12 @@ import collections
 import numpy as np
 
 import landing
-from measure import Checks
+from measure import SMALL, Checks
 from ours import Ours
 from result import BENDS_RAD
 from tables import NS_PER_MS, dearer, geometric, head, number, row
 
-OURS, THEIRS = 10_000, 60
+OURS, THEIRS = 10_000, 12 if SMALL else 60
 SEED = 1
 
 

@@ -9,7 +9,7 @@ from interior import COLD, WARM, Nlp, options
 class SpaceInterior:
     """One of them."""
 
-    problem, makes = "space", ()
+    problem, makes, loops = "space", (), False
 
     def __init__(self, solver, folder):
         self.name, self.solver, self.folder = solver, solver, folder

@@ -3,7 +3,7 @@
 import numpy as np
 
 import landing
-from measure import starts
+from measure import STARTS
 from ours import Ours
 from result import BENDS_RAD
 
@@ -64,7 +64,7 @@ def shown(failed, worse=0):
 def cold_cells(field, record, both):
     """Time and ratio of cold solves: of each guess alone, or of both together."""
     times, ratios, failed = [], [], 0
-    for start, _ in enumerate(starts()):
+    for start in range(len(STARTS)):
         groups = [BENDS_RAD] if both else [(bend,) for bend in BENDS_RAD]
         for bends in groups:
             if not record.cold:
@@ -155,6 +155,8 @@ def loops(field):
     head(["", "failed", "ms a step", "ratio", "median", "worst", "largest height off at burn-out, m"])
     own = geometric(s.ns for s in field.ours.loop)
     for record in field.records:
+        if not record.loop:
+            continue
         ns = np.array([s.ns for s in record.loop], dtype=float)
         failed = sum(not s.converged for s in record.loop)
         cells = [geometric(ns) / NS_PER_MS, geometric(ns) / own, np.median(ns) / NS_PER_MS, ns.max() / NS_PER_MS]
@@ -171,15 +173,3 @@ def checks(fields):
             if found.flown:
                 worst = [f"{value:.0e}" for value in (found.cost, found.miss_m, found.gradient)]
                 row([record.name, field.problem, str(found.flown), str(found.refuted), *worst])
-
-
-def show(records, planned_rad):
-    """All tables."""
-    fields = [Field(records, problem) for problem in (landing.HARD, landing.PRICED)]
-    for field in fields:
-        solves(field)
-    for field in fields:
-        steps(field, planned_rad)
-    for field in fields:
-        loops(field)
-    checks(fields)

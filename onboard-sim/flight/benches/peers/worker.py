@@ -20,7 +20,7 @@ def _serve(pipe, module, arguments):
     except Exception:
         pipe.send((None, traceback.format_exc()))
         return
-    pipe.send((version, [(entrant.name, entrant.problem, entrant.makes) for entrant in entrants]))
+    pipe.send((version, [(e.name, e.problem, e.makes, e.loops) for e in entrants]))
     while True:
         try:
             index, method, words, more = pipe.recv()
@@ -33,11 +33,12 @@ def _serve(pipe, module, arguments):
 
 
 class Entrant:
-    """A solver on one of the two problems. `makes`: which of cold solves, warm solves and single iterations it has."""
+    """A solver on one of the two problems. `makes`: which of cold solves, warm solves and single iterations it has;
+    `loops`: whether it flies the closed loop."""
 
-    def __init__(self, pipe, index, name, problem, makes):
+    def __init__(self, pipe, index, name, problem, makes, loops):
         self.pipe, self.index = pipe, index
-        self.name, self.problem, self.makes = name, problem, makes
+        self.name, self.problem, self.makes, self.loops = name, problem, makes, loops
 
     def __getattr__(self, method):
         if method not in CALLED:

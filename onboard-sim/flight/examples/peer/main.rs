@@ -115,6 +115,8 @@ impl Peer {
                 ensure!(samples < planned, "the plan has {planned} intervals; samples must be fewer");
                 let mut problem = self.problem(state(words)?, planned - samples);
                 problem.solver.max_iterations = cap;
+                // A public solver does not ask first whether a start can be landed.
+                problem.touchdown_speed_max_m_s = f64::MAX;
                 let warm = self.plan.shifted(samples);
                 self.timed(&problem, Some(&warm))
             }
@@ -203,7 +205,10 @@ fn timed_from_one(model: &OneGuess) -> Result<String> {
     Ok(answer)
 }
 
-fn number<T: FromStr<Err: Error + Send + Sync + 'static>>(word: Option<&str>, what: &'static str) -> Result<T> {
+fn number<T: FromStr<Err: Error + Send + Sync + 'static>>(
+    word: Option<&str>,
+    what: &'static str,
+) -> Result<T> {
     word.with_context(|| format!("{what} is missing"))?.parse().context(what)
 }
 

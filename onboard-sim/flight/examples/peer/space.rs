@@ -41,11 +41,7 @@ pub(crate) struct Space {
 
 impl Space {
     pub(crate) fn new(solver: SolverLimits) -> Self {
-        Self {
-            workspace: SpaceWorkspace::default(),
-            problem: landing(solver),
-            plan: Plan::default(),
-        }
+        Self { workspace: SpaceWorkspace::default(), problem: landing(solver), plan: Plan::default() }
     }
 
     pub(crate) fn set_price(&mut self, price: f64) {
@@ -79,7 +75,10 @@ impl Space {
     pub(crate) fn warm(&mut self, samples: usize, start: State) -> Result<String> {
         let planned = self.plan.inputs.len();
         let settled = self.problem.end.settled_nodes;
-        ensure!(samples + settled < planned, "the plan has {planned} intervals; samples must be fewer by {settled}");
+        ensure!(
+            samples + settled < planned,
+            "the plan has {planned} intervals; samples must be fewer by {settled}"
+        );
         let Self { workspace, problem, plan } = self;
         let mut rest = problem.clone();
         rest.initial = start;
@@ -113,7 +112,8 @@ fn answer(workspace: &SpaceWorkspace, outcome: &Outcome, ns: i64) -> Result<Stri
 /// Thrust falls with the square of time to the weight.
 fn pushes(thrust_over_weight: f64) -> Vec<Push> {
     let share = |k: usize| k as f64 / INTERVALS as f64;
-    let thrust = |k: usize| GRAVITY_M_S2 * (thrust_over_weight - (thrust_over_weight - 1.0) * share(k) * share(k));
+    let thrust =
+        |k: usize| GRAVITY_M_S2 * (thrust_over_weight - (thrust_over_weight - 1.0) * share(k) * share(k));
     let push = |thrust_m_s2: f64| Push {
         thrust_m_s2,
         turning_rad_s2: TURNING_PER_THRUST * thrust_m_s2,
