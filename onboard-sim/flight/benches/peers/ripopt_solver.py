@@ -172,10 +172,13 @@ class Ripopt:
         self.plan = self.last
 
     def _warm(self, samples, start, how):
-        path, of_equations, of_lower, of_upper = self.plan
+        path, of_equations, _, _ = self.plan
         intervals = (len(path) - landing.slacks(self.problem)) // 7 - samples
         gone = 7 * samples
-        multipliers = (of_equations[6 * samples :], of_lower[gone:], of_upper[gone:])
+        # Given bounds' multipliers, 0.8.2 reads past their end when its preprocessing or restoration changes the number of
+        # variables, and ends the process.
+        none = np.zeros(len(path) - gone)
+        multipliers = (of_equations[6 * samples :], none, none)
         result, self.last = self.solver(intervals, how).solve(start, path[gone:], None if how == COLD else multipliers)
         return result
 
