@@ -24,7 +24,7 @@ def draws():
 
 def ours(own, all_starts):
     """What becomes of every start in our solver, and whether each lands."""
-    ends, lands, times = collections.Counter(), [], []
+    ends, lands, times, odd = collections.Counter(), [], [], []
     checks = Checks()
     for start in all_starts:
         result = own.cold_both(start)
@@ -36,12 +36,16 @@ def ours(own, all_starts):
             ends["converged to a landing" if landed else "converged, the end height missed at its price"] += 1
         else:
             ends[own.status] += 1
+            if own.status != "not landable":
+                odd.append((own.status, start))
     print(f"\n**{len(all_starts)} random cold starts, ours, priced**\n")
     head(["end", "starts"])
     for end, count in ends.most_common():
         row([end, str(count)])
     ms = np.array(times) / NS_PER_MS
     print(f"\nmedian {number(np.median(ms))} ms, largest {number(ms.max())} ms; {checks.flown} flown again, {checks.refuted} refuted")
+    for status, start in odd:
+        print(f"{status} from {start.tolist()}")
     return lands
 
 
