@@ -11,6 +11,9 @@ const SIZE: (u16, u16) = (100, 34);
 /// A person who taps once a second is well within the 2 s.
 const TAP_EVERY: Duration = Duration::from_secs(1);
 
+/// How long a person waits for the answer to what was typed, before typing it again.
+const ANSWERED: Duration = Duration::from_secs(3);
+
 const CREW: &str = r#"
 mode = "two-person"
 [[operator]]
@@ -72,12 +75,29 @@ impl Launch {
     /// Bob asks for the arming, and Ann confirms it: Bob is in command.
     fn armed_by_bob_and_ann() -> Self {
         let mut launch = Self::new();
-        launch.bob.type_until(b"0AARM\r", "FLIGHT Bob asks to arm");
-        launch.ann.wait_for("FLIGHT Bob asks to arm");
-        launch.ann.type_until(b"0ACONFIRM\r", " ARMED ");
+        let [ann, bob] = [&mut launch.ann, &mut launch.bob];
+        agreed((bob, b"0AARM\r", "FLIGHT Bob asks to arm"), (ann, b"0ACONFIRM\r", " ARMED "));
         launch.bob.wait_for(" ARMED ");
         launch
     }
+}
+
+/// One person asks and the other one confirms: the keys of each, and what the other one then sees. On a busy machine the 10 s between
+/// them may pass, and both do it again.
+fn agreed(asks: (&mut Terminal, &[u8], &str), confirms: (&mut Terminal, &[u8], &str)) {
+    let (one, asking, asked) = asks;
+    let (other, confirming, confirmed) = confirms;
+    for _ in 0..10 {
+        one.type_by_hand(asking);
+        if other.wait_within(ANSWERED, |window| window.shows(asked).then_some(())).is_none() {
+            continue;
+        }
+        other.type_by_hand(confirming);
+        if other.wait_within(ANSWERED, |window| window.shows(confirmed).then_some(())).is_some() {
+            return;
+        }
+    }
+    panic!("no `{confirmed}` on:\n{}", other.window().rows().join("\n"));
 }
 
 impl Drop for Launch {
@@ -98,19 +118,17 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
         launch.ann.type_until(b"0AARM\r", "must confirm within");
     }
     assert!(!shows(&launch.ann, " ARMED "), "one alone has armed");
-    launch.bob.wait_for("RANGE SAFETY Ann asks to arm");
-    launch.bob.type_until(b"0ACONFIRM\r", " ARMED ");
+    let [ann, bob] = [&mut launch.ann, &mut launch.bob];
+    agreed((ann, b"0AARM\r", "RANGE SAFETY Ann asks to arm"), (bob, b"0ACONFIRM\r", " ARMED "));
     launch.ann.wait_for(" ARMED ");
     // The start is shared in the same way; whoever confirms must tap.
-    launch.bob.type_until(b"0SSTART\r", "FLIGHT Bob asks to start");
-    launch.ann.wait_for("FLIGHT Bob asks to start");
-    launch.ann.type_until(b"0SCONFIRM\r", " T-");
+    agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
     launch.bob.wait_for("no tap of RANGE SAFETY Ann for 2 s");
     launch.ann.wait_for("start anew");
     assert!(shows(&launch.ann, " ARMED "), "a hold does not disarm");
     // Again, with taps until the release.
-    launch.bob.type_until(b"0SSTART\r", "FLIGHT Bob asks to start");
-    launch.ann.type_until(b"0SCONFIRM\r", " T-");
+    let [ann, bob] = [&mut launch.ann, &mut launch.bob];
+    agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
     let released = (0..60).any(|_| {
         launch.ann.type_bytes(b"T");
         let flies = |window: &e2e::Window| window.shows("POWERED").then_some(());

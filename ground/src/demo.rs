@@ -8,16 +8,16 @@ use std::io;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use onboard_sim::fly::DeadlinePolicy;
-use onboard_sim::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
+use simulated_vehicle::fly::DeadlinePolicy;
+use simulated_vehicle::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
 use tokio::sync::{oneshot, watch};
 
 use crate::cli::Demonstration;
 
-pub use onboard_sim::fly::{LogClock, Speed};
+pub use simulated_vehicle::fly::{LogClock, Speed};
 
 /// How long to wait for the end of the simulator.
 const STOP_WITHIN: Duration = Duration::from_secs(3);

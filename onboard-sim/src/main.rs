@@ -8,9 +8,9 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use onboard_sim::fly::{builtins, load_flight};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
+use simulated_vehicle::fly::{builtins, load_flight};
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]

@@ -15,11 +15,11 @@ use ground::app::clock::{Clock, LogTime};
 use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
-use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
-use onboard_sim::vehicle::VehicleEvent;
 use protocol::dialect::MavMessage;
 use protocol::transport::LinkAddress;
 use sim::plane::DeadlinePolicy;
+use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
+use simulated_vehicle::vehicle::VehicleEvent;
 use tokio::sync::watch;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;

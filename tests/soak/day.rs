@@ -8,12 +8,12 @@ use flight::computer::crew::{Asked, Request};
 use flight::rules::phase::Phase;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
-use onboard_sim::fly::{LoadedFlight, load_flight};
-use onboard_sim::vehicle::Vehicle;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
+use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::fly::{LoadedFlight, load_flight};
+use simulated_vehicle::vehicle::Vehicle;
 
 use crate::footprint::{GROWTH_MAX_BYTES, resident_bytes};
 use crate::{Failure, say};

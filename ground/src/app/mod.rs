@@ -31,11 +31,11 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use onboard_sim::fly::load_flight;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::transport::LinkAddress;
+use simulated_vehicle::fly::load_flight;
 
 use crate::cli::{Cli, Command, LogChoice, Seconds};
 use crate::config::Config;
@@ -202,6 +202,11 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
+    if let Some(name) = &model.settings.vehicle_name {
+        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        model.info(clock.now(), text);
+    }
     let mut signatures = None;
     if let Some((list, file, told)) = checklist {
         model.checklist = Some(list);

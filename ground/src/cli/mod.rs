@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Parser, Subcommand};
-use onboard_sim::fly::StartPoint;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
+use simulated_vehicle::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;

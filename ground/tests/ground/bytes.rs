@@ -13,15 +13,15 @@ use ground::model::Model;
 use ground::update::{Action, Msg, update};
 use ground::view::theme::{Palette, Theme};
 use ground::view::view;
-use onboard_sim::endpoint::VehicleEndpoint;
-use onboard_sim::fly::DeadlinePolicy;
-use onboard_sim::fly::load_flight;
 use protocol::dialect::TdPhase;
 use protocol::frame::{Encoder, FramerCounters};
 use protocol::identity::GROUND;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
+use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::fly::DeadlinePolicy;
+use simulated_vehicle::fly::load_flight;
 
 use crate::rig::settings;
 

@@ -8,10 +8,10 @@ use ground::model::Model;
 use ground::model::dead_reckoning::{Basis, PredictedPosition, predict_position};
 use ground::model::judgement::{Compliance, LEGS, Standard, TABLE_2, overall};
 use ground::update::{Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
-use onboard_sim::fly::{LoadedFlight, load_flight};
-use onboard_sim::vehicle::Vehicle;
 use protocol::frame::Frame;
+use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::fly::{LoadedFlight, load_flight};
+use simulated_vehicle::vehicle::Vehicle;
 
 use crate::rig::settings;
 

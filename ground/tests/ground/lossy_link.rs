@@ -7,13 +7,13 @@ use ground::key::Key;
 use ground::model::Model;
 use ground::model::command::CommandKind;
 use ground::update::{Action, Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
-use onboard_sim::fly::DeadlinePolicy;
-use onboard_sim::fly::load_flight;
 use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
+use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::fly::DeadlinePolicy;
+use simulated_vehicle::fly::load_flight;
 
 use crate::rig::settings;
 

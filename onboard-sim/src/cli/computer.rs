@@ -10,10 +10,10 @@ use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use hil::computer::Counts;
 use hil::start::Pace;
-use onboard_sim::hil::computer::{ComputerEnd, Event};
-use onboard_sim::hil::link::{Brought, HilLink};
 use protocol::identity::VEHICLE;
 use protocol::transport::LinkAddress;
+use simulated_vehicle::hil::computer::{ComputerEnd, Event};
+use simulated_vehicle::hil::link::{Brought, HilLink};
 
 use super::campaign::mission_text;
 use super::fly::interrupted;

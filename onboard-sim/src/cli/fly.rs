@@ -8,11 +8,6 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
-use onboard_sim::fly::{
-    FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
-    log_header,
-};
-use onboard_sim::vehicle::{RocketFlight, VehicleEvent};
 use protocol::crew_file::CrewFile;
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
@@ -21,6 +16,11 @@ use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
 use sim::plane::DeadlinePolicy;
+use simulated_vehicle::fly::{
+    FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
+    log_header,
+};
+use simulated_vehicle::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
 use super::campaign::text_of;

@@ -6,10 +6,10 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
-use onboard_sim::fly::{LoadedFlight, load_flight};
 use onboard_sim::landability::{self, Axis, Map, SpaceQuestion};
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
+use simulated_vehicle::fly::{LoadedFlight, load_flight};
 
 use super::campaign::text_of;
 use super::choices::show;

@@ -8,14 +8,14 @@ use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use hil::lockstep::Patience;
 use hil::start::Pace;
-use onboard_sim::fly::OnTheWire;
-use onboard_sim::hil::link::HilLink;
-use onboard_sim::hil::report::FlightReport;
-use onboard_sim::hil::world::{HilError, Manner, fly};
 use protocol::identity::Address;
 use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
+use simulated_vehicle::fly::OnTheWire;
+use simulated_vehicle::hil::link::HilLink;
+use simulated_vehicle::hil::report::FlightReport;
+use simulated_vehicle::hil::world::{HilError, Manner, fly};
 
 use super::campaign::{mission_text, text_of};
 use super::fly::{WIND_MAX_M_S, with_wind};

@@ -10,7 +10,6 @@ use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
 use flight::vehicle::profile::StartPoint;
-use onboard_sim::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use proptest::prelude::*;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
@@ -20,6 +19,7 @@ use replay::verify::{Obstacle, Verification, VerifyReport, verify};
 use sim::plane::draw::draw;
 use sim::plane::{DeadlinePolicy, PlanarFlight};
 use sim::recipe::Recipe;
+use simulated_vehicle::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use tempfile::TempDir;
 
 /// More frames than any flight of either vehicle has.

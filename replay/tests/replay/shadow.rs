@@ -8,11 +8,11 @@ use flight::computer::LogState;
 use flight::computer::crew::{Asked, Request};
 use flight::rules::arming;
 use flight::rules::phase::Phase;
-use onboard_sim::endpoint::VehicleEndpoint;
-use onboard_sim::vehicle::{RocketFlight, Vehicle};
 use protocol::dialect::MavMessage;
 use replay::shadow::{Check, Flag, Shadow};
 use sim::recipe::Recipe;
+use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::vehicle::{RocketFlight, Vehicle};
 
 use crate::command_line::run;
 use crate::simulated::MK2;

@@ -4,11 +4,11 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use onboard_sim::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;
 use sim::plane::DeadlinePolicy;
+use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
 use tempfile::TempDir;
 use tokio::sync::watch;
 

@@ -22,7 +22,8 @@ fn recipe(program: &str) -> String {
 fn shell(line: &str, folder: &Path, variables: &[(&str, &Path)]) {
     let ours = Path::new(program(Program::OnboardSim).get_program()).parent().expect("a folder").to_owned();
     let theirs = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::env::join_paths([ours].into_iter().chain(std::env::split_paths(&theirs))).expect("a path");
+    let path =
+        std::env::join_paths([ours].into_iter().chain(std::env::split_paths(&theirs))).expect("a path");
     let mut shell = outside("sh");
     shell.args(["-c", line]).env("PATH", path).current_dir(folder).envs(variables.iter().copied());
     let ended = Running::to_end(&mut shell);
@@ -42,7 +43,8 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 /// Merges the parts in a folder as the page says, and compares the whole with a campaign that was never cut.
 fn expect_the_campaign_of_one_machine(folder: &Path) {
     let merge = fs::read_to_string(file("../../ENGINEER.md")).expect("the page");
-    let merge = merge.lines().find(|line| line.starts_with("onboard-sim campaign merge")).expect("how to merge");
+    let merge =
+        merge.lines().find(|line| line.starts_with("onboard-sim campaign merge")).expect("how to merge");
     shell(merge, folder, &[]);
     shell("onboard-sim campaign --flights 9 --out one", folder, &[]);
     let (whole, one) = (files(&folder.join("whole")), files(&folder.join("one")));
@@ -82,10 +84,12 @@ impl Cluster {
         fs::write(folder.join("slurm.conf"), configuration(folder)).unwrap();
 
         let mut munged = outside(found(&["munged"], "munge"));
-        munged.arg("--foreground").args(["key-file", "socket", "pid-file", "log-file", "seed-file"].map(|what| {
-            let path = folder.join(what.trim_end_matches("-file"));
-            format!("--{what}={}", path.display())
-        }));
+        munged.arg("--foreground").args(["key-file", "socket", "pid-file", "log-file", "seed-file"].map(
+            |what| {
+                let path = folder.join(what.trim_end_matches("-file"));
+                format!("--{what}={}", path.display())
+            },
+        ));
         let authentication = Running::start(&mut munged);
         e2e::wait_for_content(&folder.join("pid"));
 

@@ -8,13 +8,13 @@ use std::process::Command;
 use clients::{PYMAVLINK, dialect, tshark, tshark_folder};
 use e2e::{BareGround, Program, Running, program, raw_frames_of};
 use hil::start::{Pace, Start};
-use onboard_sim::hil::computer::ComputerEnd;
-use onboard_sim::hil::messages::{of_frame, of_start};
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
 use protocol::mission::MissionHash;
 use sim::recipe::Recipe;
 use sim::remote::RemoteFlight;
+use simulated_vehicle::hil::computer::ComputerEnd;
+use simulated_vehicle::hil::messages::{of_frame, of_start};
 
 /// A dissector that pymavlink's generator made of our XML reads every frame of whole flights. The flights of the two
 /// vehicles together contain every message of ours but those of a crew.

@@ -8,10 +8,10 @@ mod messages;
 mod real_time;
 
 use hil::start::{Pace, Start};
-use onboard_sim::hil::computer::ComputerEnd;
 use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::remote::RemoteFlight;
+use simulated_vehicle::hil::computer::ComputerEnd;
 
 /// mk2 on a day at the field, with what the wire can carry.
 fn recipe() -> Recipe {

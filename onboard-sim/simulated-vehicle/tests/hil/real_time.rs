@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use hil::real_time::RealTime;
 use hil::start::Pace;
-use onboard_sim::hil::assembly::AnswerAssembly;
-use onboard_sim::hil::messages::{of_frame, of_start};
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::mission::MissionHash;
 use sim::outcome::Outcome;
 use sim::remote::RemoteFlight;
+use simulated_vehicle::hil::assembly::AnswerAssembly;
+use simulated_vehicle::hil::messages::{of_frame, of_start};
 
 use super::bad_wire::{BadWire, Badness};
 use super::{computer, recipe, start};

@@ -6,12 +6,12 @@ use hil::carried::{CarriedCommands, CarriedFix, CarriedReadings};
 use hil::computer::Answer;
 use hil::readings::Switches;
 use hil::start::Pace;
-use onboard_sim::hil::assembly::{AnswerAssembly, FrameAssembly, ToComputer};
-use onboard_sim::hil::messages::{of_answer, of_frame};
 use proptest::prelude::*;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
+use simulated_vehicle::hil::assembly::{AnswerAssembly, FrameAssembly, ToComputer};
+use simulated_vehicle::hil::messages::{of_answer, of_frame};
 
 /// The messages after a way through bytes.
 fn through_bytes(messages: &[MavMessage]) -> Vec<MavMessage> {
