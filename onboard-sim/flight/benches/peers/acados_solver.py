@@ -1,221 +1,162 @@
-"""acados on the landing problem, behind the interface of `solvers.Public`.
+"""acados on the landing problem, in every one of its ways.
 
-The interface and the libraries are those of the installation in ACADOS_SOURCE_DIR, or else of the wheel
-`comma-deps-acados`. Dynamics are discrete (the same RK4 step as everybody's), Hessians exact. One solver for each length of
-the horizon, all from one generated program. The end height is either a hard condition or priced as ours: 1000 a metre.
+Dynamics are discrete: the same RK4 step as everybody's. One solver for each length of the horizon, all from one
+generated program for each way.
 """
 
-import contextlib
-import ctypes
-import importlib.metadata
+import dataclasses
+import itertools
 import os
-import sys
 import time
 
-import casadi as ca
 import numpy as np
 
+import acados_problem
 import landing
 import rollout
-import solvers
-
-PRICE = 1000.0
-# Curvature of the price where the QP wants some, cost units per square metre; smaller ones fail more often.
-PRICE_CURVATURE = 10.0
-X, Z = 0, 1
+from result import Result, cost, guess
 
 
-def installed():
-    """Makes acados importable; the words for its version."""
-    source = os.environ.get("ACADOS_SOURCE_DIR")
-    if source:
-        sys.path.insert(0, os.path.join(source, "interfaces", "acados_template"))
-        return f"the installation in {source}"
-    import acados  # the wheel
+@dataclasses.dataclass
+class Plan:
+    """A path with all its multipliers: of the dynamics, and of the limits at each node."""
 
-    # Its libraries do not find each other by themselves.
-    for library in ("libblasfeo.so", "libqpOASES_e.so.3.1", "libhpipm.so", "libacados.so"):
-        ctypes.CDLL(os.path.join(acados.LIB_DIR, library), mode=ctypes.RTLD_GLOBAL)
+    states: np.ndarray
+    inputs: np.ndarray
+    dynamics: list
+    limits: list
 
-    version = importlib.metadata.version("comma-deps-acados")
-    os.environ["ACADOS_SOURCE_DIR"] = acados.DIR
-    os.environ["ACADOS_PYTHON_INTERFACE_PATH"] = acados.TEMPLATE_DIR
-    os.environ["TERA_PATH"] = acados.TERA_PATH
-    sys.path.insert(0, os.path.dirname(acados.TEMPLATE_DIR))
-    return f"the wheel comma-deps-acados {version}"
-
-
-@contextlib.contextmanager
-def silent(folder):
-    """acados writes into the working directory and, as C does, past Python's standard output."""
-    before, saved = os.getcwd(), os.dup(1)
-    os.chdir(folder)
-    sys.stdout.flush()
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 1)
-    try:
-        yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(saved)
-        os.close(nothing)
-        os.chdir(before)
-
-
-def problem(priced):
-    """The landing as acados takes it."""
-    from acados_template import AcadosModel, AcadosOcp
-
-    ocp, model = AcadosOcp(), AcadosModel()
-    state, gimbal = ca.SX.sym("x", 6), ca.SX.sym("u")
-    model.name = "landing_priced" if priced else "landing_hard"
-    model.x, model.u, model.p = state, gimbal, ca.SX.sym("p", 0)
-    model.disc_dyn_expr = landing.STEP(state, gimbal)
-    ocp.model = model
-    ocp.dims.N = landing.HORIZON
-    weights, target = np.diag(landing.STATE_WEIGHTS), landing.TARGET
-    cost = ocp.cost
-    cost.cost_type_0 = cost.cost_type = cost.cost_type_e = "LINEAR_LS"
-    # The start costs nothing, the end costs a whole step: a sum over the ends of the intervals.
-    cost.W_0, cost.Vx_0, cost.Vu_0 = np.array([[landing.INPUT_WEIGHT]]), np.zeros((1, 6)), np.ones((1, 1))
-    cost.yref_0 = np.zeros(1)
-    cost.W = np.block([[weights, np.zeros((6, 1))], [np.zeros((1, 6)), landing.INPUT_WEIGHT]])
-    cost.Vx, cost.Vu = np.eye(7, 6), np.eye(7, 1, -6)
-    cost.yref = np.append(target, 0.0)
-    cost.W_e, cost.Vx_e, cost.yref_e = landing.STEP_S * weights, np.eye(6), target
-    limits = ocp.constraints
-    limits.x0 = np.array([0.0, 15.0, np.pi / 2.0, -5.0, 0.0, 0.0])
-    limits.idxbu = np.array([0])
-    limits.lbu, limits.ubu = np.array([-landing.GIMBAL_LIMIT_RAD]), np.array([landing.GIMBAL_LIMIT_RAD])
-    limits.idxbx_e = np.array([X, Z])
-    limits.lbx_e, limits.ubx_e = np.array([-landing.X_FINAL_M, 0.0]), np.array([landing.X_FINAL_M, 0.0])
-    if priced:
-        limits.idxsbx_e = np.array([1])
-        cost.zl_e = cost.zu_e = np.array([PRICE])
-        cost.Zl_e = cost.Zu_e = np.array([PRICE_CURVATURE])
-    options = ocp.solver_options
-    options.tf = landing.HORIZON * landing.STEP_S
-    options.integrator_type = "DISCRETE"
-    options.nlp_solver_type = "SQP"
-    options.hessian_approx = "EXACT"
-    options.regularize_method = "CONVEXIFY"
-    options.qp_solver = "PARTIAL_CONDENSING_HPIPM"
-    options.qp_solver_cond_N = 5
-    options.globalization = os.environ.get("ACADOS_GLOBALIZATION", "MERIT_BACKTRACKING")
-    options.nlp_solver_max_iter = solvers.MOST_ITERATIONS
-    options.qp_solver_iter_max = 100
-    options.qp_solver_warm_start = 0
-    for tolerance in ("stat", "eq", "ineq", "comp"):
-        setattr(options, f"nlp_solver_tol_{tolerance}", landing.TOLERANCE)
-    options.print_level = 0
-    options.ext_fun_compile_flags = "-O3 -march=native"
-    return ocp
+    def rest(self, samples):
+        return Plan(self.states[samples:], self.inputs[samples:], self.dynamics[samples:], self.limits[samples:])
 
 
 class Acados:
-    """acados with the end height hard or priced."""
+    """One way of acados on one of the two problems."""
 
-    def __init__(self, folder, priced):
+    def __init__(self, kind, folder, model):
+        """`model`: whose plan is adopted; itself if it is `None`."""
         from acados_template import AcadosOcpSolver
 
-        self.folder, self.priced, self.solvers, self.plan = folder, priced, {}, None
-        os.makedirs(folder, exist_ok=True)
-        self.ocp = problem(priced)
-        self.ocp.code_export_directory = os.path.join(folder, self.ocp.model.name)
-        self.json = os.path.join(folder, self.ocp.model.name + ".json")
-        with silent(folder):
-            AcadosOcpSolver.generate(self.ocp, json_file=self.json)
-            AcadosOcpSolver.build(self.ocp.code_export_directory, with_cython=False, verbose=False)
+        self.kind, self.model, self.solvers = kind, model, {}
+        self.name, self.problem = kind.name, kind.problem
+        self.makes = ("step",) if kind.rti else ("cold", "warm")
+        # Most Gauss-Newton solves of a disturbed loop run to their cap: its single iterations stand for it.
+        self.loops = kind.rti or kind.exact
+        self.plan = self.last = None
+        code = os.path.join(folder, kind.model_name)
+        self.json = code + ".json"
+        if not os.path.exists(code + ".built"):
+            made = acados_problem.problem(kind)
+            made.code_export_directory = code
+            AcadosOcpSolver.generate(made, json_file=self.json)
+            AcadosOcpSolver.build(code, with_cython=False, verbose=False)
+            open(code + ".built", "w", encoding="utf-8").close()
 
     def solver(self, intervals):
         """The solver of a horizon."""
         from acados_template import AcadosOcpSolver
 
         if intervals not in self.solvers:
-            with silent(self.folder):
-                made = AcadosOcpSolver(None, json_file=self.json, build=False, generate=False, verbose=False)
-                if intervals != landing.HORIZON:
-                    made.set_new_time_steps(np.full(intervals, landing.STEP_S))
-                    made.update_qp_solver_cond_N(min(5, intervals))
+            made = AcadosOcpSolver(None, json_file=self.json, build=False, generate=False, verbose=False)
+            if intervals != landing.HORIZON:
+                made.set_new_time_steps(np.full(intervals, landing.STEP_S))
+                if not self.kind.full:
+                    made.update_qp_solver_cond_N(min(acados_problem.BLOCKS, intervals))
             self.solvers[intervals] = made
         return self.solvers[intervals]
 
-    def fill(self, solver, start, states, inputs, multipliers):
+    def fill(self, solver, start, plan, with_multipliers):
         """Puts a start and a first path into a solver."""
-        intervals = len(inputs)
+        intervals = len(plan.inputs)
         for bound in ("lbx", "ubx"):
             solver.set(0, bound, start)
         for k in range(intervals + 1):
-            solver.set(k, "x", states[k])
-            if k < intervals:
-                solver.set(k, "u", np.array([inputs[k]]))
-        dynamics, bounds = multipliers if multipliers else (None, None)
-        # Multiplier of the start, which the end of the step before it was in the plan.
-        of_start = np.zeros(6)
-        if dynamics is not None:
-            _, by_state, _ = rollout.tangent(states[0], inputs[0])
-            of_start = np.array(by_state).T @ dynamics[0]
-        for k in range(intervals + 1):
+            solver.set(k, "x", plan.states[k])
             multiplier = np.zeros(len(solver.get(k, "lam")))
-            if bounds is not None:
-                # The first stage has multipliers of the start, too; a later one of the plan becomes the first.
-                here, there = len(multiplier) // 2, len(bounds[k]) // 2
+            if with_multipliers:
+                # The first node has multipliers of the start, too; a later one of the plan becomes the first.
+                here, there = len(multiplier) // 2, len(plan.limits[k]) // 2
                 shared = min(here, there)
-                multiplier[:shared], multiplier[here : here + shared] = bounds[k][:shared], bounds[k][there : there + shared]
+                multiplier[:shared] = plan.limits[k][:shared]
+                multiplier[here : here + shared] = plan.limits[k][there : there + shared]
                 if k == 0 and here == 7:
+                    # The dynamics' multiplier of the step before it, which is not in the plan.
+                    _, by_state, _ = rollout.tangent(plan.states[0], plan.inputs[0])
+                    of_start = np.array(by_state).T @ plan.dynamics[0]
                     multiplier[1:7], multiplier[8:] = np.maximum(of_start, 0.0), np.maximum(-of_start, 0.0)
             solver.set(k, "lam", multiplier)
             if k < intervals:
-                solver.set(k, "pi", dynamics[k] if dynamics is not None else np.zeros(6))
-        if self.priced:
+                solver.set(k, "u", np.array([plan.inputs[k]]))
+                solver.set(k, "pi", plan.dynamics[k] if with_multipliers else np.zeros(6))
+        if self.problem == landing.PRICED:
             for slack in ("sl", "su"):
                 solver.set(intervals, slack, np.zeros(1))
 
-    def solve(self, start, states, inputs, multipliers=None):
+    def solve(self, start, plan, with_multipliers):
         """Solves twice from a path; the second run is timed."""
-        intervals = len(inputs)
+        intervals = len(plan.inputs)
         solver = self.solver(intervals)
-        solver.options_set("globalization", "fixed_step" if multipliers else "merit_backtracking")
-        # Without its slacks even an optimum looks unsolved to it.
-        solver.options_set("initialize_t_slacks", 1 if multipliers else 0)
+        if not self.kind.rti:
+            # With the line search more of the warm solves fail.
+            solver.options_set("globalization", "fixed_step" if with_multipliers else "merit_backtracking")
+            # Without its slacks even an optimum looks unsolved to it.
+            solver.options_set("initialize_t_slacks", 1 if with_multipliers else 0)
         for _ in range(2):
             solver.reset()
-            self.fill(solver, start, states, inputs, multipliers)
+            self.fill(solver, start, plan, with_multipliers)
             before = time.thread_time_ns()
             status = solver.solve()
             ns = time.thread_time_ns() - before
-        found = np.array([solver.get(k, "x") for k in range(intervals + 1)])
-        gimbals = np.array([solver.get(k, "u")[0] for k in range(intervals)])
-        dynamics = [solver.get(k, "pi") for k in range(intervals)]
-        bounds = [solver.get(k, "lam") for k in range(intervals + 1)]
-        cost = landing.STEP_S * 0.5 * (
-            ((found[1:] - landing.TARGET) ** 2 @ landing.STATE_WEIGHTS).sum() + landing.INPUT_WEIGHT * gimbals @ gimbals
+        nodes, steps = range(intervals + 1), range(intervals)
+        self.last = Plan(
+            np.array([solver.get(k, "x") for k in nodes]),
+            np.array([solver.get(k, "u")[0] for k in steps]),
+            [solver.get(k, "pi") for k in steps],
+            [solver.get(k, "lam") for k in nodes],
         )
-        lands = abs(found[-1, Z]) <= solvers.LANDING_MISS_M
-        plan = (found, gimbals, dynamics, bounds)
         iterations = int(np.ravel(solver.get_stats("sqp_iter"))[0])
-        return solvers.Result(status == 0, ns, iterations, float(cost), gimbals, plan, lands)
+        finite = bool(np.all(np.isfinite(self.last.inputs)))
+        return Result(status == 0 and finite, ns, iterations, cost(self.last.states, self.last.inputs), self.last.inputs)
 
-    def cold(self, start, bend):
-        first = solvers.guess(start, bend).reshape(-1, 7)
-        return self.solve(start, np.vstack([start, first[:, 1:]]), first[:, 0])
+    def cold(self, start, bend_rad):
+        return self.solve(start, Plan(*guess(start, bend_rad), None, None), False)
 
     def adopt(self, start, states, inputs):
         """Converges from a given optimum; holds it."""
-        result = self.solve(start, np.asarray(states), np.asarray(inputs))
-        self.hold(result)
+        if self.model is not None:
+            self.plan = self.model.plan
+            return None
+        result = self.solve(start, Plan(np.asarray(states), np.asarray(inputs), None, None), False)
+        self.hold()
         return result
 
-    def hold(self, result):
-        self.plan = result.plan
+    def hold(self):
+        self.plan = self.last
 
     def warm(self, samples, start, retry=False):
         """Solves what is left some samples after the plan began, from the plan shifted and rolled out from where the
-        vehicle is (a hard end height needs that); with `retry`, without multipliers."""
-        states, inputs, dynamics, bounds = self.plan
-        inputs = inputs[samples:]
-        path = [np.asarray(start, dtype=float)]
-        for gimbal in inputs:
-            path.append(np.array(landing.STEP(path[-1], gimbal)).ravel())
-        multipliers = None if retry else (dynamics[samples:], bounds[samples:])
-        return self.solve(start, np.array(path), inputs, multipliers)
+        vehicle is; with `retry`, without multipliers. A single iteration of the priced problem is nearer the optimum from
+        the plan as it is; with a hard end height every fifth QP then has no solution."""
+        rest = self.plan.rest(samples)
+        if not (self.kind.rti and self.problem == landing.PRICED):
+            rest.states = rollout.states(start, rest.inputs)
+        return self.solve(start, rest, not retry)
+
+    def step(self, samples, start):
+        """One real-time iteration, preparation and feedback."""
+        return self.warm(samples, start)
+
+
+def entrants(folder, wheel_folder):
+    """Called by `worker`. All adopt the plan of the exact SQP: from an optimum without multipliers others do not converge."""
+    version = acados_problem.installed(wheel_folder)
+    os.makedirs(folder, exist_ok=True)
+    os.chdir(folder)  # acados writes into the working directory
+    made = []
+    for problem in (landing.HARD, landing.PRICED):
+        model = None
+        for rti, exact, full in itertools.product((False, True), (True, False), (False, True)):
+            entrant = Acados(acados_problem.Kind(problem, rti, exact, full), folder, model)
+            model = model or entrant
+            made.append(entrant)
+    return version, made

@@ -1,12 +1,13 @@
-"""The landing paper's problem as a CasADi NLP, compiled to C, and the public solvers on it.
+"""The landing paper's problem as a CasADi NLP, compiled to C.
 
-Variables are ordered by stage: (u_0, x_1, u_1, x_2, ..., u_{N-1}, x_N); the start state is a parameter.
-SI and radians; states are (x, z, theta, u, w, q) as in the controller.
+Variables are ordered by stage: (u_0, x_1, u_1, x_2, ..., u_{N-1}, x_N), and for the priced problem two slacks; the start
+state is a parameter. SI and radians; states are (x, z, theta, u, w, q) as in the controller.
+
+The end height is either a hard condition, z_N = 0, or priced: a miss costs 1000 a metre.
 """
 
 import math
 import os
-import subprocess
 
 import casadi as ca
 import numpy as np
@@ -21,7 +22,9 @@ GIMBAL_LIMIT_RAD = math.radians(20.0)
 X_FINAL_M = 20.0
 TOLERANCE = 1e-6
 
-FLAGS = ["-O3", "-march=native", "-fPIC", "-shared"]
+HARD, PRICED = "hard", "priced"
+# Of a metre of missed end height, cost units.
+PRICE_PER_M = 1000.0
 
 
 def step_function():
@@ -52,48 +55,54 @@ def step_function():
 STEP = step_function()
 
 
-def nlp(intervals):
-    """The problem over `intervals` samples; one column of `path` a stage: (u_k, x_{k+1})."""
-    start, path = ca.MX.sym("start", 6), ca.MX.sym("path", 7, intervals)
+def slacks(problem):
+    """Number of variables after the path: the miss of the end height, above and below."""
+    return 2 if problem == PRICED else 0
+
+
+def nlp(intervals, problem):
+    """The problem over `intervals` samples; one column of the path a stage: (u_k, x_{k+1})."""
+    start, path, miss = ca.MX.sym("start", 6), ca.MX.sym("path", 7, intervals), ca.MX.sym("miss", slacks(problem))
     gimbals, after = path[0, :], path[1:, :]
     gaps = after - STEP.map(intervals)(ca.horzcat(start, after[:, :-1]), gimbals)
     misses = after - ca.repmat(ca.DM(TARGET), 1, intervals)
     weighted = ca.mtimes(ca.diag(ca.DM(STATE_WEIGHTS)), misses)
     cost = STEP_S * 0.5 * (ca.dot(misses, weighted) + INPUT_WEIGHT * ca.dot(gimbals, gimbals))
-    return {"x": ca.vec(path), "p": start, "f": cost, "g": ca.vec(gaps)}
+    equations = [ca.vec(gaps)]
+    if problem == PRICED:
+        cost += PRICE_PER_M * ca.sum1(miss)
+        equations.append(after[1, -1] - miss[0] + miss[1])
+    return {"x": ca.vertcat(ca.vec(path), miss), "p": start, "f": cost, "g": ca.vertcat(*equations)}
 
 
-def structure(solver, intervals):
+def bounds(intervals, problem):
+    """Lower and upper bounds of the variables."""
+    lower = np.full((intervals, 7), -np.inf)
+    lower[:, 0] = -GIMBAL_LIMIT_RAD
+    lower[-1, 1] = -X_FINAL_M
+    upper = -lower
+    if problem == HARD:
+        lower[-1, 2] = upper[-1, 2] = 0.0
+    more = slacks(problem)
+    return np.append(lower.ravel(), np.zeros(more)), np.append(upper.ravel(), np.full(more, np.inf))
+
+
+def structure(solver, intervals, problem):
     """What a solver is told of the problem's structure."""
     if solver != "fatrop":
         return {}
+    more = slacks(problem)
+    ends = 1 if more else 0
     return {
         "structure_detection": "manual",
         "N": intervals,
         "nx": [0] + [6] * intervals,
-        "nu": [1] * intervals + [0],
-        "ng": [0] * (intervals + 1),
-        "equality": [True] * (6 * intervals),
+        "nu": [1] * intervals + [more],
+        "ng": [0] * intervals + [ends],
+        "equality": [True] * (6 * intervals + ends),
     }
 
 
-def compiled(solver, intervals, folder, expand=False):
-    """Path of a shared library of the problem's functions and derivatives as `solver` wants them.
-
-    `expand` unrolls all stages into one straight line: a little faster, and minutes to compile.
-    """
-    name = f"{solver}_{intervals}" + ("_expanded" if expand else "")
-    library = os.path.join(folder, name + ".so")
-    if not os.path.exists(library):
-        options = {**structure(solver, intervals), "expand": expand}
-        generator = ca.nlpsol("S", solver, nlp(intervals), options)
-        before = os.getcwd()
-        os.chdir(folder)  # CasADi writes into the working directory
-        try:
-            generator.generate_dependencies(name + ".c")
-        finally:
-            os.chdir(before)
-        source, partial = os.path.join(folder, name + ".c"), library + ".partial"
-        subprocess.check_call([os.environ.get("CC", "cc"), *FLAGS, source, "-o", partial])
-        os.rename(partial, library)
-    return library
+def library_path(solver, intervals, problem, folder):
+    """Where the functions of a problem are, or will be."""
+    return os.path.join(folder, f"{solver}_{problem}_{intervals}.so")

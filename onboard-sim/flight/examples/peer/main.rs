@@ -4,11 +4,17 @@
 //! m/s and rad/s. The problem is the landing paper's own (only distance and height are limited at the end), N = 50.
 //!
 //! ```text
-//! cold STATE          solve the whole horizon from the solver's own two bent guesses
-//! hold                make the last solution the plan
-//! warm SAMPLES STATE  solve what is left SAMPLES after the plan began, warm-started with the plan
-//! sweep STATE         time the layers of one iteration at the cold solution
-//! peak                time the arithmetic of this machine
+//! price PRICE              what a metre of missed end height costs from now on; a high price makes it a hard condition
+//! cold both STATE          solve the whole horizon from the solver's own two bent guesses
+//! cold 0|1 STATE           solve it from one of them
+//! hold                     make the last solution the plan
+//! warm SAMPLES CAP STATE   solve what is left SAMPLES after the plan began, warm-started with the plan, in at most CAP
+//!                          iterations
+//! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at its beginning
+//! space hold               make that solution the plan in space
+//! space warm SAMPLES STATE solve what is left of it
+//! sweep STATE              time the layers of one iteration at the cold solution
+//! peak                     time the arithmetic of this machine
 //! ```
 //!
 //! A solve runs twice, and the second run is timed in the thread's own processor time, so interruptions do not count.
@@ -18,11 +24,15 @@
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
+mod one_guess;
 mod peak;
+mod space;
 
+use std::error::Error;
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::{BufRead, Write as _};
+use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
@@ -30,6 +40,9 @@ use flight::guidance::landing::landing_problem;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::profile::Profile;
 use nmpc::{Problem, Solution, WarmStart, Workspace, solve, solve_into};
+use one_guess::OneGuess;
+use space::Space;
+use stages::Status;
 
 const HORIZON: usize = 50;
 
@@ -53,6 +66,7 @@ struct Peer {
     workspace: Workspace,
     last: Solution,
     plan: Solution,
+    space: Space,
 }
 
 impl Peer {
@@ -61,8 +75,10 @@ impl Peer {
             vehicles::profile::builtin("paper-calibrated").context("built-in profile paper-calibrated")?;
         profile.nmpc.limits.final_box = None;
         profile.nmpc.limits.altitude_min_m = None;
+        let space = Space::new(profile.nmpc.solver);
         Ok(Self {
             profile,
+            space,
             workspace: Workspace::default(),
             last: Solution::default(),
             plan: Solution::default(),
@@ -72,26 +88,60 @@ impl Peer {
     fn answer(&mut self, line: &str) -> Result<String> {
         let mut words = line.split_whitespace();
         match words.next() {
+            Some("price") => {
+                let price = number(words.next(), "price")?;
+                self.profile.nmpc.solver.terminal_penalty = price;
+                self.space.set_price(price);
+                Ok("priced".to_owned())
+            }
             Some("cold") => {
+                let which = words.next().context("which guess is missing")?;
                 let problem = self.problem(state(words)?, HORIZON);
-                self.timed(&problem, None)
+                match which {
+                    "both" => self.timed(&problem, None),
+                    "0" => timed_from_one(&OneGuess { problem: &problem, index: 0 }),
+                    "1" => timed_from_one(&OneGuess { problem: &problem, index: 1 }),
+                    _ => bail!("guess '{which}': both, 0 or 1"),
+                }
             }
             Some("hold") => {
                 self.plan = self.last.clone();
                 Ok("held".to_owned())
             }
             Some("warm") => {
-                let samples: usize =
-                    words.next().context("samples are missing")?.parse().context("samples")?;
+                let samples: usize = number(words.next(), "samples")?;
+                let cap = number(words.next(), "cap")?;
                 let planned = self.plan.inputs_rad.len();
                 ensure!(samples < planned, "the plan has {planned} intervals; samples must be fewer");
-                let problem = self.problem(state(words)?, planned - samples);
+                let mut problem = self.problem(state(words)?, planned - samples);
+                problem.solver.max_iterations = cap;
+                // A public solver does not ask first whether a start can be landed.
+                problem.touchdown_speed_max_m_s = f64::MAX;
                 let warm = self.plan.shifted(samples);
                 self.timed(&problem, Some(&warm))
             }
+            Some("space") => self.in_space(words),
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
-            _ => bail!("must start with cold, hold, warm, sweep or peak"),
+            _ => bail!("must start with price, cold, hold, warm, space, sweep or peak"),
+        }
+    }
+
+    fn in_space<'a>(&mut self, mut words: impl Iterator<Item = &'a str>) -> Result<String> {
+        match words.next() {
+            Some("cold") => {
+                let ratio = number(words.next(), "ratio")?;
+                self.space.cold(ratio, numbers(words)?)
+            }
+            Some("hold") => {
+                self.space.hold();
+                Ok("held".to_owned())
+            }
+            Some("warm") => {
+                let samples = number(words.next(), "samples")?;
+                self.space.warm(samples, numbers(words)?)
+            }
+            _ => bail!("in space: cold, hold or warm"),
         }
     }
 
@@ -139,11 +189,35 @@ impl Peer {
     }
 }
 
-fn state<'a>(words: impl Iterator<Item = &'a str>) -> Result<PlanarState> {
+/// Solves from one guess twice, each time with the buffers of the solve before.
+fn timed_from_one(model: &OneGuess) -> Result<String> {
+    let mut workspace = stages::Workspace::default();
+    workspace.solve(black_box(model), None);
+    let before = thread_ns();
+    let outcome = workspace.solve(black_box(model), None);
+    let ns = thread_ns() - before;
+    let status = if outcome.status == Status::Converged { "converged" } else { "failed" };
+    let stages::Outcome { iterations, cost, stationarity, feasibility, miss, .. } = outcome;
+    let mut answer = format!("{status} {ns} {iterations} {cost:e} {stationarity:e} {feasibility:e} {miss:e}");
+    for input in workspace.inputs().as_flattened() {
+        write!(answer, " {input:e}")?;
+    }
+    Ok(answer)
+}
+
+fn number<T: FromStr<Err: Error + Send + Sync + 'static>>(
+    word: Option<&str>,
+    what: &'static str,
+) -> Result<T> {
+    word.with_context(|| format!("{what} is missing"))?.parse().context(what)
+}
+
+fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[f64; N]> {
     let numbers: Vec<f64> =
         words.map(|word| word.parse().with_context(|| format!("number '{word}'"))).collect::<Result<_>>()?;
-    let state: [f64; 6] = numbers
-        .try_into()
-        .map_err(|got: Vec<f64>| anyhow::anyhow!("6 numbers make a state, not {}", got.len()))?;
-    Ok(PlanarState::from_array(state))
+    numbers.try_into().map_err(|got: Vec<f64>| anyhow::anyhow!("{N} numbers make a state, not {}", got.len()))
+}
+
+fn state<'a>(words: impl Iterator<Item = &'a str>) -> Result<PlanarState> {
+    Ok(PlanarState::from_array(numbers(words)?))
 }

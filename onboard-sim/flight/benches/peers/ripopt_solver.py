@@ -1,0 +1,202 @@
+"""ripopt, an interior-point method in Rust, through its C interface, with the compiled functions that IPOPT gets."""
+
+import ctypes
+import os
+import time
+
+import casadi as ca
+import numpy as np
+
+import landing
+from interior import COLD, ONE_STEP, WARM, claimed, variables
+from result import MOST_ITERATIONS, Result, guess
+
+# What it takes for infinite.
+INFINITE = 1e30
+
+OPTIONS = {"tol": landing.TOLERANCE, "max_iter": MOST_ITERATIONS, "print_level": 0}
+WARM_OPTIONS = {
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-8,
+    "warm_start_bound_push": 1e-9,
+    "warm_start_bound_frac": 1e-9,
+    "warm_start_mult_bound_push": 1e-9,
+}
+
+INTS, DOUBLES = ctypes.POINTER(ctypes.c_int), ctypes.POINTER(ctypes.c_double)
+CALLBACKS = ("f", "grad_f", "g", "jac_g", "hess_l")
+RESULTS = {"f": "f", "grad_f": "grad_f_x", "g": "g", "jac_g": "jac_g_x", "hess_l": "triu_hess_gamma_x_x"}
+
+
+class Function(ctypes.Structure):
+    """`struct function` of the bridge."""
+
+    _fields_ = [
+        ("call", ctypes.c_void_p),
+        ("arg", ctypes.c_void_p),
+        ("res", ctypes.c_void_p),
+        ("iw", ctypes.c_void_p),
+        ("w", ctypes.c_void_p),
+        ("out", ctypes.c_int),
+    ]
+
+
+class Problem(ctypes.Structure):
+    """`struct problem` of the bridge."""
+
+    _fields_ = [(name, Function) for name in CALLBACKS] + [
+        (name, ctypes.c_void_p) for name in ("parameter", "jac_row", "jac_col", "hess_row", "hess_col")
+    ]
+
+
+def doubles(array):
+    return array.ctypes.data_as(DOUBLES)
+
+
+class Functions:
+    """A compiled problem, as the bridge reads it."""
+
+    def __init__(self, library):
+        self.library = ctypes.CDLL(library)
+        self.kept, self.sparsity = [], {}
+        self.parameter = np.zeros(6)
+        self.problem = Problem(parameter=self.parameter.ctypes.data)
+        for name in CALLBACKS:
+            setattr(self.problem, name, self._function(name, ca.external(f"nlp_{name}", library)))
+        jac_row, jac_col = self.sparsity["jac_g"]
+        # CasADi has the upper triangle.
+        hess_col, hess_row = self.sparsity["hess_l"]
+        for name, places in (("jac_row", jac_row), ("jac_col", jac_col), ("hess_row", hess_row), ("hess_col", hess_col)):
+            setattr(self.problem, name, self._keep(np.array(places, dtype=np.intc)))
+
+    def _keep(self, array):
+        self.kept.append(array)
+        return array.ctypes.data
+
+    def _function(self, name, function):
+        out = function.name_out().index(RESULTS[name])
+        self.sparsity[name] = function.sparsity_out(out).get_triplet()
+        memory = {
+            part: self._keep(np.zeros(max(1, size), dtype=kind))
+            for part, size, kind in (
+                ("arg", function.sz_arg(), np.uintp),
+                ("res", function.sz_res(), np.uintp),
+                ("iw", function.sz_iw(), np.int64),
+                ("w", function.sz_w(), np.float64),
+            )
+        }
+        call = ctypes.cast(getattr(self.library, f"nlp_{name}"), ctypes.c_void_p).value
+        return Function(call=call, out=out, **memory)
+
+
+class Solver:
+    """One problem in one ripopt."""
+
+    def __init__(self, ripopt, bridge, functions, intervals, problem, how):
+        self.ripopt, self.functions, self.intervals = ripopt, functions, intervals
+        lower, upper = (np.clip(bound, -INFINITE, INFINITE) for bound in landing.bounds(intervals, problem))
+        self.variables, self.equations = len(lower), 6 * intervals + (1 if problem == landing.PRICED else 0)
+        zeros = np.zeros(self.equations)
+        nonzeros = [len(functions.sparsity[name][0]) for name in ("jac_g", "hess_l")]
+        callbacks = [ctypes.cast(getattr(bridge, f"bridge_{name}"), ctypes.c_void_p) for name in CALLBACKS]
+        self.handle = ctypes.c_void_p(
+            ripopt.ripopt_create(
+                self.variables, doubles(lower), doubles(upper), self.equations, doubles(zeros), doubles(zeros), *nonzeros, 0, *callbacks
+            )
+        )
+        options = dict(OPTIONS)
+        if how != COLD:
+            options |= WARM_OPTIONS
+        if how == ONE_STEP:
+            options["max_iter"] = 1
+        for key, value in options.items():
+            self._set(key, value)
+
+    def _set(self, key, value):
+        keyword, ripopt = key.encode(), self.ripopt
+        if isinstance(value, str):
+            taken = ripopt.ripopt_add_str_option(self.handle, keyword, value.encode())
+        elif isinstance(value, int):
+            taken = ripopt.ripopt_add_int_option(self.handle, keyword, value)
+        else:
+            taken = ripopt.ripopt_add_num_option(self.handle, keyword, ctypes.c_double(value))
+        if not taken:
+            raise SystemExit(f"ripopt does not take {key} = {value}")
+
+    def solve(self, start, first, multipliers=None):
+        """Solves twice from a path and multipliers, and times the second; the result, and the plan."""
+        self.functions.parameter[:] = start
+        for _ in range(2):
+            found = first.copy()
+            fresh = (np.zeros(self.equations), np.zeros(self.variables), np.zeros(self.variables))
+            of_equations, of_lower, of_upper = (m.copy() for m in multipliers or fresh)
+            # All its threads, if it had any.
+            before = time.process_time_ns()
+            status = self.ripopt.ripopt_solve(
+                self.handle, doubles(found), None, None, doubles(of_equations), doubles(of_lower), doubles(of_upper), ctypes.byref(self.functions.problem)
+            )
+            ns = time.process_time_ns() - before
+        inputs, running = claimed(found, self.intervals)
+        iterations = self.ripopt.ripopt_get_iter_count(self.handle)
+        return Result(status == 0, ns, iterations, running, inputs), (found, of_equations, of_lower, of_upper)
+
+
+class Ripopt:
+    """ripopt on one of the two problems, cold and warm, over every length of horizon."""
+
+    name, makes, loops = "ripopt", ("cold", "warm", "step"), True
+
+    def __init__(self, ripopt, bridge, problem, folder):
+        self.ripopt, self.bridge, self.problem, self.folder = ripopt, bridge, problem, folder
+        self.solvers, self.plan, self.last = {}, None, None
+
+    def solver(self, intervals, how):
+        if (intervals, how) not in self.solvers:
+            functions = Functions(landing.library_path("ipopt", intervals, self.problem, self.folder))
+            self.solvers[intervals, how] = Solver(self.ripopt, self.bridge, functions, intervals, self.problem, how)
+        return self.solvers[intervals, how]
+
+    def cold(self, start, bend_rad):
+        first = variables(*guess(start, bend_rad), self.problem)
+        result, self.last = self.solver(landing.HORIZON, COLD).solve(start, first)
+        return result
+
+    def adopt(self, start, states, inputs):
+        """Converges from a given optimum; holds it."""
+        first = variables(states, inputs, self.problem)
+        result, self.last = self.solver(landing.HORIZON, COLD).solve(start, first)
+        self.hold()
+        return result
+
+    def hold(self):
+        self.plan = self.last
+
+    def _warm(self, samples, start, how):
+        path, of_equations, _, _ = self.plan
+        intervals = (len(path) - landing.slacks(self.problem)) // 7 - samples
+        gone = 7 * samples
+        # Given bounds' multipliers, 0.8.2 reads past their end when its preprocessing or restoration changes the number of
+        # variables, and ends the process.
+        none = np.zeros(len(path) - gone)
+        multipliers = (of_equations[6 * samples :], none, none)
+        result, self.last = self.solver(intervals, how).solve(start, path[gone:], None if how == COLD else multipliers)
+        return result
+
+    def warm(self, samples, start, retry=False):
+        """Solves what is left some samples after the plan began, from the plan shifted; with `retry`, with the
+        barrier of a cold solve."""
+        return self._warm(samples, start, COLD if retry else WARM)
+
+    def step(self, samples, start):
+        """One iteration of a warm solve."""
+        return self._warm(samples, start, ONE_STEP)
+
+
+def entrants(library, bridge, folder):
+    """Called by `worker`."""
+    ripopt, bridge = ctypes.CDLL(library), ctypes.CDLL(bridge)
+    ripopt.ripopt_create.restype = ctypes.c_void_p
+    number = (ctypes.c_int(), ctypes.c_int(), ctypes.c_int())
+    ripopt.ripopt_get_version(*map(ctypes.byref, number))
+    version = ".".join(str(part.value) for part in number)
+    return f"ripopt {version}", [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.PRICED)]
