@@ -9,7 +9,7 @@ use std::hint::black_box;
 use std::io::{Read, Write as _};
 use std::time::{Duration, Instant};
 
-use mavlink::{MavHeader, write_v2_msg};
+use mavlink_core::{MavHeader, write_v2_msg};
 use mavlink_core::MavlinkReader;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA,

@@ -8,7 +8,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::rules::phase::Phase;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
+use onboard_sim::endpoint::{VehicleEndpoint, step};
 use onboard_sim::fly::{LoadedFlight, load_flight};
 use onboard_sim::vehicle::Vehicle;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
@@ -73,7 +73,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             &[]
         };
         let own: Vec<Request> = asked.iter().copied().map(Request::of_the_programme).collect();
-        drop(endpoint.step(&mut vehicle, &own, &mut || Duration::ZERO));
+        drop(step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO));
         for outgoing in endpoint.poll(&vehicle) {
             drop(update(model, Msg::Frame(outgoing.frame), now));
         }

@@ -13,7 +13,7 @@ use ground::model::Model;
 use ground::update::{Action, Msg, update};
 use ground::view::theme::{Palette, Theme};
 use ground::view::view;
-use onboard_sim::endpoint::VehicleEndpoint;
+use onboard_sim::endpoint::{VehicleEndpoint, step};
 use onboard_sim::fly::DeadlinePolicy;
 use onboard_sim::fly::load_flight;
 use protocol::dialect::TdPhase;
@@ -56,7 +56,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let (mut tick_at, mut over_at) = (Duration::ZERO, None);
     loop {
         let now = Duration::from_secs_f64(vehicle.time_s());
-        endpoint.step(&mut vehicle, &[], &mut || Duration::ZERO);
+        step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
         let mut msgs = Vec::new();
         for leaving in endpoint.poll(&vehicle) {
             let frame = leaving.frame;

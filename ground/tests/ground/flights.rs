@@ -8,7 +8,7 @@ use ground::model::Model;
 use ground::model::dead_reckoning::{Basis, PredictedPosition, predict_position};
 use ground::model::judgement::{Compliance, LEGS, Standard, TABLE_2, overall};
 use ground::update::{Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
+use onboard_sim::endpoint::{VehicleEndpoint, step};
 use onboard_sim::fly::{LoadedFlight, load_flight};
 use onboard_sim::vehicle::Vehicle;
 use protocol::frame::Frame;
@@ -38,7 +38,7 @@ fn mk2(number: u64) -> (Vec<(Duration, Frame)>, bool) {
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {
         let ready = rocket.phase().on_pad() && rocket.snapshot().checks_failed == 0;
         let own = if ready { &[Asked::Arm, Asked::Start].map(Request::of_the_programme)[..] } else { &[] };
-        endpoint.step(&mut rocket, own, &mut || Duration::ZERO);
+        step(&mut endpoint, &mut rocket, own, &mut || Duration::ZERO);
         if rocket.is_over() {
             stands_s += rocket.frame_s();
         }

@@ -7,7 +7,7 @@ use ground::key::Key;
 use ground::model::Model;
 use ground::model::command::CommandKind;
 use ground::update::{Action, Msg, update};
-use onboard_sim::endpoint::VehicleEndpoint;
+use onboard_sim::endpoint::{VehicleEndpoint, step};
 use onboard_sim::fly::DeadlinePolicy;
 use onboard_sim::fly::load_flight;
 use protocol::command::CommandRequest;
@@ -85,7 +85,7 @@ fn run(seed: u64) -> Run {
             for frame in up.arrived(now) {
                 endpoint.on_frame(0, &frame, &vehicle);
             }
-            endpoint.step(&mut vehicle, &[], &mut || Duration::ZERO);
+            step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
             for leaving in endpoint.poll(&vehicle) {
                 down.send(leaving.frame, now);
             }

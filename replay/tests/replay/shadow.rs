@@ -8,7 +8,7 @@ use flight::computer::LogState;
 use flight::computer::crew::{Asked, Request};
 use flight::rules::arming;
 use flight::rules::phase::Phase;
-use onboard_sim::endpoint::VehicleEndpoint;
+use onboard_sim::endpoint::{VehicleEndpoint, step};
 use onboard_sim::vehicle::{RocketFlight, Vehicle};
 use protocol::dialect::MavMessage;
 use replay::shadow::{Check, Flag, Shadow};
@@ -100,7 +100,7 @@ fn flown(mission: &str, number: u64, Trouble { fault, impulse_share }: Trouble<'
         } else {
             Vec::new()
         };
-        endpoint.step(&mut vehicle, &own, &mut || Duration::ZERO);
+        step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO);
         let now_s = vehicle.time_s();
         for sent in endpoint.poll(&vehicle) {
             let message = sent.frame.decode().unwrap();

@@ -7,7 +7,7 @@ use sim::dispersion::Dispersion;
 
 use super::*;
 use crate::fly::{LoadedFlight, load_flight};
-use crate::streams::FROM_APOGEE;
+use vehicle_link::streams::FROM_APOGEE;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
