@@ -34,7 +34,7 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a vehicle says and hears. The code of all 248 messages would not fit into a flight computer's flash.
+/// What a vehicle says and hears. The code of all 254 messages would not fit into a flight computer's flash.
 const OF_A_VEHICLE: &str = "
     HEARTBEAT SYS_STATUS SYSTEM_TIME PING PARAM_REQUEST_READ PARAM_REQUEST_LIST PARAM_VALUE PARAM_SET GPS_RAW_INT ATTITUDE
     ATTITUDE_QUATERNION LOCAL_POSITION_NED GLOBAL_POSITION_INT MISSION_WRITE_PARTIAL_LIST MISSION_ITEM MISSION_REQUEST

@@ -90,7 +90,9 @@ impl Crewed {
         input.hearing(uplink, commander, requests)
     }
 
-    /// Speaks with the ground after a frame; returns what the next one is told and asked.
+    /// Speaks with the ground after a frame; returns what the next one is told and asked. Never inline: what it keeps on the stack
+    /// would lie below the flight computer's, whose own is the largest.
+    #[inline(never)]
     pub(crate) fn flown(
         &mut self,
         input: &Input<'_>,
