@@ -13,8 +13,8 @@ use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, AVAILABLE_MODES_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage,
     MavResult, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TIMESYNC_DATA, TdCheck,
 };
-use protocol::frame::{Encoder, Frame};
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
+use protocol::identity::{Address, GROUND, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::text::Reassembler;
 use vehicle_link::streams::{STANDARD, Streams};
 

@@ -3,6 +3,7 @@
 use flight::rules::arming::{UPLINK_CHECK, all_passed};
 use flight::rules::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
 use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdMotor};
+use protocol::signing::Rejection;
 use sim::dispersion::Dispersion;
 
 use super::*;
